@@ -1,13 +1,14 @@
-"""Robots of a package stand up, trot, jump and reach: problems from their files alone, solved and replayed.
+"""Robots of a package stand up, trot, walk, jump, reach and push: problems from their files alone, and closed loops.
 
     pip install example-robot-data
     python benchmarks/robots.py                      one line per robot and task
     python benchmarks/robots.py --match go1
 
-Feet, stance and weights are found as `dojo_opt.problems.legs` does; only feet that a file has as meshes, or not at all,
+Feet, stance and weights are found as `dojo_opt.gaits.legs` does; only feet that a file has as meshes, or not at all,
 are named here. A plan is replayed under its gains at a fifth of its time step. It counts as done when it is solved, all
 steps of the replay are solved, and the robot ends within 2 cm of the plan and is upright all the time, or the hand of
-an arm ends within 5 mm of its target.
+an arm ends within 5 mm of its target, or the box it pushes within 2 cm. "steered" is `dojo.tasks.legged_mpc` for 3 s on
+a plant with steps of 1 ms, once undisturbed and once with a push to the side: done when neither falls.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ import numpy as np
 from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
+from dojo_opt.gaits.legs import Legs
+from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report.result import Cell, Report, Row, Table
 
 UPRIGHT = 0.85  # least cosine between the z axis of the base and the vertical
@@ -56,6 +59,7 @@ ROBOTS = {
     "ANYmal B": Robot("anymal_b_simple_description/robots/anymal.urdf"),
     "ANYmal C": Robot("anymal_c_simple_description/urdf/anymal.urdf"),
     "HyQ": Robot("hyq_description/robots/hyq_no_sensors.urdf"),
+    "Bolt": Robot("bolt_description/robots/bolt.urdf", {"FL_FOOT": 0.0275, "FR_FOOT": 0.0275}),
     "Panda": Robot(
         "panda_description/urdf/panda.urdf", None, "panda_hand", (0, -0.8, 0, -2.3, 0, 1.6, 0.8, 0.02, 0.02)
     ),
@@ -63,7 +67,10 @@ ROBOTS = {
     "UR5": Robot("ur_description/urdf/ur5_robot.urdf", None, "tool0", (0, -1.2, 1.2, -1.5, -1.5, 0)),
 }
 WAY = np.array([-0.1, 0.15, 0.1])  # of a hand [m]
-TASKS = ("stand_up", "trot", "jump")
+FAR = np.array([0.2, 0.0])  # of a box [m]
+PUSH = 0.3  # [m/s] of the velocity that a push gives a robot as high as the A1, in proportion to the root of the height
+TASKS = ("stand_up", "trot", "walk", "jump")
+BIPEDS = ("Bolt",)  # without feet that balance: only in closed loop
 
 
 def path_of(robot: Robot) -> Path:
@@ -115,6 +122,34 @@ def reached(robot: Robot) -> list[Cell]:
     return [plan.status.name, plan.nit, seconds, float(np.abs(plan.u).max()), off, None, done]
 
 
+def pushed(robot: Robot) -> list[Cell]:
+    """A line of an arm that pushes a box."""
+    mech, box = loaded(robot), dojo.Body("box", 0.5, shape=dojo.Box(0.1, 0.1, 0.1))
+    begin = time.perf_counter()
+    plan = dojo.ilqr(dojo.problems.push(mech, box, FAR, frame=robot.hand, start=robot.q))
+    seconds, shot = time.perf_counter() - begin, replayed(plan)
+    at = plan.problem.sim.mechanism.q_slice("box")
+    moved = shot.x[-1, at][:2] - shot.x[0, at][:2]
+    off = float(np.abs(moved - FAR).max())
+    done = bool(plan.success and shot.success and off < OFF)
+    return [plan.status.name, plan.nit, seconds, float(np.abs(plan.u).max()), off, None, done]
+
+
+def steered(robot: Robot) -> list[Cell]:
+    """A line of a robot under a velocity command; its time is the median of a tick."""
+    mech = loaded(robot)
+    legs = Legs(mech, robot.feet)
+    mpc = dojo.tasks.legged_mpc(mech, feet=robot.feet)
+    push = dojo.Push(1.0, (0.0, PUSH * legs.mass * legs.size**0.5, 0.0), duration=0.1)
+    calm, hit = (dojo.closed_loop(mpc, dojo.tasks.plant(mpc, 1e-3, pushes=p), 3.0) for p in ((), (push,)))
+    ms = milliseconds(calm.log, cpu=True)
+    upright = min(float((1.0 - 2.0 * (run.x[:, 4] ** 2 + run.x[:, 5] ** 2)).min()) for run in (calm, hit))
+    largest = float(np.abs(calm.u).max())
+    off = float(np.abs(calm.error()[-1, :3]).max())
+    end = "upright" if calm.survived and hit.survived else "fell"
+    return [end, None, float(np.median(ms)) / 1e3, largest, off, upright, bool(calm.survived and hit.survived)]
+
+
 def cases(args: argparse.Namespace) -> list[tuple[str, Callable[[], list[Cell]]]]:
     """What is tried, by name."""
     out: list[tuple[str, Callable[[], list[Cell]]]] = []
@@ -123,9 +158,12 @@ def cases(args: argparse.Namespace) -> list[tuple[str, Callable[[], list[Cell]]]
             continue
         if robot.hand:
             out.append((f"{name}: reach", lambda robot=robot: reached(robot)))
-        else:
-            out += [(f"{name}: {task}", lambda robot=robot, task=task: walked(robot, task)) for task in TASKS]
-    return [case for case in out if "Go1: stand" in case[0] or "UR5" in case[0]] if args.quick else out
+            out.append((f"{name}: push", lambda robot=robot: pushed(robot)))
+            continue
+        tasks = () if name in BIPEDS else TASKS
+        out += [(f"{name}: {task}", lambda robot=robot, task=task: walked(robot, task)) for task in tasks]
+        out.append((f"{name}: steered", lambda robot=robot: steered(robot)))
+    return [case for case in out if "Go1: stand" in case[0] or "UR5: reach" in case[0]] if args.quick else out
 
 
 def run(args: argparse.Namespace) -> Report:
@@ -140,7 +178,7 @@ def run(args: argparse.Namespace) -> Report:
             lines.append([name, "refused", None, None, None, None, None, False])
     header = ("", "planned", "iterations", "time [s]", "largest input", "off [m]", "upright", "done")
     report.tables.append(
-        Table("Robots", header, lines, "time of the problem and its plan, kernels compiled on the way")
+        Table("Robots", header, lines, "time of problem and plan, kernels compiled on the way; when steered, of a tick")
     )
     done = sum(bool(line[-1]) for line in lines)
     iterations = [line[2] for line in lines if line[2] is not None]

@@ -62,7 +62,7 @@ def _checked(
     """
     if r.status == Status.SOLVED and loops_gained(model, data, options, inputs[1]):
         return Outcome(Status.LOOP_STEP.value, r.iterations, r.residual, r.violation)
-    smooth = model.contact_body.shape[0] + model.limit_dof.shape[0] == 0
+    smooth = model.contact_body.shape[0] + model.limit_dof.shape[0] + model.dry_dof.shape[0] == 0
     if r.status == Status.SOLVED and smooth and step_gained(model, data, options, inputs):
         return Outcome(Status.ENERGY_STEP.value, r.iterations, r.residual, r.violation)
     if r.status == Status.SOLVED and not ends_below_half(model, data, options.h):

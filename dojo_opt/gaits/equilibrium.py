@@ -38,7 +38,7 @@ def input_map(sim: Simulator) -> Array:
     for k, part in enumerate(sim.mechanism.inputs or ()):
         if part.joint is None:
             continue
-        out[sim.mechanism.v_slice(part.joint).start + part.dof, k] = 1.0
+        out[sim.mechanism.v_slice(part.joint).start + part.dof, k] = part.gain
     return out
 
 

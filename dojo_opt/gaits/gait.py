@@ -11,6 +11,7 @@ from dojo_opt.gaits.equilibrium import input_map, least_pushes
 from dojo_opt.gaits.feet import Feet
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.parts import Input, Joint
+from sim.mechanism.servos import passive
 from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -97,7 +98,7 @@ class Gait:
 
     def _generalised_forces(self, iterations: int) -> Array:
         """(T, nv) forces that lead from each state to the velocity of the next, without the ground."""
-        mech = self.simulator.mechanism
+        mech = passive(self.simulator.mechanism)
         joints = [_with_far_stops(j) for j in mech.joints]
         driven = replace(mech, joints=joints, inputs=[Input(j.name, dof=d) for j in mech.joints for d in range(j.nv)])
         sim = self.simulator.replace(mechanism=driven)
@@ -115,9 +116,9 @@ class Gait:
 
 
 def _with_far_stops(joint: Joint) -> Joint:
-    """The joint with its stops out of reach: they push when met, and a first guess of the forces meets them."""
+    """The joint with its stops out of reach and without dry friction: a first guess of the forces meets both."""
     far = [(-_FAR if np.isfinite(lo) else lo, _FAR if np.isfinite(hi) else hi) for lo, hi in joint.limits or ()]
-    return replace(joint, limits=far)
+    return replace(joint, limits=far, friction=0.0)
 
 
 def _pyramid(feet: Feet) -> Array:

@@ -343,10 +343,10 @@ def _periodic(
 
 
 def _offsets(offsets: dict[tuple[bool, bool], float], places: Array) -> Array:
-    """(k,) when each foot comes down: by front and left of four, in turn along each side of more."""
+    """(k,) when each foot comes down: by left of two, by front and left of four, in turn along each side of more."""
     middle = places.mean(axis=0)
     left = places[:, 1] > middle[1]
-    front = places[:, 0] > middle[0]
+    front = (places[:, 0] > middle[0]) & (len(places) != 2)
     if len(places) > 4:
         for side in (True, False):
             order = np.argsort(-places[left == side, 0]).argsort()

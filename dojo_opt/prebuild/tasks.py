@@ -173,6 +173,7 @@ def _joints() -> None:
         dojo.Joint("spherical", None, "a", cone=0.5, spring=1.0, damper=0.1, child_point=point),
         dojo.Joint("orbital", None, "a", spring=1.0, damper=0.1, child_point=point),
         dojo.Joint("revolute", None, "a", limits=(-0.5, 0.5), child_point=point),
+        dojo.Joint("revolute", None, "a", friction=0.1, child_point=point),
     )
     for joint in joints:
         _every(dojo.Simulator(dojo.Mechanism([body], [joint]), time_step=0.01))

@@ -1,4 +1,4 @@
-"""Problems, ready to solve: a hop, a pushed block, swing-ups, gaits and leaps of robots with legs, arms that reach."""
+"""Problems, ready to solve: hops, swing-ups, gaits and leaps of robots with legs, arms that reach and push."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from dojo_opt.problems.classics import block, hop, swingup
 from dojo_opt.problems.leaps import leap
-from dojo_opt.problems.legged import jump, stand_up, trot
-from dojo_opt.problems.locomotion import bound, follow, pace, turn, walk
+from dojo_opt.problems.legged import jump, stand_up, trot, walk
+from dojo_opt.problems.locomotion import bound, follow, pace, turn
+from dojo_opt.problems.push import push
 from dojo_opt.problems.reach import reach
 from sim.mechanism.checks import nearest
 
@@ -19,6 +20,7 @@ __all__ = [
     "jump",
     "leap",
     "pace",
+    "push",
     "reach",
     "stand_up",
     "swingup",

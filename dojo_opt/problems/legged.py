@@ -1,4 +1,4 @@
-"""Problems of any robot with legs: trot, jump and stand up, in units of its height, weight and time of a pendulum."""
+"""Problems of any robot with legs: trot, walk, jump, stand up, in units of its height, weight and a pendulum's time."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt import gaits
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.gait import Gait, assemble
+from dojo_opt.gaits.legs import Legs
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from dojo_opt.problems import locomotion
-from dojo_opt.problems.legs import Legs
 from dojo_opt.problems.locomotion import EFFORT, PLACE, follow
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
@@ -43,7 +43,7 @@ def trot(
     damping in the joints (5 N m s/rad there; with .5 here the robot falls over by itself). The pose of the base at the
     end is a constraint. Torques are limited to 33.5 N m.
 
-    Of another robot feet and stance are found, see `dojo_opt.problems.legs.Legs`, and weights, times and lengths follow
+    Of another robot feet and stance are found, see `dojo_opt.gaits.legs.Legs`, and weights, times and lengths follow
     from its weight and height h: two periods of 0.6 s at 0.2 m/s for h = 0.29 m, in proportion to the root of h, with
     20 knots each. Torques keep within the limits of its inputs. Six legs move in two sets of three.
 
@@ -67,13 +67,50 @@ def trot(
     if robot is None:
         return locomotion.trot(**_of_the_quadruped("problems.trot", feet, stance, settings))
     legs = Legs(robot, feet, damping=settings.pop("damping", None), stance=stance)
+    return _periodic(legs, "trot", _PERIOD, _SPEED, settings)
+
+
+def walk(
+    robot: Any = None,
+    *,
+    feet: Sequence[str] | Mapping[str, float] | None = None,
+    stance: Any = None,
+    **settings: Any,
+) -> Problem:
+    """A robot walks, one foot after the other: the library's quadruped, or any one with two or four legs.
+
+    Others walk for two periods of 1 s at 0.1 m/s for a height of 0.29 m, in proportion to the root of the height, with
+    20 knots each; all else is as for `trot`.
+
+    Args:
+        robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
+        feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
+            radii [m] in a table by name (default None: found, see `dojo_opt.gaits.legs.Legs`).
+        stance: coordinates of the stance by joint (default None: found).
+        **settings: as for `trot`.
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range, a robot without legs, or a foot that cannot reach its place.
+    """
+    if robot is None:
+        return locomotion.walk(**_of_the_quadruped("problems.walk", feet, stance, settings))
+    legs = Legs(robot, feet, damping=settings.pop("damping", None), stance=stance)
+    return _periodic(legs, "walk", 1.0, 0.5 * _SPEED, settings)
+
+
+def _periodic(legs: Legs, name: str, period: float, speed: float, settings: dict[str, Any]) -> Problem:
+    """The problem to follow two periods of a gait; period [s] and speed [m/s] of a robot as high as the A1."""
     slow = legs.size**0.5
-    step = _rounded(settings.pop("period", _PERIOD * slow) / _KNOTS)
+    step = _rounded(settings.pop("period", period * slow) / _KNOTS)
     follows, rest = _shared_out(settings)
-    usual = {"speed": _SPEED * slow, "step_height": _LIFT * legs.size, "cycles": 1 if follows.get("periodic") else 2}
-    substeps = whole_number("problems.trot(substeps=...)", follows.get("substeps", 1))
-    gait = gaits.trot(legs.simulator(step / substeps, PLANNED), period=_KNOTS * step, **{**usual, **rest})
-    return _scaled(legs, gait, follows)
+    usual = {"speed": speed * slow, "step_height": _LIFT * legs.size, "cycles": 1 if follows.get("periodic") else 2}
+    substeps = whole_number(f"problems.{name}(substeps=...)", follows.get("substeps", 1))
+    made = getattr(gaits, name)(legs.simulator(step / substeps, PLANNED), period=_KNOTS * step, **{**usual, **rest})
+    return _scaled(legs, made, follows)
 
 
 def jump(
@@ -95,7 +132,7 @@ def jump(
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
         feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
-            radii [m] in a table by name (default None: found, see `dojo_opt.problems.legs.Legs`).
+            radii [m] in a table by name (default None: found, see `dojo_opt.gaits.legs.Legs`).
         stance: coordinates of the stance by joint (default None: found).
         **settings: distance [m], height [m], damping (least damper of the joints [N m s/rad]), refinement (parts of
             every time step in the second half of `ilqr`, 5; 1 for none), further arguments of `gaits.jump` (crouch,
@@ -143,7 +180,7 @@ def stand_up(
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator.
         feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
-            radii [m] in a table by name (default None: found, as `dojo_opt.problems.legs.Legs` says).
+            radii [m] in a table by name (default None: found, as `dojo_opt.gaits.legs.Legs` says).
         low: height of the base at the beginning over that of the stance, between 0 and 1.
         duration: of the rise and the rest [s] (default None: 1 s for a robot as high as the A1, for others in
             proportion to the root of the height).

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.constraint import Frame, Goal, SpeedLimits
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.gaits.equilibrium import input_map
+from dojo_opt.gaits.equilibrium import input_map, potential_gradient
 from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
@@ -78,7 +78,7 @@ def reach(
     horizon = max(2, round(duration / (time_step * substeps)))
     states = _path(sim, first, found.q, horizon, substeps)
     B = input_map(sim)
-    held = np.linalg.lstsq(B, kin.gravity_torques(states[:-1, : sim.nq]).T, rcond=None)[0].T
+    held = np.linalg.lstsq(B, potential_gradient(sim, states[:-1]).T, rcond=None)[0].T
     low, high = sim.mechanism.input_limits
     held = np.clip(held, low, high)
     unit = np.maximum(np.abs(held).max(initial=0.0), 1e-3)

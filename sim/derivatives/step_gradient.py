@@ -89,7 +89,7 @@ def _joint_columns(model: Model, data: Data, h: float, v: Vector) -> None:
 
 @kernel
 def _input_columns(model: Model, data: Data, h: float) -> None:
-    """columns[:, 2 nv:] = -dR/du: h at the dof of a joint input, h S2^T wrench above the body of the others."""
+    """columns[:, 2 nv:] = -dR/du: h g at the dof of a joint input, h S2^T wrench above the body of the others."""
     nv = data.columns.shape[0]
     nu = model.input_kind.shape[0]
     for d in range(nv):
@@ -98,7 +98,7 @@ def _input_columns(model: Model, data: Data, h: float) -> None:
     for j in range(nu):
         col = 2 * nv + j
         if model.input_kind[j] == InputKind.JOINT:
-            data.columns[model.input_index[j], col] = h
+            data.columns[model.input_index[j], col] = h * model.input_wrench[j, 0]
             continue
         w = data.couple_wrench
         input_wrench(model, data, j, w)

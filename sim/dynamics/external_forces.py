@@ -106,14 +106,14 @@ def outer_slopes(model: Model, data: Data, u: Vector, out: Matrix) -> None:
 
 @kernel
 def input_slopes(model: Model, data: Data, free: Integers, out: Matrix) -> None:
-    """out = df/du: 1 at the dof of a JOINT input, S_d . wrench above the body of the others."""
+    """out = df/du: the gain at the dof of a JOINT input, S_d . wrench above the body of the others."""
     w = data.wrench[0]
     for j in range(out.shape[1]):
         for d in range(out.shape[0]):
             out[d, j] = 0.0
         i = model.input_index[j]
         if model.input_kind[j] == InputKind.JOINT:
-            out[i, j] = 1.0
+            out[i, j] = model.input_wrench[j, 0]
             continue
         input_wrench(model, data, j, w)
         while i >= 0:

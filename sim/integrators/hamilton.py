@@ -117,7 +117,7 @@ def outer_power(model: Model, data: Data, u: Vector) -> float:
         power += dot_six(data.S2[d], data.balance[model.dof_body[d]]) * data.nu[d]
     for j in range(u.shape[0]):
         if model.input_kind[j] == _JOINT:
-            power += u[j] * data.nu[model.input_index[j]]
+            power += model.input_wrench[j, 0] * u[j] * data.nu[model.input_index[j]]
     return power
 
 
@@ -139,7 +139,7 @@ def column_rate(model: Model, data: Data, i: int, d: int) -> tuple[float, float,
 
 @kernel
 def joint_forces(model: Model, q: Vector, v: Vector, u: Vector, out: Vector) -> None:
-    """out = -k (q - rest) - d v + u of every joint coordinate; of quaternions -2 k c s, (c, s) the turn from rest."""
+    """out = -k (q - rest) - d v + g u of every joint coordinate; of quaternions -2 k c s, (c, s) the turn from rest."""
     for i in range(model.body_parent.shape[0]):
         stop = model.body_vadr[i + 1]
         if model.joint_nrot[i] == 3:
@@ -154,7 +154,7 @@ def joint_forces(model: Model, q: Vector, v: Vector, u: Vector, out: Vector) -> 
         out[d] -= model.dof_damper[d] * v[d]
     for j in range(u.shape[0]):
         if model.input_kind[j] == _JOINT:
-            out[model.input_index[j]] += u[j]
+            out[model.input_index[j]] += model.input_wrench[j, 0] * u[j]
 
 
 @kernel

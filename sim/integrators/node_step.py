@@ -55,7 +55,7 @@ def add_forces(model: Model, data: Data, h: float, u: Vector, out: Vector) -> No
     for j in range(u.shape[0]):
         i = model.input_index[j]
         if model.input_kind[j] == InputKind.JOINT:
-            out[i] += h * u[j]
+            out[i] += h * model.input_wrench[j, 0] * u[j]
             continue
         w = data.wrench[0]
         input_wrench(model, data, j, w)

@@ -77,6 +77,7 @@ def begin(data: Data) -> None:
     data.inactive_kappa[0] = 0.0
     clear(data.cone_step)
     clear(data.bound_step)
+    clear(data.dry_step)
     clear(data.external)
     for row in range(data.couple_force.shape[0]):
         data.couple_force[row] = 0.0

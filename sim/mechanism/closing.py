@@ -48,7 +48,9 @@ def carried(
 def acts(joint: Joint) -> bool:
     """Whether the joint does more than constrain."""
     limited = any(np.isfinite(bound) for pair in joint.limits or () for bound in pair) or joint.cone is not None
-    return limited or any(np.any(np.asarray(part)) for part in (joint.spring, joint.damper, joint.armature))
+    return limited or any(
+        np.any(np.asarray(part)) for part in (joint.spring, joint.damper, joint.armature, joint.friction)
+    )
 
 
 def is_weld(loop: Joint) -> bool:

@@ -19,6 +19,7 @@ from sim.mechanism.gear import Gear, check_gears
 from sim.mechanism.naming import name_contacts, name_inputs
 from sim.mechanism.parts import WORLD, Body, Contact, Input, Joint
 from sim.mechanism.poses import poses
+from sim.mechanism.self_collisions import self_collisions
 from sim.mechanism.shape_contacts import shape_contacts
 from sim.mechanism.shapes import Solid, Sphere, rotation_matrix
 from sim.mechanism.terrain import Terrain
@@ -42,7 +43,8 @@ class Mechanism:
         name: name of the mechanism.
         neutral: coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero for joints
             without a name in it, or all of q (default None: zero).
-        collisions: bodies and obstacles that keep apart (default none).
+        collisions: bodies and obstacles that keep apart (default none). "self" stands for all pairs of shapes but those
+            of links that a joint connects, and those that overlap in the neutral state (self_collisions.py).
         loops: joints that close loops (default none).
         gears: joint coordinates that follow others (default none).
         scenery: parts of pictures that are fixed to the world (default none).
@@ -66,6 +68,10 @@ class Mechanism:
     def __post_init__(self) -> None:
         checks.name("Mechanism(name=...)", self.name)
         call = f"Mechanism({self.name!r}"
+        itself = isinstance(self.collisions, str)
+        if itself:
+            checks.one_of(f"{call}, collisions=...)", str(self.collisions), ("self",))
+            object.__setattr__(self, "collisions", ())
         for field, kind in _KINDS.items():
             if field != "inputs" or self.inputs is not None:
                 object.__setattr__(self, field, _parts(f"{call}, {field}=...)", getattr(self, field), kind))
@@ -86,6 +92,9 @@ class Mechanism:
         check_gears(f"{call})", self.gears, joints)
         if self.nv == 0:
             raise ValueError(f"{call}): no joint is free to move")
+        object.__setattr__(self, "neutral", self._coordinates(f"{call}, neutral=...)", self.neutral))
+        if itself:
+            object.__setattr__(self, "collisions", tuple(self.self_collisions()[0]))
         ends = dict.fromkeys([*self.body_names, WORLD])
         for c in self.collisions:
             for name in (c.a, c.b):
@@ -97,7 +106,6 @@ class Mechanism:
         object.__setattr__(self, "contacts", name_contacts(f"{call})", self.contacts, self.body_names))
         object.__setattr__(self, "inputs", name_inputs(call, self.inputs or (), self.joints, self.body_names))
         object.__setattr__(self, "gravity", checks.vector(f"{call}, gravity=...)", self.gravity, 3))
-        object.__setattr__(self, "neutral", self._coordinates(f"{call}, neutral=...)", self.neutral))
 
     def __repr__(self) -> str:
         parts: dict[str, Any] = {"bodies": self.bodies, "inputs": self.inputs, "contacts": self.contacts}
@@ -267,6 +275,14 @@ class Mechanism:
             ValueError: a name is unknown or used twice.
         """
         return replace(self, collisions=[*self.collisions, *collisions])
+
+    def self_collisions(self) -> tuple[list[Collision], list[str]]:
+        """What `collisions="self"` stands for: all pairs of shapes of bodies that no joint connects.
+
+        Returns:
+            (the collisions, the names of the pairs that overlap in the neutral state and are left out).
+        """
+        return self_collisions(self.bodies, self.joints, self.loops, np.array(self.neutral))
 
     def with_obstacle(
         self, shape: Solid, bodies: Sequence[str] | None = None, name: str = "obstacle", **options: Any

@@ -14,6 +14,7 @@ from sim.mechanism.pack_clusters import pack_clusters
 from sim.mechanism.pack_collisions import pack_collisions
 from sim.mechanism.parts import WORLD, Contact, Joint
 from sim.mechanism.seen_inertia import seen_inertias
+from sim.mechanism.servos import with_servos
 from sim.mechanism.shapes import rotation_matrix
 from sim.mechanism.terrain import Terrain
 from sim.model.layout import Sizes, allocate_model
@@ -45,6 +46,7 @@ def mechanism_sizes(mech: Mechanism) -> Sizes:
         ngear=len(mech.gears),
         nterrain=len(fields),
         nheight=sum(f.coefficients.size for f in fields),
+        ndry=sum(int(np.count_nonzero(j.friction)) for j in mech.joints),
     )
 
 
@@ -52,8 +54,9 @@ def pack(mech: Mechanism) -> Model:
     """The numbers of a mechanism."""
     model = allocate_model(mechanism_sizes(mech))
     _pack_tree(mech, model)
-    _pack_joints(mech.joints, model)
+    _pack_joints(with_servos(mech.joints, mech.inputs or ()), model)
     model.dof_seen[:] = seen_inertias(model)
+    _pack_dry(mech.joints, model)
     _pack_branches(model)
     _pack_terrain(mech, model)
     _pack_contacts(mech, model)
@@ -133,6 +136,13 @@ def _pack_joints(joints: Sequence[Joint], model: Model) -> None:
             model.limit_dof[limit], model.limit_sign[limit], model.limit_bound[limit] = d + dof, sign, bound
             model.limit_cone[limit] = sign == _CONE
             limit += 1
+
+
+def _pack_dry(joints: Sequence[Joint], model: Model) -> None:
+    """Degrees of freedom with dry friction."""
+    forces = np.concatenate([np.asarray(joint.friction, dtype=np.float64) for joint in joints])
+    model.dry_dof[:] = np.flatnonzero(forces)
+    model.dry_force[:] = forces[forces > 0.0]
 
 
 def _bounds(joint: Joint) -> list[tuple[int, float, float]]:
@@ -222,6 +232,7 @@ def _pack_inputs(mech: Mechanism, model: Model) -> None:
         if part.joint is not None:
             model.input_kind[k] = InputKind.JOINT
             model.input_index[k] = model.body_vadr[joints[part.joint]] + part.dof
+            model.input_wrench[k, 0] = part.gain
         else:
             model.input_kind[k] = InputKind.WORLD if part.frame == "world" else InputKind.BODY
             model.input_index[k] = bodies[part.body or ""]

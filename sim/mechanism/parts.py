@@ -127,10 +127,13 @@ class Joint:
             no limit).
         armature: inertia that moves with a coordinate and with nothing else, as a geared rotor's [kg, kg m^2] (default
             0).
+        friction: dry friction: the largest force or torque that holds a coordinate, and the one that brakes it when it
+            moves; one number, or one per degree of freedom, none for quaternions [N, N m] (default 0). A joint at rest
+            creeps with kappa, as contacts do: by kappa/(h f) (1/(1 - s) - 1/(1 + s)) in a step h under a share s of f.
         close: whether the child hangs on another joint already, and this one closes a loop (default False). With a
-            spring, a damper, limits, armature, an input, a pitch or two rotations, it has coordinates of its own, and
-            the child is cut there: a second part of it, the body "child.name", hangs on this joint and is welded to the
-            first (sim/mechanism/closing.py).
+            spring, a damper, friction, limits, armature, an input, a pitch or two rotations, it has coordinates of its
+            own, and the child is cut there: a second part of it, the body "child.name", hangs on this joint and is
+            welded to the first (sim/mechanism/closing.py).
         pitch: displacement of a screw along its axis per turn, positive for a right-handed thread, negative for a
             left-handed one [m/rev] (default 0). Its coordinate is the angle.
 
@@ -152,6 +155,7 @@ class Joint:
     limits: Sequence[Any] | None = None
     cone: float | None = None
     armature: ArrayLike = 0.0
+    friction: ArrayLike = 0.0
     close: bool = False
     pitch: float = 0.0  # [m/rev]
 
@@ -165,7 +169,7 @@ class Joint:
             object.__setattr__(self, field, checks.vector(f"{call}, {field}=...)", getattr(self, field), 3))
         object.__setattr__(self, "axis", checks.direction(f"{call}, axis=...)", self.axis))
         object.__setattr__(self, "orientation", checks.quaternion(f"{call}, orientation=...)", self.orientation))
-        for field in ("spring", "damper", "rest", "armature"):
+        for field in ("spring", "damper", "rest", "armature", "friction"):
             object.__setattr__(self, field, per_dof(call, self, field))
         object.__setattr__(self, "limits", limits_of(f"{call}, limits=...)", self))
         object.__setattr__(self, "cone", cone_of(f"{call}, cone=...)", self))
@@ -297,6 +301,12 @@ class Input:
         Input("base", dof=3)                          its fourth degree of freedom [N or N m]
         Input(body="block", force=(1, 0, 0))          u newtons along x, world axes
         Input(body="drone", force=(0, 0, 1), torque=(0, 0, 0.02), frame="body")
+        Input("knee", servo="position", stiffness=80, damping=2)    u is the angle it turns to [rad]
+        Input("wheel", servo="velocity", damping=5)                 u is the rate it turns at [rad/s]
+
+    A servo makes the force kp (u - q) - kd v, or kd (u - v). Springs and dampers of a step are implicit, so are those
+    of a servo: it is stable for every gain. It counts as a spring at rest at zero in energies, and does not know a
+    largest force.
 
     Attributes:
         joint: name of the joint (default None: the input acts on a body).
@@ -307,13 +317,16 @@ class Input:
         frame: axes of force and torque, "world" or "body" (default "world").
         name: name of the input (default that of the joint, with the number of one of several degrees of freedom, or of
             the body).
-        limits: (lo, hi) of the force or torque, as a file gives them: default control limits of problems and plants;
-            a simulator does not clip [N, N m] (default inf).
+        limits: (lo, hi) of the force or torque, or of the target of a servo, as a file gives them: default control
+            limits of problems and plants; a simulator does not clip [N, N m; m, rad; m/s, rad/s] (default inf).
         speed: largest speed of the joint's coordinate, see `dojo.constraint.SpeedLimits`; nothing else holds it [m/s,
             rad/s] (default inf).
+        servo: "position" or "velocity": the input is what its joint is driven to (default None: a force or torque).
+        stiffness: kp of a position servo [N/m, N m/rad] (default 0).
+        damping: kd of a servo [N s/m, N m s/rad] (default 0).
 
     Raises:
-        ValueError: for both a joint and a body or neither, or a value out of range.
+        ValueError: for both a joint and a body or neither, a servo without its gain, or a value out of range.
     """
 
     joint: str | None = None
@@ -325,6 +338,9 @@ class Input:
     name: str = ""
     limits: tuple[float, float] = (-np.inf, np.inf)
     speed: float = np.inf
+    servo: str | None = None
+    stiffness: float = 0.0
+    damping: float = 0.0
 
     def __post_init__(self) -> None:
         if (self.joint is None) == (self.body is None):
@@ -341,9 +357,34 @@ class Input:
         object.__setattr__(self, "limits", bounds(f"{call}, limits=...)", self.limits))
         if not (isinstance(self.speed, int | float) and self.speed > 0.0):
             raise ValueError(f"{call}, speed=...): expected a number > 0, got {self.speed!r}")
+        check_servo(call, self)
+
+    @property
+    def gain(self) -> float:
+        """Force or torque on the joint per unit of u: 1, or kp or kd of a servo."""
+        return {None: 1.0, "position": self.stiffness, "velocity": self.damping}[self.servo]
 
 
 # -- checks of arguments, per part -------------------------------------------------------------------------------------
+
+
+def check_servo(call: str, part: Input) -> None:
+    """Gains of servos on joints, and of nothing else."""
+    for field in ("stiffness", "damping"):
+        value = checks.number(f"{call}, {field}=...)", getattr(part, field), at_least=0.0)
+        object.__setattr__(part, field, value)
+    if part.servo is None:
+        if part.stiffness or part.damping:
+            raise ValueError(f'{call}): stiffness and damping are those of a servo; give servo="position", too')
+        return
+    checks.one_of(f"{call}, servo=...)", part.servo, ("position", "velocity"))
+    if part.joint is None:
+        raise ValueError(f"{call}, servo=...): a servo drives a joint")
+    if part.servo == "velocity" and part.stiffness:
+        raise ValueError(f"{call}, stiffness=...): a velocity servo has none; give its damping=...")
+    if part.gain == 0.0:
+        missing = "stiffness" if part.servo == "position" else "damping"
+        raise ValueError(f"{call}, servo={part.servo!r}): expected {missing}=... above 0")
 
 
 def shape_of(call: str, given: Any) -> Any:
@@ -411,7 +452,7 @@ def per_dof(call: str, joint: Joint, field: str) -> tuple[float, ...]:
         values = checks.vector(call, value, joint.nv)
     if field != "rest" and any(x < 0.0 for x in values):
         raise ValueError(f"{call}: expected numbers >= 0, got {value!r}")
-    if field == "armature" and joint.nrot == 3 and any(values[-3:]):
+    if field in ("armature", "friction") and joint.nrot == 3 and any(values[-3:]):
         raise ValueError(f"{call}: the rotations of a quaternion joint have none, got {value!r}")
     if field == "spring" and joint.nrot == 3 and len(set(values[-3:])) > 1:
         raise ValueError(f"{call}: a quaternion joint has one spring constant for its three rotations, got {value!r}")

@@ -23,6 +23,15 @@ class Kin(IntEnum):
     BY_TRANSLATION = 18  # (3, 3) d(gap, slip)/d(translation)
 
 
+class Dry(IntEnum):
+    """dry, dry_step and dry_trial: variables of the dry friction of a joint."""
+
+    FORWARD = 0  # motion forward
+    LEFT_FORWARD = 1  # F + lambda
+    BACKWARD = 2
+    LEFT_BACKWARD = 3  # F - lambda
+
+
 class PairFrame(IntEnum):
     """pair_frame: the rows n, t1, t2 of a frame, and behind them"""
 

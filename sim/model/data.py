@@ -21,6 +21,7 @@ class Data(NamedTuple):
     inactive_kappa: Vector  # (1,) kappa of the impulses of inactive contacts, 0 where none are known
     cone_step: Matrix  # (ncontact, 12) last directions of the cone variables
     bound_step: Matrix  # (nlimit, 2) and of limits
+    dry_step: Matrix  # (ndry, 4) and of dry friction
     couple_force: Vector  # (nrow,) impulses of loops
     # scratch
     origin: Vector  # (3,) the reference point O
@@ -153,6 +154,10 @@ class Data(NamedTuple):
     # limits
     bound: Matrix  # (nlimit, 2) Bound
     bound_trial: Matrix  # (nlimit, 2)
+    dry: Matrix  # (ndry, 4) Dry
+    dry_trial: Matrix  # (ndry, 4)
+    dry_move: Matrix  # (ndry, 2) motion h v25, bound of the impulse
+    dry_w: Matrix  # (ndry, 3) constant parts of the steps of the impulse and of the motions
     bound_row: Matrix  # (nlimit, 6) of a cone: torque per unit of impulse, and d(gap)/d(v25); by rotation
     bound_gap: Vector  # (nlimit,)
     bound_w: Vector  # (nlimit,)

@@ -70,6 +70,7 @@ class Model(NamedTuple):
     loop_nrot: Integers  # (nloop,) free rotations
     gear_dof: IntegerMatrix  # (ngear, 2) the degree of freedom that follows, and the one that leads
     limit_dof: Integers  # (nlimit,) a scalar degree of freedom; of a cone, the first of its three rotations
+    dry_dof: Integers  # (ndry,) degrees of freedom with dry friction
     limit_cone: Integers  # (nlimit,) 1 where the angle between the axes of parent and child is limited
     input_kind: Integers  # (nu,) InputKind
     input_index: Integers  # (nu,) degree of freedom, or body
@@ -111,6 +112,7 @@ class Model(NamedTuple):
     gear_ratio: Vector  # (ngear,)
     gear_offset: Vector  # (ngear,) [m, rad]
     limit_sign: Vector  # (nlimit,) +1 for a lower, -1 for an upper bound
+    dry_force: Vector  # (ndry,) its largest force [N, N m]
     limit_bound: Vector  # (nlimit,) [m, rad]; of a cone, its half angle
-    input_wrench: Matrix  # (nu, 6) force and torque per unit of a WORLD or BODY input
+    input_wrench: Matrix  # (nu, 6) force and torque per unit of a WORLD or BODY input; gain of a JOINT input, first
     gravity: Vector  # (3,) [m/s^2]

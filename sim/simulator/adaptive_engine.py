@@ -380,9 +380,10 @@ def check_adaptive(mechanism: Mechanism, accuracy: float) -> None:
             f"joints, whose errors are not seen below that, got {accuracy:g}"
         )
     names = [("loop joint", j.name) for j in mechanism.loops] + [("gear", g.name) for g in mechanism.gears]
+    names += [("dry friction of", j.name) for j in mechanism.joints if np.any(j.friction)]
     if names:
         what, name = names[0]
         raise ValueError(
             f"Simulator(accuracy=...): {mechanism.name!r} has the {what} {name!r}; steps of a given accuracy are for "
-            "trees: use a time step"
+            "trees without dry friction: use a time step"
         )

@@ -248,10 +248,12 @@ def check(mechanism: Mechanism, settings: Settings) -> None:
     """Refuse mechanisms that only steps of order 2 can move."""
     collisions = [c.name for c in mechanism.collisions]
     loops, gears = [j.name for j in mechanism.loops], [g.name for g in mechanism.gears]
-    for what, names in (("collision", collisions), ("loop joint", loops), ("gear", gears)):
+    dry = [j.name for j in mechanism.joints if np.any(j.friction)]
+    for what, names in (("collision", collisions), ("loop joint", loops), ("gear", gears), ("dry friction of", dry)):
         if names:
             more = f" and {len(names) - 1} more" if len(names) > 1 else ""
             raise ValueError(
                 f"Simulator(order={settings.order}): {mechanism.name!r} has the {what} {names[0]!r}{more}; steps of "
-                f"higher order are for trees without collisions of their bodies: use order=2, or leave them out"
+                f"higher order are for trees without collisions of their bodies and without dry friction: use order=2, "
+                f"or leave them out"
             )

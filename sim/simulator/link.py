@@ -65,6 +65,25 @@ from sim.derivatives.step_gradient import gradient
 from sim.dynamics.elimination_deep import solve_deep_panel
 from sim.dynamics.joints.ball_spring import add_ball_spring_derivatives, add_spring_block, spring_impulse
 from sim.dynamics.joints.cone_limit import cone_block, cone_derivative, cone_gap
+from sim.dynamics.joints.dry_friction import (
+    add_dry_blocks,
+    add_dry_time_step,
+    apply_dry,
+    dry_boundary,
+    dry_constants,
+    dry_error,
+    dry_kinematics,
+    dry_load,
+    dry_products,
+    dry_products_ahead,
+    fit_dry,
+    keep_dry,
+    move_dry,
+    recover_dry,
+    resume_dry,
+    return_dry,
+    start_dry,
+)
 from sim.dynamics.joints.limits import add_limit_derivatives
 from sim.dynamics.joints.swing import swing_curvature, swing_pose, swing_turn
 from sim.dynamics.loops.branch_motion import (
@@ -120,6 +139,24 @@ _CONTACTS = (
     slip_noise,
     worst_contact,
     report_contacts,
+)
+_DRY = (
+    add_dry_blocks,
+    apply_dry,
+    dry_boundary,
+    dry_constants,
+    dry_error,
+    dry_kinematics,
+    dry_load,
+    dry_products,
+    dry_products_ahead,
+    fit_dry,
+    keep_dry,
+    move_dry,
+    recover_dry,
+    resume_dry,
+    return_dry,
+    start_dry,
 )
 _PREDICTION = (has_pyramids, contact_rates, contact_answers, choose_contacts, take_contacts)
 _COUPLING = (factor_coupling, solve_coupling)
@@ -231,7 +268,7 @@ def link_pairs(model: Model) -> None:
 
 def link_step(model: Model) -> None:
     """Link the kernels of a time step: the interior point only if there are contacts or limits."""
-    hard = len(model.contact_body) + len(model.limit_dof) > 0
+    hard = len(model.contact_body) + len(model.limit_dof) + len(model.dry_dof) > 0
     link(model.optional, step)
     if hard:
         link(model.optional, interior_point)
@@ -241,6 +278,8 @@ def link_step(model: Model) -> None:
         link(model.optional, *_CONTACTS, *_PREDICTION)
     if np.any(model.limit_cone):
         link(model.optional, cone_gap, cone_block)
+    if len(model.dry_dof):
+        link(model.optional, *_DRY)
     if _has_ball_springs(model):
         link(model.optional, spring_impulse)
     if np.any(model.contact_law == int(Law.LINEAR)):
@@ -270,7 +309,7 @@ def link_gradient(model: Model) -> None:
     link(model.optional, gradient)
     if np.sum(model.count_above[model.dof_body]) > _DEEP * len(model.dof_body):
         link(model.optional, solve_deep_panel)
-    if len(model.contact_body) + len(model.limit_dof):
+    if len(model.contact_body) + len(model.limit_dof) + len(model.dry_dof):
         link(model.optional, add_stiffness)
     if len(model.contact_body):
         link(model.optional, add_slip_jacobians)
@@ -300,6 +339,8 @@ def link_parameters(model: Model) -> None:
     """Link the further kernels of derivatives by parameters."""
     if np.any(model.contact_terrain):
         link(model.optional, add_surface_radius)
+    if len(model.dry_dof):
+        link(model.optional, add_dry_time_step)
     if _has_strings(model):
         link(model.optional, add_moved_end)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sim.contact.active_contacts import contacts_boundary, contacts_products, contacts_products_ahead
+from sim.dynamics.joints.dry_friction import dry_boundary, dry_products, dry_products_ahead
 from sim.model.columns import Bound
 from sim.model.data import Data
 from sim.model.model import Model
@@ -19,6 +20,8 @@ def products(model: Model, data: Data, kappa: float) -> tuple[float, float]:
         total += t
         count += 1.0
         violation = max(violation, abs(t - kappa))
+    dry, worst = dry_products(model, data, kappa)
+    total, count, violation = total + dry, count + 2.0 * model.dry_dof.shape[0], max(violation, worst)
     return total / count if count > 0.0 else kappa, violation
 
 
@@ -31,13 +34,14 @@ def products_ahead(model: Model, data: Data, alpha: float) -> float:
         d = data.bound_step[k]
         total += (b[Bound.SLACK] + alpha * d[Bound.SLACK]) * (b[Bound.IMPULSE] + alpha * d[Bound.IMPULSE])
         count += 1.0
+    total, count = total + dry_products_ahead(model, data, alpha), count + 2.0 * model.dry_dof.shape[0]
     return total / count if count > 0.0 else data.inactive_kappa[0]
 
 
 @kernel
 def boundary_step(model: Model, data: Data) -> float:
     """Largest step that keeps every cone variable in its cone, or 1e30."""
-    a = contacts_boundary(model, data)
+    a = min(contacts_boundary(model, data), dry_boundary(model, data))
     for k in range(model.limit_dof.shape[0]):
         b = data.bound[k]
         d = data.bound_step[k]

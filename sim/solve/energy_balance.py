@@ -42,6 +42,7 @@ from sim.dynamics.energy import (
     spatial_inertia,
 )
 from sim.dynamics.joints.damper import damper_impulse
+from sim.dynamics.joints.dry_friction import apply_dry
 from sim.dynamics.joints.terms import add_limit_impulse
 from sim.dynamics.loops.loop_work import loop_slack
 from sim.dynamics.mass import eliminate_mass
@@ -94,7 +95,8 @@ def constraint_work(model: Model, data: Data, h: float, v: Vector) -> float:
 @kernel
 def smoothing_energy(model: Model, options: StepOptions) -> float:
     """kappa/h of each contact and limit [J]: gamma gap of all on the central path."""
-    return options.kappa * (model.contact_body.shape[0] + model.limit_dof.shape[0]) / options.h
+    count = model.contact_body.shape[0] + model.limit_dof.shape[0] + 2 * model.dry_dof.shape[0]
+    return options.kappa * count / options.h
 
 
 @kernel
@@ -157,6 +159,7 @@ def work_at_node(model: Model, data: Data, h: float, v: Vector, u: Vector) -> tu
         f[d] += damper_impulse(model, h, d, data.nu[d], v[d])
     for k in range(model.limit_dof.shape[0]):
         add_limit_impulse(model, data, k, -data.bound[k, Bound.IMPULSE], f)
+    apply_dry(model, data, f)
     for d in range(v.shape[0]):
         part = 0.5 * f[d] * (v[d] + data.nu[d])
         total, size = total + part, size + abs(part)
@@ -211,7 +214,7 @@ def damping_loss(model: Model, data: Data, h: float, v: Vector) -> float:
 def step_gained(model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector]) -> bool:
     """Whether the solved step gained too much energy, or lost it where nothing dissipates.   inputs: (q, v, u)."""
     _, v, u = inputs
-    smooth = model.contact_body.shape[0] + model.limit_dof.shape[0] == 0
+    smooth = model.contact_body.shape[0] + model.limit_dof.shape[0] + model.dry_dof.shape[0] == 0
     both = smooth and options.loss < 1e300
     turned = least_cosine(data)
     near = _NEAR if model.contact_body.shape[0] == 0 else _NEAR_GROUND

@@ -158,7 +158,9 @@ def known_start(
     q, v, u = inputs
     h = options.h
     kappa = options.kappa
-    if data.active_count[0] + model.limit_dof.shape[0] == 0:  # nothing to be on the central path of
+    if (
+        data.active_count[0] + model.limit_dof.shape[0] + model.dry_dof.shape[0] == 0
+    ):  # nothing to be on the central path of
         if set_trial_velocity(model, data, h, q, guess.velocity, 1.0):
             return KnownStart(True, kappa, residuals(model, data, h, q, v, u))
         return KnownStart(False, kappa, INFEASIBLE)

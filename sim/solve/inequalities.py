@@ -1,4 +1,4 @@
-"""All active contacts, and all limits, of a step at once: the operations of the interior point on them, one per kernel.
+"""All active contacts, limits and dry friction of a step at once: the operations of the interior point, one per kernel.
 
 Those of contacts alone are in sim/contact/active_contacts.py, those of limits in sim/dynamics/joints/limits.py; the
 complementarity products are in complementarity.py.
@@ -20,6 +20,20 @@ from sim.contact.active_contacts import (
     resume_contacts,
     return_contacts,
     start_contacts,
+)
+from sim.dynamics.joints.dry_friction import (
+    add_dry_blocks,
+    apply_dry,
+    dry_constants,
+    dry_error,
+    dry_kinematics,
+    dry_load,
+    keep_dry,
+    move_dry,
+    recover_dry,
+    resume_dry,
+    return_dry,
+    start_dry,
 )
 from sim.dynamics.joints.limits import (
     add_limit_blocks,
@@ -47,6 +61,7 @@ def inequality_kinematics(model: Model, data: Data, h: float) -> None:
     """Gaps and slips of active contacts, impulses of inactive ones, gaps of limits, at configuration 3."""
     contacts_kinematics(model, data, h)
     limit_gaps(model, data, h)
+    dry_kinematics(model, data, h)
 
 
 @kernel
@@ -71,6 +86,7 @@ def start_inequalities(model: Model, data: Data, h: float, kappa: float, growth:
         s = max(data.bound_gap[j], floor)
         data.bound[j, Bound.SLACK] = s
         data.bound[j, Bound.IMPULSE] = k0 / s
+    start_dry(model, data, k0)
     return k0
 
 
@@ -79,6 +95,7 @@ def resume_inequalities(model: Model, data: Data, h: float, kappa: float, predic
     """All cone variables on the central path of kappa, near the present gaps and the impulses kept, or predicted."""
     resume_contacts(model, data, h, kappa, predicted)
     resume_limits(model, data, h / _LIMIT_INERTIA, kappa, predicted)
+    resume_dry(model, data, kappa, predicted)
 
 
 @kernel
@@ -86,12 +103,13 @@ def return_inequalities(model: Model, data: Data, h: float, kappa: float) -> Non
     """Every pair that the last move took out of its cone put back onto the central path of kappa."""
     return_contacts(model, data, h, kappa)
     return_limits(model, data, h / _LIMIT_INERTIA, kappa)
+    return_dry(model, data, kappa)
 
 
 @kernel
 def total_impulse(model: Model, data: Data) -> float:
     """Sum of the normal impulses of active contacts and limits: an estimate of the load that they balance."""
-    total = normal_impulses(model, data)
+    total = normal_impulses(model, data) + dry_load(model, data)
     for k in range(model.limit_dof.shape[0]):
         total += data.bound[k, Bound.IMPULSE]
     return total
@@ -100,7 +118,7 @@ def total_impulse(model: Model, data: Data) -> float:
 @kernel
 def apply_inequalities(model: Model, data: Data) -> float:
     """wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
-    r = apply_contacts(model, data)
+    r = max(apply_contacts(model, data), dry_error(model, data))
     for k in range(model.limit_dof.shape[0]):
         r = max(r, abs(data.bound_gap[k] - data.bound[k, Bound.SLACK]))
     return r
@@ -111,6 +129,7 @@ def apply_limits(model: Model, data: Data) -> None:
     """residual -= sign gamma, and p gamma of a cone."""
     for k in range(model.limit_dof.shape[0]):
         add_limit_impulse(model, data, k, -data.bound[k, Bound.IMPULSE], data.residual)
+    apply_dry(model, data, data.residual)
 
 
 @kernel
@@ -118,6 +137,7 @@ def condense_inequalities(model: Model, data: Data, h: float, kappa: float, shar
     """A += contacts, joint_block += limits: their slacks and impulses eliminated.  See `condense_contacts`."""
     condense_contacts(model, data, h, kappa, share, form, data.A)
     add_limit_blocks(model, data, h)
+    add_dry_blocks(model, data, h)
 
 
 @optional(Slot.ADD_STIFFNESS)
@@ -127,6 +147,7 @@ def add_stiffness(model: Model, data: Data, h: float, kappa: float) -> None:
     condense_contacts(model, data, h, kappa, 1.0, LawForm.SOFT, data.A3)
     add_slip_jacobians(model, data, h)
     add_limit_blocks(model, data, h)
+    add_dry_blocks(model, data, h)
 
 
 @kernel
@@ -134,6 +155,7 @@ def inequality_rhs(model: Model, data: Data, target: NewtonTarget) -> None:
     """dnu += S2^T B^T w + limits, for the target of this Newton step."""
     contact_constants(model, data, target)
     limit_constants(model, data, target)
+    dry_constants(model, data, target)
 
 
 @kernel
@@ -141,6 +163,7 @@ def recover_inequalities(model: Model, data: Data, h: float, share: float) -> No
     """Steps of all cone variables from the twists and rates of the last solve."""
     recover_contacts(model, data, share)
     recover_limits(model, data, h, share)
+    recover_dry(model, data, h)
 
 
 @kernel
@@ -150,6 +173,7 @@ def keep_inequalities(model: Model, data: Data) -> None:
     for k in range(model.limit_dof.shape[0]):
         data.bound_trial[k, Bound.SLACK] = data.bound[k, Bound.SLACK]
         data.bound_trial[k, Bound.IMPULSE] = data.bound[k, Bound.IMPULSE]
+    keep_dry(model, data)
     keep_loops(model, data)
 
 
@@ -160,4 +184,5 @@ def move_inequalities(model: Model, data: Data, alpha: float) -> None:
     for k in range(model.limit_dof.shape[0]):
         data.bound[k, Bound.SLACK] = data.bound_trial[k, Bound.SLACK] + alpha * data.bound_step[k, Bound.SLACK]
         data.bound[k, Bound.IMPULSE] = data.bound_trial[k, Bound.IMPULSE] + alpha * data.bound_step[k, Bound.IMPULSE]
+    move_dry(model, data, alpha)
     move_loops(model, data, alpha)

@@ -28,6 +28,7 @@ from sim.contact.pairs.active_features import overlapping
 from sim.contact.pairs.inactive_pairs import begin_pairs
 from sim.contact.pairs.pair_energy import pairs_gained
 from sim.contact.restitution import find_impacts, impacts_gained
+from sim.dynamics.joints.dry_friction import fit_dry
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FAILED, FeatureChoice, Guess, Outcome, StepOptions, Verdict
@@ -226,6 +227,7 @@ def interior_point(
     begin_pairs(model, data, options)
     choose_active(model, data, options)
     find_impacts(model, data, options.h)
+    fit_dry(model, data, options.h)
     while True:
         out = solve_active(model, data, options, (q, v, u), guess, out)
         if has_activated(model, data):

@@ -37,10 +37,10 @@ _CLOSE = 1e-3  # error, as of the merit, from which one iteration of Newton's me
 
 @kernel
 def predictable(model: Model, data: Data) -> bool:
-    """Whether `predict` covers the scene: no pairs of bodies, loops, gears or friction pyramids."""
+    """Whether `predict` covers the scene: no pairs of bodies, loops, gears, dry friction or friction pyramids."""
     if data.active_count[0] != data.active_ground_count[0] or model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0:
         return False
-    return not has_pyramids(model, data)
+    return model.dry_dof.shape[0] == 0 and not has_pyramids(model, data)
 
 
 @kernel

@@ -19,6 +19,6 @@ def solve_step(
 
     The interior point solves scenes with contacts or limits, Newton's method the others; a scene links one of them.
     """
-    if model.contact_body.shape[0] + model.limit_dof.shape[0] > 0:
+    if model.contact_body.shape[0] + model.limit_dof.shape[0] + model.dry_dof.shape[0] > 0:
         return interior_point(model, data, options, q, v, u, guess)
     return newton(model, data, options, q, v, u, guess)

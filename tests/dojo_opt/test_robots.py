@@ -7,8 +7,8 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.gaits.feet import Feet
+from dojo_opt.gaits.legs import Legs
 from dojo_opt.gaits.references import _TROT, _offsets
-from dojo_opt.problems.legs import Legs
 from sim.mechanism.parts import Contact
 
 

@@ -55,9 +55,13 @@ def test_what_is_left_out_is_said() -> None:
     with pytest.warns(MjcfWarning):
         report = load_mjcf(text).report
     assert report is not None
-    for words in ("that hold one joint, or are not linear, are left out: w", "dry friction of joints is left out: j", "drag of a fluid",
+    for words in ("that hold one joint, or are not linear, are left out: w", "hinges and slides: j", "drag of a fluid",
                   "bodies do not collide"):  # fmt: skip
         assert words in str(report), words
+    with pytest.warns(MjcfWarning):
+        rubbing = load_mjcf(text, joint_friction=True)
+    assert [float(np.max(joint.friction)) for joint in rubbing.joints] == [0.0, 1.0, 0.0]
+    assert "dry" not in str(rubbing.report)
 
 
 HELD = """

@@ -161,6 +161,8 @@ def test_dry_friction_and_unread_elements_are_in_the_report(tmp_path: Path) -> N
     texts = [str(note) for note in mech.report.notes]
     assert any("dry friction" in text and text.endswith("elbow") for text in texts)
     assert "not read: <transmission> (1)" in texts
+    rubbing = dojo.load_urdf(tmp_path / "robot.urdf", joint_friction=True)
+    assert rubbing.joints[1].friction == (0.2,) and not any("dry" in str(note) for note in rubbing.report.notes)
     assert str(mech.report).startswith("robot.urdf: 2 links, 0 of them")
 
 

@@ -104,7 +104,7 @@ class TreeReference:
                 f[stop - 3 : stop] -= 2.0 * model.dof_spring[stop - 3] * s[0] * s[1:]
         for j, force in enumerate(() if u is None else u):
             if model.input_kind[j] == InputKind.JOINT:
-                f[model.input_index[j]] += force
+                f[model.input_index[j]] += model.input_wrench[j, 0] * force
             elif force != 0.0:
                 raise ValueError("reference: inputs on bodies are not represented")
         return f

@@ -12,6 +12,7 @@ from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.directions import At
 from sim.dynamics.joints.ball_spring import spring_turns
 from sim.dynamics.joints.damper import damper_lag, lag_rates
+from sim.dynamics.joints.dry_friction import add_dry_time_step
 from sim.model.columns import Bound
 from sim.model.data import Data
 from sim.model.model import InputKind, Model
@@ -250,10 +251,11 @@ def add_time_step(model: Model, data: Data, at: At, w: float, col: int) -> None:
     for j in range(model.input_kind.shape[0]):
         i = model.input_index[j]
         if model.input_kind[j] == InputKind.JOINT:
-            X[i, col] += w * at.u[j]
+            X[i, col] += w * model.input_wrench[j, 0] * at.u[j]
         else:
             f, t = _input_wrench(model, data, j, at.u)
             add_wrench(model, data, i, f, moment(data, i, f, t), -2.0 * w, col)
+    add_dry_time_step(model, data, w, col)
     for d in range(at.v.shape[0]):
         by_damper, _ = lag_rates(model, h, d)
         X[d, col] += w * (model.dof_damper[d] * by_damper - damper_lag(model, h, d) / h) * (data.nu[d] - at.v[d])

@@ -95,10 +95,11 @@ def all_parameters(mech: Mechanism, time_step: float) -> list[Parameter]:
     for body in mech.bodies:
         if body.mass > 0.0 and body.name not in shares:
             found += body_parameters(mech, body)
+    driven = {part.joint for part in mech.inputs or () if part.servo == "position"}
     first = 0
     limit = 0
     for index, joint in enumerate(mech.joints):
-        found += geometry_parameters(joint, index, False) + joint_parameters(joint, first)
+        found += geometry_parameters(joint, index, False) + joint_parameters(joint, first, driven)
         bounds = list(limit_parameters(joint, limit))
         found += bounds
         first += joint.nv

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -103,14 +103,20 @@ def frame_turns(a: Floats, first: Floats, second: Floats, e: Floats) -> Floats:
     return np.asarray((skew + np.outer(a, spin)) @ (np.eye(3) - np.outer(a, a)))
 
 
-def joint_parameters(joint: Joint, d: int) -> list[Parameter]:
-    """spring, damper, rest, armature; a quaternion has one spring constant, and no armature."""
+def joint_parameters(joint: Joint, d: int, driven: Set[str | None]) -> list[Parameter]:
+    """spring, damper, rest, armature; a quaternion has one spring constant, and no armature.
+
+    driven: names of joints with position servos, whose springs are one with theirs: they have no rest.
+    """
     plain = joint.ntrans if joint.nrot == 3 else joint.nv
     springs = np.asarray(joint.spring)[: plain + (joint.nrot == 3)]
+    rests = () if joint.name in driven else joint.rest
+    if joint.name in driven and np.any(joint.rest):
+        springs = springs[:0]
     return [
         *vector("spring", joint.name, springs, lambda k: [(Effect.SPRING, d + k, 0, 1.0)]),
         *vector("damper", joint.name, joint.damper, lambda k: [(Effect.DAMPER, d + k, 0, 1.0)]),
-        *vector("rest", joint.name, joint.rest, lambda k: [(Effect.REST, d + min(k, plain), max(k - plain, 0), 1.0)]),
+        *vector("rest", joint.name, rests, lambda k: [(Effect.REST, d + min(k, plain), max(k - plain, 0), 1.0)]),
         *vector(
             "armature", joint.name, np.asarray(joint.armature)[:plain], lambda k: [(Effect.ARMATURE, d + k, 0, 1.0)]
         ),

@@ -19,9 +19,9 @@ from solvers.types import Vector
 
 @kernel
 def joint_impulses(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vector) -> None:
-    """residual += h d nu + I (nu - v) + h k (q + h (nu - v)/4 - rest) - h u, and the analogue of quaternion joints.
+    """residual += h d nu + I (nu - v) + h k (q + h (nu - v)/4 - rest) - h g u, and the analogue of quaternion joints.
 
-    I: armature less lag.
+    I: armature less lag;  g: 1 of forces, the gain of servos.
     """
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
@@ -42,7 +42,7 @@ def joint_impulses(model: Model, data: Data, h: float, q: Vector, v: Vector, u: 
             data.residual[e] += r
     for j in range(u.shape[0]):
         if model.input_kind[j] == InputKind.JOINT:
-            data.residual[model.input_index[j]] -= h * u[j]
+            data.residual[model.input_index[j]] -= h * model.input_wrench[j, 0] * u[j]
 
 
 @kernel

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from sim.io.mjcf.groups import Where, name_of, pose_of
 from sim.io.mjcf.joints import BALL, FREE
 from sim.io.urdf.report import Notes
-from sim.mechanism.parts import Input
+from sim.mechanism.parts import Input, Joint
 
 Floats = NDArray[np.float64]
 
 _JOINT, _JOINT_IN_PARENT, _SITE = 0, 1, 4  # mjtTrn
-_FIXED_GAIN, _NO_BIAS, _NO_DYNAMICS = 0, 0, 0
+_FIXED_GAIN, _NO_BIAS, _NO_DYNAMICS = 0, 0, 0  # mjtGain, mjtBias, mjtDyn
+_AFFINE_BIAS = 1
 
 
 def find_inputs(
@@ -24,7 +25,7 @@ def find_inputs(
 ) -> tuple[list[Input], Floats, Floats, Floats]:
     """(inputs, gear, low, high): one input per actuator on a hinge, a slide or a site; bounds of u = gear * ctrl.
 
-    That of a site is the wrench that moves with it, per unit of the actuator's force.
+    That of a site is the wrench that moves with it, per unit of the actuator's force; that of a servo is its target.
     """
     inputs: list[Input] = []
     rows: list[tuple[float, float, float]] = []
@@ -35,9 +36,18 @@ def find_inputs(
         if wrench is None and (not on_joint or model.jnt_type[j] in (FREE, BALL)):
             notes.add("actuators that do not drive a hinge, a slide or a site are left out", [name], warn=True)
             continue
+        servo = None if wrench else _servo(model, a)
+        if servo is not None:
+            part, ratio = replace(servo, joint=homes[j][0], dof=homes[j][1], name=name), 1.0 / model.actuator_gear[a, 0]
+            low, high = _ctrl_bounds(model, a, ratio)
+            inputs.append(replace(part, limits=(low, high)) if low < high else part)
+            rows.append((ratio, low, high))
+            if model.actuator_forcelimited[a]:
+                notes.add("force ranges of servos are not held", [name], warn=True)
+            continue
         plain = model.actuator_gaintype[a] == _FIXED_GAIN and model.actuator_biastype[a] == _NO_BIAS
         if not plain or model.actuator_dyntype[a] != _NO_DYNAMICS:
-            notes.add("servos and actuators with dynamics are plain forces here", [name], warn=True)
+            notes.add("actuators with dynamics or a bias that is no servo's are plain forces here", [name], warn=True)
         ratio = 1.0 if wrench else float(model.actuator_gear[a, 0])
         gear = ratio * (float(model.actuator_gainprm[a, 0]) if plain else 1.0)
         low, high = _bounds(model, a, gear, ratio, bool(plain))
@@ -46,6 +56,25 @@ def find_inputs(
         rows.append((gear, low, high))
     table = np.array(rows, dtype=np.float64).reshape(-1, 3)
     return inputs, table[:, 0], table[:, 1], table[:, 2]
+
+
+def _servo(model: Any, a: int) -> Input | None:
+    """The servo that an actuator of a joint is, for a target in units of the joint; None of others.
+
+    Its force is kp ctrl - kp l - kd l' or kd (ctrl - l') of the length l = gear q.
+    """
+    affine = model.actuator_gaintype[a] == _FIXED_GAIN and model.actuator_biastype[a] == _AFFINE_BIAS
+    gear = float(model.actuator_gear[a, 0])
+    if not affine or model.actuator_dyntype[a] != _NO_DYNAMICS or gear == 0.0:
+        return None
+    gain, (constant, place, rate) = float(model.actuator_gainprm[a, 0]), model.actuator_biasprm[a, :3].tolist()
+    if constant != 0.0 or gain <= 0.0 or rate > 0.0:
+        return None
+    if place == -gain:
+        return Input("a joint", servo="position", stiffness=gain * gear**2, damping=-rate * gear**2)
+    if place == 0.0 and rate == -gain:
+        return Input("a joint", servo="velocity", damping=gain * gear**2)
+    return None
 
 
 def _at_site(model: Any, a: int, name: str, where: Where) -> Input | None:
@@ -65,13 +94,38 @@ def _at_site(model: Any, a: int, name: str, where: Where) -> Input | None:
 
 def _bounds(model: Any, a: int, gear: float, ratio: float, plain: bool) -> tuple[float, float]:
     """Bounds of an input from those of its control, and of its force times the ratio [N, N m]."""
-    low, high = -np.inf, np.inf
-    if plain and model.actuator_ctrllimited[a]:
-        low, high = sorted(float(gear * x) for x in model.actuator_ctrlrange[a])
+    low, high = _ctrl_bounds(model, a, gear) if plain else (-np.inf, np.inf)
     if model.actuator_forcelimited[a]:
         ends = sorted(float(ratio * x) for x in model.actuator_forcerange[a])
         low, high = max(low, ends[0]), min(high, ends[1])
     return low, high
+
+
+def _ctrl_bounds(model: Any, a: int, gear: float) -> tuple[float, float]:
+    """Bounds of an input from those of its control."""
+    if not model.actuator_ctrllimited[a]:
+        return -np.inf, np.inf
+    low, high = sorted(float(gear * x) for x in model.actuator_ctrlrange[a])
+    return low, high
+
+
+def with_friction(
+    model: Any, joints: list[Joint], homes: dict[int, tuple[str, int]], wanted: bool, notes: Notes
+) -> list[Joint]:
+    """The joints with the dry friction of the file, where it is wanted and they can have it."""
+    forces = {joint.name: np.zeros(joint.nv) for joint in joints}
+    rough = sorted({int(model.dof_jntid[d]) for d in np.flatnonzero(model.dof_frictionloss)})
+    missing = []
+    for j in rough:
+        if not wanted or model.jnt_type[j] in (FREE, BALL):
+            missing.append(name_of(model, "joint", j))
+            continue
+        name, dof = homes[j]
+        forces[name][dof] = model.dof_frictionloss[model.jnt_dofadr[j]]
+    if missing:
+        text = "dry friction of joints is left out, which joint_friction=True adds to hinges and slides"
+        notes.add(text, missing, warn=True)
+    return [replace(joint, friction=forces[joint.name]) if forces[joint.name].any() else joint for joint in joints]
 
 
 def left_out(model: Any, collisions: bool, notes: Notes) -> None:
@@ -82,9 +136,6 @@ def left_out(model: Any, collisions: bool, notes: Notes) -> None:
         notes.add("tendons are left out", [name_of(model, "tendon", k) for k in range(model.ntendon)], warn=felt)
     if model.npair and not collisions:
         notes.add("explicit contact pairs are left out", [name_of(model, "pair", k) for k in range(model.npair)])
-    rough = sorted({int(model.dof_jntid[d]) for d in np.flatnonzero(model.dof_frictionloss)})
-    if rough:
-        notes.add("dry friction of joints is left out", [name_of(model, "joint", j) for j in rough], warn=True)
     for field, what in (("dof_dampingpoly", "nonlinear damping"), ("jnt_stiffnesspoly", "nonlinear stiffness")):
         if np.any(getattr(model, field, 0.0)):
             notes.add(f"{what} is left out", warn=True)

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 
 from sim.io.mjcf.collisions import find_collisions, find_on_planes
 from sim.io.mjcf.contacts import find_contacts
-from sim.io.mjcf.drives import find_inputs, left_out
+from sim.io.mjcf.drives import find_inputs, left_out, with_friction
 from sim.io.mjcf.equalities import find_gears, find_loops
 from sim.io.mjcf.groups import GeomGroup, body_shapes, find_groups
 from sim.io.mjcf.joints import BALL, FREE, carry
 from sim.io.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
-from sim.io.urdf.report import LinkFrame, Notes
+from sim.io.urdf.report import OVERLAPPING, LinkFrame, Notes
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.parts import LAWS, Body, Joint
@@ -34,8 +34,9 @@ def load_mjcf(
     merge: bool = True,
     keyframe: int | None = None,
     rim_points: int = 4,
-    collisions: bool = False,
+    collisions: bool | str = False,
     gravity: ArrayLike | None = None,
+    joint_friction: bool = False,
 ) -> MjcfMechanism:
     """Load the model of an MJCF file, with MuJoCo's own parser (`pip install "dojo-opt[mjcf]"`).
 
@@ -51,8 +52,11 @@ def load_mjcf(
         rim_points: number of points per rim of a cylinder.
         collisions: whether bodies collide with one another, and with fixed geoms other than planes, where MuJoCo lets
             them: its spheres, capsules, boxes, cylinders, ellipsoids and meshes, each the convex hull of 32
-            corners at most (sim/io/mjcf/collisions.py).
+            corners at most (sim/io/mjcf/collisions.py). "self" lets all bodies collide with one another but those that
+            a joint connects; `report` lists pairs of shapes that overlap in the neutral state, which do not.
         gravity: (3,) acceleration of gravity [m/s^2]; None: that of the file.
+        joint_friction: whether hinges and slides have the dry friction (frictionloss) of the file, see
+            `Joint.friction`. Steps of a higher order or of a given accuracy are for joints without it.
 
     Returns:
         MjcfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion
@@ -63,6 +67,8 @@ def load_mjcf(
         ValueError: MuJoCo cannot read the file, or no rigid body has the inertia of the named body.
         OSError: the file does not exist.
     """
+    if not isinstance(collisions, bool):
+        checks.one_of("load_mjcf(collisions=...)", collisions, ("self",))
     model, file = _compile(source)
     touching = _touching(friction, law, rim_points)
     notes = Notes()
@@ -71,23 +77,29 @@ def load_mjcf(
     if not joints:
         raise ValueError(f"load_mjcf: {file}: no joint is free to move")
     inputs, gear, low, high = find_inputs(model, homes, where, notes)
-    left_out(model, collisions, notes)
+    joints = with_friction(model, joints, homes, joint_friction, notes)
+    left_out(model, bool(collisions), notes)
     mech = MjcfMechanism(
         bodies,
         [*joints, *find_loops(model, where, notes)],
-        find_contacts(model, where, touching, collisions, notes) if ground else [],
+        find_contacts(model, where, touching, collisions is True, notes) if ground else [],
         inputs,
         gravity=model.opt.gravity if gravity is None else gravity,
         name=Path(file).stem,
         neutral=_neutral(model, keyframe, notes),
         collisions=[
             *(find_on_planes(model, where, touching) if ground else []),
-            *(find_collisions(model, where, touching, notes) if collisions else []),
+            *(find_collisions(model, where, touching, notes) if collisions is True else []),
         ],
         gears=find_gears(model, homes, notes),
     )
     mech = _without_constant_gaps(mech, notes)
     mech = _clear(mech) if keyframe is None else mech
+    if collisions == "self":
+        pairs, overlapping = mech.self_collisions()
+        mech = replace(mech, collisions=[*mech.collisions, *pairs])
+        if overlapping:
+            notes.add(OVERLAPPING, overlapping)
     known = {model.joint(j).name or f"joint_{j}": home for j, home in homes.items()}
     report = MjcfReport(file, notes.close(), _frames(model, where), known, gear, low, high)
     _warn(report)

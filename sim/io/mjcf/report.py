@@ -27,7 +27,7 @@ class MjcfReport:
         notes: unsupported elements, and other differences.
         bodies: pose of the frame of every body of the file.
         joints: of every joint of the file, the joint of the mechanism that has its coordinates, and the first of them.
-        gear: (nu,) force or torque of every input per unit of MuJoCo's control, u = gear * ctrl [N, N m].
+        gear: (nu,) force or torque of every input, or target of a servo, per unit of MuJoCo's control, u = gear * ctrl.
         low: (nu,) lower bounds of u from the control and force ranges of the actuators, infinite without any [N, N m].
         high: (nu,) upper bounds likewise [N, N m].
     """
@@ -54,11 +54,11 @@ class MjcfMechanism(Mechanism):
     The coordinates q and velocities v are MuJoCo's qpos and qvel. Represented: bodies (welded ones as one), free, ball,
     slide and hinge joints with damping, armature (an inertia of its coordinate alone: exact; not on balls), springs and
     ranges (not on balls); spheres, capsules, boxes, cylinders, ellipsoids against planes that do not move, and with
-    `collisions=True` against one another and fixed geoms; actuators on hinges and slides as inputs in N and N m, u =
-    report.gear * ctrl, and on sites as wrenches that move with the body; connect and weld as joints that close loops,
-    and linear couplings of two joints as gears, all of them rigid (equalities.py). Not represented, and listed
-    in `report.notes`: other equality constraints, tendons, dry friction of joints, servos, fluids, meshes, height
-    fields.
+    `collisions=True` against one another and fixed geoms; actuators on hinges and slides as inputs in N and N m, or as
+    servos with targets in units of the joint, u = report.gear * ctrl, and on sites as wrenches that move with the body;
+    connect and weld as joints that close loops, and linear couplings of two joints as gears, all of them rigid
+    (equalities.py). Not represented, and listed in `report.notes`: other equality constraints, tendons, fluids, meshes,
+    height fields.
 
     Attributes:
         report: poses of the bodies, coordinates of the joints, gears and bounds of the inputs, unsupported elements.

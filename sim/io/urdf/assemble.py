@@ -13,14 +13,14 @@ from sim.io.urdf.contacts import find_contacts
 from sim.io.urdf.inertia import RigidInertia, combined, fault, repaired
 from sim.io.urdf.loops import UrdfLoop, closing_joint, zero_poses
 from sim.io.urdf.mimic import follower_value, leader_of, mimic_gears
-from sim.io.urdf.report import LinkFrame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
+from sim.io.urdf.report import OVERLAPPING, LinkFrame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
 from sim.io.urdf.robot import Robot, UrdfJoint
 from sim.io.urdf.solids import body_shapes, body_visuals, collision_shapes
 from sim.io.urdf.tree import MergedLinks, Place, group, ordered
 from sim.io.urdf.xml import UrdfError
 from sim.mechanism import checks
 from sim.mechanism.composite import composite
-from sim.mechanism.parts import WORLD, Body, Contact, Input, Joint
+from sim.mechanism.parts import KINDS, WORLD, Body, Contact, Input, Joint
 from sim.mechanism.pose import HERE, Pose
 from sim.mechanism.stance import gaps, lifted, resting
 from sim.mechanism.visual import Visual
@@ -55,6 +55,8 @@ class Choices:
     law: str
     rim_points: int
     gravity: tuple[float, ...]
+    collisions: str | None
+    joint_friction: bool
 
 
 def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, notes: Notes) -> UrdfMechanism:
@@ -98,6 +100,18 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
     if len(bases) == 1 and bases[0] not in choices.neutral:
         mech = replace(mech, neutral=lifted(mech, bases[0]))
     _ground_notes(mech, choices, bool(bases), notes)
+    rough = [
+        body.joint.name
+        for body in groups
+        if body.joint and body.joint.friction and not (choices.joint_friction and _may_rub(body, body.joint))
+    ]
+    if rough:
+        notes.add("joints move without the dry friction of the file, which joint_friction=True adds to hinges", rough)
+    if choices.collisions is not None:
+        pairs, overlapping = mech.self_collisions()
+        mech = replace(mech, collisions=pairs)
+        if overlapping:
+            notes.add(OVERLAPPING, overlapping)
     report = _report(
         {**robot.joints, **{n: loop.joint for n, loop in loops.items()}}, mech, places, coms, choices.file, notes
     )
@@ -189,8 +203,14 @@ def _joint(
         axis=joint.axis,
         orientation=frame.quaternion,
         damper=0.0 if body.fixed else joint.damping,
+        friction=max(joint.friction, 0.0) if choices.joint_friction and _may_rub(body, joint) else 0.0,
         limits=None if body.fixed else joint.limits,
     )
+
+
+def _may_rub(body: MergedLinks, joint: UrdfJoint) -> bool:
+    """Whether a joint has coordinates that dry friction can hold."""
+    return not body.fixed and KINDS[joint.kind][1] < 3
 
 
 def _body(body: MergedLinks, part: RigidInertia) -> Body:

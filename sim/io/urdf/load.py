@@ -42,6 +42,8 @@ def load_urdf(
     law: str = "nonlinear",
     rim_points: int = 4,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
+    collisions: str | None = None,
+    joint_friction: bool = False,
 ) -> UrdfMechanism:
     """Load the robot of a URDF file.
 
@@ -78,6 +80,10 @@ def load_urdf(
         law: law of contacts with friction, see `dojo.Contact`.
         rim_points: number of points per rim of a cylinder.
         gravity: (3,) acceleration of gravity [m/s^2].
+        collisions: "self" lets all links collide but those that a joint connects; `report` lists pairs of shapes that
+            overlap in the neutral state, which do not. None: the robot does not touch itself.
+        joint_friction: whether joints have the dry friction that the file gives them, see `Joint.friction`. Steps of a
+            higher order or of a given accuracy are for joints without it.
 
     Returns:
         UrdfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion
@@ -111,6 +117,8 @@ def load_urdf(
         law=checks.one_of("load_urdf(law=...)", law, LAWS),
         rim_points=whole_number("load_urdf(rim_points=...)", rim_points, 3),
         gravity=checks.vector("load_urdf(gravity=...)", gravity, 3),
+        collisions=None if collisions is None else checks.one_of("load_urdf(collisions=...)", collisions, ("self",)),
+        joint_friction=joint_friction,
     )
     return assemble(robot, loops, choices, notes)
 

@@ -14,6 +14,9 @@ from sim.mechanism.mechanism import Mechanism
 Floats = NDArray[np.float64]
 
 
+OVERLAPPING = "shapes that overlap in the neutral state, and do not collide"
+
+
 class UrdfWarning(UserWarning):
     """The mechanism differs from the robot of the file in a way that its motion shows."""
 
@@ -91,7 +94,7 @@ class UrdfMechanism(Mechanism):
 
     Attributes:
         report: `links` has the pose of every link in its body, `effort` and `velocity` the bounds of the inputs and
-            their joints, `notes` unsupported elements (dry friction, meshes, mimics).
+            their joints, `notes` unsupported elements (meshes, mimics).
     """
 
     report: UrdfReport | None = field(default=None, compare=False, repr=False)

@@ -100,6 +100,7 @@ class UrdfJoint:
     axis: Floats  # (3,) in the joint frame, unit
     limits: tuple[float, float] | None  # [m, rad]
     damping: float  # [N s/m, N m s/rad]
+    friction: float  # dry [N, N m]
     effort: float  # [N, N m], infinite where there is none
     velocity: float  # [m/s, rad/s], infinite where there is none
     element: Element
@@ -243,8 +244,7 @@ def read_joint(element: Element, ends: tuple[str, str], pose: Pose, notes: Notes
     damping = dynamics.number("damping", 0.0) if dynamics else 0.0
     if dynamics and damping < 0.0:
         raise dynamics.error(f"expected damping >= 0, got {damping:g}")
-    if dynamics and dynamics.number("friction", 0.0) != 0.0 and kind != "fixed":
-        notes.add("joints move without the dry friction that the file gives them, which is not modelled", [name])
+    friction = dynamics.number("friction", 0.0) if dynamics else 0.0
     bounds = [
         limit.number(field, np.inf) if limit and field in limit.attributes else np.inf
         for field in ("effort", "velocity")
@@ -263,6 +263,7 @@ def read_joint(element: Element, ends: tuple[str, str], pose: Pose, notes: Notes
         axis,
         _limits(name, given, limit, notes),
         damping,
+        friction,
         bounds[0],
         bounds[1],
         element,

@@ -1,0 +1,211 @@
+"""Problems of arms: the hand pushes an object along a table."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.constraint import Goal
+from dojo_opt.cost import Effort, Tracking
+from dojo_opt.gaits.equilibrium import input_map, potential_gradient
+from dojo_opt.planning.options import PLANNED
+from dojo_opt.planning.problem import Problem
+from sim.mechanism import checks
+from sim.mechanism.collision import Collision
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
+from sim.mechanism.shape_contacts import shape_contacts
+from sim.mechanism.shapes import Solid, Sphere
+from sim.simulator.inverse_kinematics import ik
+from sim.simulator.kinematics import Kinematics
+from sim.simulator.simulator import Simulator
+
+Array = NDArray[np.float64]
+
+__all__ = ["push"]
+
+_CALL = "problems.push"
+_GAP = 0.01  # [m] between the hand and the object at the beginning
+_REST = 0.2  # of the duration, at the end
+# weights of squares per second: place of the object over its way, its heading, angles of the arm, and their rates
+_PLACE, _TURN, _ANGLE, _RATE = 1.0, 1.0, 0.1, 0.01
+_EFFORT = 0.01  # of squares of a torque, in units of the largest that holds the arm
+_ROUGH = 0.5  # friction of an object whose shapes have none
+_TIP = "the ball that pushes"
+
+
+def push(
+    arm: Mechanism | Simulator,
+    object: Body,
+    goal: ArrayLike,
+    *,
+    frame: str | None = None,
+    offset: ArrayLike = (0.0, 0.0, 0.0),
+    radius: float = 0.03,
+    start: ArrayLike | None = None,
+    at: ArrayLike | None = None,
+    duration: float = 2.0,
+    time_step: float = 0.02,
+) -> Problem:
+    """An arm pushes an object along a table to a place, where both come to rest.
+
+    The object stands with its x axis in the direction of the push. The hand is a ball at a frame of the arm, which
+    begins 1 cm behind the object, at the height of its centre of mass. The guess is a
+    hand that moves straight ahead, the object before it, with the torques that hold the arm; it does not know the
+    contact. Place and heading of the object at the end are constraints, and so is the rest of both. The friction of the
+    object's shapes, 0.5 where they have none, acts at the table and at the ball.
+
+    Args:
+        arm: the mechanism, or its simulator, whose time step is then `time_step`; its own contacts are left out.
+        object: a body with a shape that stands on the table: a Box, Sphere, Capsule or Polytope.
+        goal: (2,) displacement of the object along x and y [m].
+        frame: name of the link that has the ball (default None: the body at the end of the longest row of hinges).
+        offset: (3,) of the ball from the origin of the frame, in its axes [m].
+        radius: radius of the ball [m].
+        start: (nq,) coordinates where the search for those behind the object begins (default None: the neutral ones).
+        at: (3,) point of the table below the object at the beginning [m] (default None: on the ground, below the ball
+            of the coordinates `start`).
+        duration: of the motion, of which a fifth is for the rest at the end [s].
+        time_step: time step of the simulator [s].
+
+    Returns:
+        The problem; the joint of the object has the object's name.
+
+    Raises:
+        TypeError: `arm` is neither a mechanism nor a simulator, or `object` no body.
+        ValueError: the frame is unknown, the hand cannot reach the object or its goal, or an argument is out of range.
+    """
+    mech = arm.mechanism if isinstance(arm, Simulator) else arm
+    if not isinstance(mech, Mechanism):
+        raise TypeError(f"{_CALL}(arm): expected a Mechanism or a Simulator, got {arm!r}")
+    if not isinstance(object, Body):
+        raise TypeError(f"{_CALL}(object): expected a Body, got {object!r}")
+    way = np.append(checks.array(f"{_CALL}(goal)", goal, (2,)), 0.0)
+    far = float(np.linalg.norm(way))
+    if far == 0.0:
+        raise ValueError(f"{_CALL}(goal): expected a displacement along the table, got zero")
+    checks.number(f"{_CALL}(radius=...)", radius, above=0.0)
+    checks.number(f"{_CALL}(duration=...)", duration, above=0.0)
+    frame = _hand(mech) if frame is None else frame
+    alone = Simulator(replace(mech, contacts=(), collisions=()), time_step=time_step)
+    kin = Kinematics(alone)
+    checks.one_of(f"{_CALL}(frame=...)", frame, kin.frames)
+    kin.add(_TIP, frame, checks.vector(f"{_CALL}(offset=...)", offset, 3))
+    q = alone.neutral()[: alone.nq]
+    q = q if start is None else np.array(checks.array(f"{_CALL}(start=...)", start, (alone.nq,)))
+    below = np.append(kin.pose(_TIP, q)[0][:2], 0.0) if at is None else checks.array(f"{_CALL}(at=...)", at, (3,))
+    place = below + (0.0, 0.0, _half(object, np.array([0.0, 0.0, -1.0])))
+    forward = way / far
+    touch = place - (_half(object, np.array([-1.0, 0.0, 0.0])) + radius) * forward
+    pose = np.array([*place, *_heading(forward)])
+    horizon = max(5, round(duration / time_step))
+    share = np.clip(np.arange(-1.0, horizon + 1.0) / ((1.0 - _REST) * horizon), 0.0, 1.0)
+    moved = -_GAP + (far + _GAP) * _smooth(share)
+    hands = _follow(kin, q, touch + moved[:, None] * forward)
+    sim = _scene(kin, object, pose, radius, float(below[2]))
+    states = _states(sim, hands, place + np.maximum(moved, 0.0)[:, None] * forward)
+    resting = np.concatenate([hands[1:-1], np.zeros((horizon, alone.nv))], axis=1)
+    held = np.linalg.lstsq(input_map(alone), potential_gradient(alone, resting).T, rcond=None)[0].T
+    limits = tuple(np.asarray(bound, dtype=float) for bound in sim.mechanism.input_limits)
+    held = np.clip(held, *limits)
+    unit = max(float(np.abs(held).max(initial=0.0)), 1e-3)
+    return Problem(
+        sim,
+        states[0],
+        horizon,
+        cost=[
+            Tracking(states, time_step * _weights(alone.nv, far)),
+            Effort(time_step * _EFFORT / unit**2, reference=held),
+        ],
+        constraints=[Goal(states[-1], components=_ends(alone.nv))],
+        controls0=held,
+        states0=states,
+    )
+
+
+def _hand(mech: Mechanism) -> str:
+    """The body at the end of the longest row of hinges."""
+    depth: dict[str, int] = {}
+    for joint in mech.joints:
+        depth[joint.child] = depth.get(joint.parent or "", 0) + (joint.nrot > 0)
+    return max(mech.body_names, key=lambda name: depth[name])
+
+
+def _heading(forward: Array) -> list[float]:
+    """The quaternion that turns x to a level direction (3,)."""
+    half = 0.5 * float(np.arctan2(forward[1], forward[0]))
+    return [np.cos(half), 0.0, 0.0, np.sin(half)]
+
+
+def _half(body: Body, direction: Array) -> float:
+    """How far the shapes of a body reach in a direction (3,) from its centre of mass [m]."""
+    if not body.shapes:
+        raise ValueError(f"{_CALL}(object): body {body.name!r} has no shape")
+    return max(_reach(shape, direction) for shape in body.shapes)
+
+
+def _reach(shape: Solid, direction: Array) -> float:
+    """How far a shape on its body reaches in a direction (3,) [m]."""
+    stance = shape.stance()
+    if stance is None:
+        raise ValueError(f"{_CALL}(object): expected a Box, Sphere, Capsule or Polytope, got {shape!r}")
+    return float((shape.place(stance.points) @ direction).max()) + stance.radius
+
+
+def _follow(kin: Kinematics, q: Array, tips: Array) -> Array:
+    """(n, nq) coordinates of the arm with its ball at the places (n, 3), each from those before."""
+    out = []
+    for place in tips:
+        found = ik(kin, {_TIP: place}, q)
+        if not found.success:
+            raise ValueError(f"{_CALL}(at=..., goal): the hand at {np.round(place, 3)}: {found.message}")
+        q = found.q
+        out.append(q)
+    return np.array(out)
+
+
+def _scene(kin: Kinematics, thing: Body, pose: Array, radius: float, table: float) -> Simulator:
+    """The arm, the object on the table, and the ball between them."""
+    mech = kin.mechanism
+    rough = max((shape.friction for shape in thing.shapes if shape.friction is not None), default=_ROUGH)
+    contacts = shape_contacts(_CALL, thing, friction=rough, height=table)
+    joint = Joint("floating", None, thing.name)
+    alone = Mechanism([thing], [joint], contacts, inputs=(), neutral=pose)
+    number, point, _ = kin.place(_TIP)
+    if thing.name in (*mech.body_names, *mech.joint_names):
+        raise ValueError(f"{_CALL}(object): the arm {mech.name!r} has a part called {thing.name!r}, too")
+    ball = Sphere(radius, center=point)
+    pairs = [
+        Collision(mech.body_names[number], thing.name, ball, shape, friction=rough, name=f"hand-{thing.name}.{k}")
+        for k, shape in enumerate(thing.shapes)
+    ]
+    return Simulator(mech.add(alone).with_collisions(*pairs), time_step=kin.sim.time_step, kappa=PLANNED)
+
+
+def _states(sim: Simulator, hands: Array, places: Array) -> Array:
+    """States (n - 1, nx) along coordinates of the arm (n, nq) and places of the object (n, 3)."""
+    x = np.tile(sim.neutral(), (len(hands), 1))
+    x[:, : hands.shape[1]] = hands
+    x[:, hands.shape[1] : hands.shape[1] + 3] = places
+    steps = sim.difference(x[1:], x[:-1])[:, : sim.nv]
+    x = x[1:]
+    x[:, sim.nq :] = steps / sim.time_step
+    return x
+
+
+def _weights(arm: int, far: float) -> Array:
+    """(ndx,) weights of squares of a scene with so many degrees of freedom of the arm."""
+    place = [*[_PLACE / far**2] * 3, *[_TURN] * 3]
+    return np.array([_ANGLE] * arm + place + [_RATE] * arm + [_RATE * w for w in place])
+
+
+def _ends(arm: int) -> NDArray[np.int64]:
+    """Components that the goal holds: place along the table and heading of the object, and all velocities."""
+    return np.concatenate([arm + np.array([0, 1, 5]), np.arange(arm + 6, 2 * (arm + 6))])
+
+
+def _smooth(t: Array) -> Array:
+    """0 at 0, 1 at 1, with two derivatives zero at both: 10 t^3 - 15 t^4 + 6 t^5."""
+    return np.asarray(t**3 * (10.0 - 15.0 * t + 6.0 * t**2))

@@ -1,0 +1,125 @@
+"""A robot of any make walks under a velocity command."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt import gaits
+from dojo_opt.cost import Effort, Tracking
+from dojo_opt.gaits.gait import Gait
+from dojo_opt.gaits.legs import Legs
+from dojo_opt.mpc.controller import MPC
+from dojo_opt.planning.options import PLANNED
+from dojo_opt.planning.problem import Problem
+from dojo_opt.tasks.commanded import CommandedGait, SteeredGait
+from sim.mechanism import checks
+from sim.mechanism.checks import whole_number
+from sim.simulator.simulator import Simulator
+
+Vector = NDArray[np.float64]
+
+__all__ = ["legged_mpc"]
+
+_GAITS = ("trot", "walk", "pace", "bound", "hop")
+# of a robot of the size and weight of the A1, as in `quadruped_mpc`: lengths go with the height, times with its root
+_KNOT, _KNOTS, _HORIZON = 0.04, 12, 20  # [s], of a period, of a plan
+_SPEED, _LIFT, _KAPPA = 0.2, 0.05, 1e-3  # [m/s], [m], [N s m]
+_BASE, _ANGLE, _VELOCITY, _RATE, _EFFORT = 10.0, 1.0, 0.1, 0.01, 1e-4
+_CAREFUL = 0.5  # share of the friction that plans count on
+
+
+def legged_mpc(
+    robot: Any,
+    gait: str = "trot",
+    *,
+    velocity: Any = None,
+    feet: Sequence[str] | Mapping[str, float] | None = None,
+    stance: Any = None,
+    period: float | None = None,
+    step_height: float | None = None,
+    duty: float | None = None,
+    damping: float | None = None,
+    substeps: int = 1,
+    **settings: Any,
+) -> MPC:
+    """A robot with two, four or six legs walks at a commanded velocity: 20 knots, 12 of them a period of its gait.
+
+    Feet and stance are found, see `dojo_opt.gaits.legs.Legs`. Weights are those of `quadruped_mpc` in units of the
+    robot's weight and height, times go with the root of the height: 40 ms a knot for one of 0.29 m. Torques keep within
+    the limits of its inputs. The cost tracks the gait with its torques by inverse dynamics; plans count on half the
+    friction of the feet, and learn the height of the ground from those that stand.
+
+    Args:
+        robot: the mechanism, on a floating base that looks along x, or its simulator.
+        gait: "trot", "walk", "pace", "bound" or "hop". Robots with two legs move them in turn when they trot.
+        velocity: (3,) velocity of the base forward and to the left, and rate of its heading [m/s, m/s, rad/s], or a
+            function of the time [s] that returns it; it is called once per plan (default None: forward at 0.2 m/s for a
+            robot of the A1's height, for others in proportion to the root of the height).
+        feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
+            radii [m] in a table by name (default None: found).
+        stance: coordinates of the stance by joint (default None: found).
+        period: duration of a cycle of the gait [s] (default None: 12 knots).
+        step_height: lift of a swinging foot [m] (default None: 0.05 m for the A1's height).
+        duty: share of the period that a foot is on the ground (default None: that of the gait).
+        damping: least damper of the joints of model and plant [N m s/rad] (default None: see `Legs`).
+        substeps: steps of the model per knot.
+        **settings: settings of `dojo.MPC`.
+
+    Returns:
+        The controller; `tasks.plant(mpc)` is a plant for it.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range, a robot without legs, or a foot that cannot reach its place.
+    """
+    call = "tasks.legged_mpc"
+    checks.one_of(f"{call}(gait)", gait, _GAITS)
+    legs = Legs(robot, feet, damping=damping, stance=stance)
+    slow, unit = legs.size**0.5, legs.torque
+    cycle = _KNOT * _KNOTS * slow if period is None else checks.number(f"{call}(period=...)", period, above=0.0)
+    knot = 1e-3 * max(1, round(1e3 * cycle / _KNOTS))
+    sim = legs.simulator(knot / whole_number(f"{call}(substeps=...)", substeps), PLANNED)
+    lift = _LIFT * legs.size if step_height is None else step_height
+    shape: dict[str, Any] = {"period": _KNOTS * knot, "step_height": lift} | ({} if duty is None else {"duty": duty})
+    make = partial(_period, gait, **shape)
+    command: Any = (_SPEED * slow, 0.0, 0.0) if velocity is None else velocity
+    reference = SteeredGait(sim, make, command) if callable(command) else CommandedGait(sim, make, command)
+    times = knot * np.arange(_HORIZON + 1)
+    limits = sim.mechanism.input_limits
+    states, torques = reference(times), reference.torques(times[:-1])
+    gains = np.array([part.gain for part in sim.mechanism.inputs or ()])
+    problem = Problem(
+        sim,
+        states[0],
+        _HORIZON,
+        cost=[Tracking(states, _weights(legs, sim)), Effort(_EFFORT * gains**2 / unit**2)],
+        control_limits=limits if np.isfinite(limits).any() else None,
+        substeps=substeps,
+        controls0=np.clip(torques, *limits),
+        states0=states,
+    )
+    grip = min((c.friction for c in sim.mechanism.contacts), default=0.0)
+    usual = {"learn_ground": True, "kappa": _KAPPA * unit * slow, "friction": _CAREFUL * grip}
+    return MPC(problem, reference={0: reference, 1: reference.torques}, **{**usual, **settings})
+
+
+def _period(name: str, sim: Simulator, command: Vector, **settings: Any) -> Gait:
+    """One period of a gait at a command (3,)."""
+    speed, lateral, heading_rate = (float(c) for c in command)
+    moves = {"speed": speed, "lateral": lateral, "heading_rate": heading_rate}
+    made: Gait = getattr(gaits, name)(sim, **moves, cycles=1, **settings)
+    return made
+
+
+def _weights(legs: Legs, sim: Simulator) -> ArrayLike:
+    """(ndx,) weights of squares of lengths, angles and their rates, in units of the robot's height and time."""
+    joints = sim.nv - 6
+    place, turn = _BASE / legs.size**2, _BASE
+    pose = [np.full(3, place), np.full(3, turn), np.full(joints, _ANGLE)]
+    rates = [np.full(3, _VELOCITY / legs.size), np.full(3, _VELOCITY * legs.size), np.full(joints, _RATE * legs.size)]
+    return np.concatenate([*pose, *rates])

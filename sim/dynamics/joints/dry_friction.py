@@ -1,0 +1,231 @@
+"""Dry friction of joints on the central path: the impulse lambda, at most F = h f, that takes the most power.
+
+    f - b = h nu,    f (F + lambda) = kappa,    b (F - lambda) = kappa,    all four factors positive
+
+f and b are the motion forward and backward in the step. As kappa -> 0 a joint that moves is held back by F, and one
+that rests by any impulse below it: a cone of one dimension whose radius is given. Power is never gained, lambda nu < 0.
+The variables of a joint are f, F + lambda, b and F - lambda (columns Dry); lambda and b, f are eliminated for nu:
+
+    d lambda = w - (h/c) d nu,    c = f/(F + lambda) + b/(F - lambda)
+"""
+
+from __future__ import annotations
+
+from sim.model.columns import Dry
+from sim.model.data import Data
+from sim.model.model import Model
+from sim.model.options import NewtonTarget
+from sim.model.slots import Slot
+from solvers.compiler import kernel, optional
+from solvers.cones import orthant_step
+from solvers.types import Vector
+
+_LEFT = 1e-3  # a variable that fell below this share of its former value has left its cone
+_HELD = 0.01  # least share of its bound by which an impulse that is kept stays within it
+
+
+@kernel
+def dry_impulse(data: Data, k: int) -> float:
+    """lambda of element k."""
+    return 0.5 * (data.dry[k, Dry.LEFT_FORWARD] - data.dry[k, Dry.LEFT_BACKWARD])
+
+
+@kernel
+def dry_compliance(data: Data, k: int) -> float:
+    """c of element k, -d(h nu)/d(lambda)."""
+    z = data.dry[k]
+    return z[Dry.FORWARD] / z[Dry.LEFT_FORWARD] + z[Dry.BACKWARD] / z[Dry.LEFT_BACKWARD]
+
+
+@kernel
+def onto_dry_path(z: Vector, x: float, bound: float, kappa: float) -> None:
+    """z = the point of the central path at the motion x, for an impulse of at most `bound`.
+
+    The remainder F - |lambda| = F kappa (1 + kappa/(s + y))/(kappa + s),  y = F |x|,  s^2 = kappa^2 + y^2.
+    """
+    y = bound * abs(x)
+    s = (kappa * kappa + y * y) ** 0.5
+    least = bound * kappa * (1.0 + kappa / (s + y)) / (kappa + s)
+    most = 2.0 * bound - least
+    z[Dry.LEFT_FORWARD] = least if x > 0.0 else most
+    z[Dry.LEFT_BACKWARD] = most if x > 0.0 else least
+    z[Dry.FORWARD] = kappa / z[Dry.LEFT_FORWARD]
+    z[Dry.BACKWARD] = kappa / z[Dry.LEFT_BACKWARD]
+
+
+@optional(Slot.DRY_KINEMATICS)
+def dry_kinematics(model: Model, data: Data, h: float) -> None:
+    """The motion h nu and the bound h f of every element."""
+    for k in range(model.dry_dof.shape[0]):
+        data.dry_move[k, 0] = h * data.nu[model.dry_dof[k]]
+        data.dry_move[k, 1] = h * model.dry_force[k]
+
+
+@optional(Slot.FIT_DRY)
+def fit_dry(model: Model, data: Data, h: float) -> None:
+    """The variables of the last step, which may have had another length, with the sum 2 F, and the same products."""
+    for k in range(model.dry_dof.shape[0]):
+        z = data.dry[k]
+        total = z[Dry.LEFT_FORWARD] + z[Dry.LEFT_BACKWARD]
+        if total > 0.0:
+            g = 2.0 * h * model.dry_force[k] / total
+            z[Dry.LEFT_FORWARD] *= g
+            z[Dry.LEFT_BACKWARD] *= g
+            z[Dry.FORWARD] /= g
+            z[Dry.BACKWARD] /= g
+
+
+@optional(Slot.START_DRY)
+def start_dry(model: Model, data: Data, kappa: float) -> None:
+    """All elements on the central path of kappa, at the present motion."""
+    for k in range(model.dry_dof.shape[0]):
+        onto_dry_path(data.dry[k], data.dry_move[k, 0], data.dry_move[k, 1], kappa)
+
+
+@optional(Slot.RESUME_DRY)
+def resume_dry(model: Model, data: Data, kappa: float, predicted: bool) -> None:
+    """All elements on the central path of kappa: at the motion of those that move, near the impulse of the others.
+
+    predicted: the impulses that they have now, otherwise those kept in dry_trial.
+    """
+    for k in range(model.dry_dof.shape[0]):
+        x, bound = data.dry_move[k, 0], data.dry_move[k, 1]
+        z = data.dry[k]
+        left = z[Dry.LEFT_FORWARD] if predicted else data.dry_trial[k, Dry.LEFT_FORWARD]
+        if bound * abs(x) > kappa or not left > 0.0:
+            onto_dry_path(z, x, bound, kappa)
+            continue
+        left = min(max(left, _HELD * bound), (2.0 - _HELD) * bound)
+        z[Dry.LEFT_FORWARD], z[Dry.LEFT_BACKWARD] = left, 2.0 * bound - left
+        z[Dry.FORWARD], z[Dry.BACKWARD] = kappa / left, kappa / (2.0 * bound - left)
+
+
+@optional(Slot.RETURN_DRY)
+def return_dry(model: Model, data: Data, kappa: float) -> None:
+    """The elements that left their cones put back onto the central path of kappa."""
+    for k in range(model.dry_dof.shape[0]):
+        left = False
+        for j in range(4):
+            left = left or data.dry[k, j] <= _LEFT * data.dry_trial[k, j]
+        if left:
+            onto_dry_path(data.dry[k], data.dry_move[k, 0], data.dry_move[k, 1], kappa)
+
+
+@optional(Slot.DRY_ERROR, default=0.0)
+def dry_error(model: Model, data: Data) -> float:
+    """Largest |f - b - h nu|."""
+    r = 0.0
+    for k in range(model.dry_dof.shape[0]):
+        r = max(r, abs(data.dry[k, Dry.FORWARD] - data.dry[k, Dry.BACKWARD] - data.dry_move[k, 0]))
+    return r
+
+
+@optional(Slot.DRY_LOAD, default=0.0)
+def dry_load(model: Model, data: Data) -> float:
+    """Sum of |lambda|."""
+    total = 0.0
+    for k in range(model.dry_dof.shape[0]):
+        total += abs(dry_impulse(data, k))
+    return total
+
+
+@optional(Slot.APPLY_DRY)
+def apply_dry(model: Model, data: Data, out: Vector) -> None:
+    """out -= lambda.   out: (nv,)."""
+    for k in range(model.dry_dof.shape[0]):
+        out[model.dry_dof[k]] -= dry_impulse(data, k)
+
+
+@optional(Slot.ADD_DRY_BLOCKS)
+def add_dry_blocks(model: Model, data: Data, h: float) -> None:
+    """joint_block += h/c on the diagonal."""
+    for k in range(model.dry_dof.shape[0]):
+        d = model.dry_dof[k]
+        i = model.dof_body[d]
+        n = model.body_vadr[i + 1] - model.body_vadr[i]
+        a = d - model.body_vadr[i]
+        data.joint_block[i, a * n + a] += h / dry_compliance(data, k)
+
+
+@optional(Slot.DRY_CONSTANTS)
+def dry_constants(model: Model, data: Data, target: NewtonTarget) -> None:
+    """dnu += w, with d lambda = w - (h/c) d nu; w and the constant parts of df and db kept in dry_w."""
+    for k in range(model.dry_dof.shape[0]):
+        z, step = data.dry[k], data.dry_step[k]
+        parts = data.dry_w[k]
+        for side in range(2):
+            a, p = z[2 * side], z[2 * side + 1]
+            r = target.kappa - a * p - target.corrected * step[2 * side] * step[2 * side + 1]
+            parts[1 + side] = r / p
+        e = z[Dry.FORWARD] - z[Dry.BACKWARD] - data.dry_move[k, 0]
+        parts[0] = (parts[1] - parts[2] + target.share * e) / dry_compliance(data, k)
+        data.dnu[model.dry_dof[k]] += parts[0]
+
+
+@optional(Slot.RECOVER_DRY)
+def recover_dry(model: Model, data: Data, h: float) -> None:
+    """dry_step from dnu."""
+    for k in range(model.dry_dof.shape[0]):
+        z, step, w = data.dry[k], data.dry_step[k], data.dry_w[k]
+        change = w[0] - h / dry_compliance(data, k) * data.dnu[model.dry_dof[k]]
+        step[Dry.LEFT_FORWARD], step[Dry.LEFT_BACKWARD] = change, -change
+        step[Dry.FORWARD] = w[1] - z[Dry.FORWARD] / z[Dry.LEFT_FORWARD] * change
+        step[Dry.BACKWARD] = w[2] + z[Dry.BACKWARD] / z[Dry.LEFT_BACKWARD] * change
+
+
+@optional(Slot.KEEP_DRY)
+def keep_dry(model: Model, data: Data) -> None:
+    """Remember the variables from which the line search starts."""
+    for k in range(model.dry_dof.shape[0]):
+        for j in range(4):
+            data.dry_trial[k, j] = data.dry[k, j]
+
+
+@optional(Slot.MOVE_DRY)
+def move_dry(model: Model, data: Data, alpha: float) -> None:
+    """dry = kept + alpha step."""
+    for k in range(model.dry_dof.shape[0]):
+        for j in range(4):
+            data.dry[k, j] = data.dry_trial[k, j] + alpha * data.dry_step[k, j]
+
+
+@optional(Slot.DRY_PRODUCTS, default=(0.0, 0.0))
+def dry_products(model: Model, data: Data, kappa: float) -> tuple[float, float]:
+    """Sum of the products, and their largest distance from kappa."""
+    total, violation = 0.0, 0.0
+    for k in range(model.dry_dof.shape[0]):
+        for side in range(2):
+            t = data.dry[k, 2 * side] * data.dry[k, 2 * side + 1]
+            total += t
+            violation = max(violation, abs(t - kappa))
+    return total, violation
+
+
+@optional(Slot.DRY_PRODUCTS_AHEAD, default=0.0)
+def dry_products_ahead(model: Model, data: Data, alpha: float) -> float:
+    """Sum of the products after a step of length alpha."""
+    total = 0.0
+    for k in range(model.dry_dof.shape[0]):
+        z, d = data.dry[k], data.dry_step[k]
+        for j in range(0, 4, 2):
+            total += (z[j] + alpha * d[j]) * (z[j + 1] + alpha * d[j + 1])
+    return total
+
+
+@optional(Slot.DRY_BOUNDARY, default=1e30)
+def dry_boundary(model: Model, data: Data) -> float:
+    """Largest step that keeps every variable positive, or 1e30."""
+    a = 1e30
+    for k in range(model.dry_dof.shape[0]):
+        for j in range(4):
+            a = min(a, orthant_step(data.dry[k, j], data.dry_step[k, j]))
+    return a
+
+
+@optional(Slot.ADD_DRY_TIME_STEP)
+def add_dry_time_step(model: Model, data: Data, w: float, col: int) -> None:
+    """columns += w d lambda/dh where h nu stays:  dF = f dh,  c d lambda = (b/(F - lambda) - f/(F + lambda)) dF."""
+    for k in range(model.dry_dof.shape[0]):
+        z = data.dry[k]
+        slope = z[Dry.BACKWARD] / z[Dry.LEFT_BACKWARD] - z[Dry.FORWARD] / z[Dry.LEFT_FORWARD]
+        data.columns[model.dry_dof[k], col] += w * slope / dry_compliance(data, k) * model.dry_force[k]

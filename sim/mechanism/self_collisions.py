@@ -1,0 +1,113 @@
+"""Collisions of a mechanism with itself: all shapes but those of neighbours, and those that overlap from the start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.mechanism.collision import Collision
+from sim.mechanism.parts import WORLD, Body, Joint
+from sim.mechanism.pose import Pose
+from sim.mechanism.poses import poses
+from sim.mechanism.shapes import HalfSpace, Solid, String
+
+Floats = NDArray[np.float64]
+
+__all__ = ["self_collisions"]
+
+_ONE = 1e3  # weight of "the shares of the points of a shape add up to one" beside distances in units of the shapes
+_TOUCHING = 1e-5  # of the size of two shapes: nearer ones overlap
+
+
+def self_collisions(
+    bodies: Sequence[Body], joints: Sequence[Joint], loops: Sequence[Joint], q: Floats
+) -> tuple[list[Collision], list[str]]:
+    """Collisions of all pairs of shapes, but those of links that a joint connects, and those that overlap.
+
+    Links without mass between two others, and fixed joints, do not part neighbours.
+
+    Args:
+        bodies: the bodies.
+        joints: the joints of the tree, parents first.
+        loops: the joints that close loops.
+        q: (nq,) coordinates at which shapes may not overlap.
+
+    Returns:
+        (the collisions, the names of the pairs that overlap).
+    """
+    at, near = poses(joints, q), _neighbours(bodies, joints, loops)
+    found, overlapping = [], []
+    for a, b in combinations([body for body in bodies if body.shapes], 2):
+        if frozenset((a.name, b.name)) in near:
+            continue
+        for (one, label_a), (other, label_b) in product(_labelled(a), _labelled(b)):
+            name = f"{label_a}-{label_b}"
+            if _gap(at[a.name], one, at[b.name], other) > 0.0:
+                shapes = (None if len(a.shapes) == 1 else one), (None if len(b.shapes) == 1 else other)
+                found.append(Collision(a.name, b.name, *shapes, name=name))
+            else:
+                overlapping.append(name)
+    return found, overlapping
+
+
+def _labelled(body: Body) -> Iterator[tuple[Solid, str]]:
+    """The shapes with an end, with their names as in contacts."""
+    for number, shape in enumerate(body.shapes):
+        if not isinstance(shape, HalfSpace | String):
+            yield shape, body.name if len(body.shapes) == 1 else f"{body.name}.{shape.name or number}"
+
+
+def _neighbours(bodies: Sequence[Body], joints: Sequence[Joint], loops: Sequence[Joint]) -> set[frozenset[str]]:
+    """Pairs of bodies that a joint connects, or that are one."""
+    solid = {body.name: body.mass > 0.0 for body in bodies}
+    parent = {joint.child: joint for joint in joints}
+    home: dict[str, str] = {}  # the first body that a body is fixed to
+    for joint in joints:
+        fixed = joint.nv == 0 and joint.parent != WORLD
+        home[joint.child] = home[joint.parent or ""] if fixed else joint.child
+
+    def above(name: str) -> str:
+        """The next body with mass from here on."""
+        while name != WORLD and not solid[name]:
+            name = parent[name].parent or WORLD
+        return name if name == WORLD else home[name]
+
+    near = {frozenset((home[joint.child], above(joint.parent or WORLD))) for joint in (*joints, *loops)}
+    names = list(home)
+    return {
+        frozenset((a, b))
+        for a, b in combinations(names, 2)
+        if home[a] == home[b] or frozenset((home[a], home[b])) in near
+    }
+
+
+def _gap(at_a: Pose, a: Solid, at_b: Pose, b: Solid) -> float:
+    """Distance of two shapes [m], less a hundred thousandth of their size; below zero where they overlap."""
+    (first, ra), (second, rb) = _points(at_a, a), _points(at_b, b)
+    middle = first.mean(axis=0) - second.mean(axis=0)
+    size = sum(float(np.linalg.norm(p - p.mean(axis=0), axis=1).max()) for p in (first, second))
+    slack = _TOUCHING * (size + ra + rb)
+    apart = float(np.linalg.norm(middle)) - size
+    return (apart if apart > ra + rb else _distance(first, second)) - ra - rb - slack
+
+
+def _points(at: Pose, shape: Solid) -> tuple[Floats, float]:
+    """Points in the world whose hull, with a ball of a radius around it, is the shape."""
+    stance = shape.stance()
+    points, radius = (shape.outline(), 0.0) if stance is None else (stance.points, stance.radius)
+    return np.array([at.at(point) for point in shape.place(points)]), radius
+
+
+def _distance(first: Floats, second: Floats) -> float:
+    """Distance of the convex hulls of points (n, 3) and (m, 3) [m]."""
+    from scipy.optimize import nnls  # .3 s, which only robots that collide with themselves need
+
+    count, unit = len(first), float(np.abs(first - second[0]).max()) or 1.0
+    rows = np.zeros((5, count + len(second)))
+    rows[:3, :count], rows[:3, count:] = (first - second[0]).T / unit, -(second - second[0]).T / unit
+    rows[3, :count] = rows[4, count:] = _ONE
+    share, _ = nnls(rows, np.array([0.0, 0.0, 0.0, _ONE, _ONE]))
+    return float(np.linalg.norm(rows[:3] @ share)) * unit

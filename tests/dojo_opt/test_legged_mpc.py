@@ -1,0 +1,72 @@
+"""A robot of any make under a velocity command: its reference, and closed loops with pushes and steering."""
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt.gaits.feet import Feet
+
+
+def steering(time):
+    return (0.2, 0.0, 0.0) if time < 0.5 else (0.15, 0.05, 0.6)
+
+
+@pytest.fixture(scope="module")
+def mpc():
+    return dojo.tasks.legged_mpc(dojo.models.quadruped(damper=0.0), velocity=steering)
+
+
+def test_the_reference_of_a_turning_robot_goes_on_and_its_feet_stand_still(mpc):
+    gait, sim = mpc.references._moving[0][1], mpc.sim
+    gait.anchor(0.0, mpc.start)
+    before = gait([0.6])[0]
+    gait.anchor(0.6, mpc.start)  # the command has changed
+    t = 0.6 + np.arange(0.0, 1.2, 0.004)
+    x, then = gait(t), gait(t - sim.time_step)
+    np.testing.assert_allclose(x[0, :2], before[:2], atol=1e-6)
+    rates = sim.difference(x, then)[:, : sim.nv] / sim.time_step
+    np.testing.assert_allclose(x[10:, sim.nq :], rates[10:], atol=1e-9)
+    heading = 2.0 * np.arctan2(x[:, 6], x[:, 3])
+    assert heading[-1] - heading[0] == pytest.approx(0.6 * (t[-1] - t[0]), abs=0.02)
+    ahead = x[-1, sim.nq] * np.cos(heading[-1]) + x[-1, sim.nq + 1] * np.sin(heading[-1])
+    assert ahead == pytest.approx(0.15, abs=0.01)
+    feet = Feet(sim).positions(x)
+    still = np.linalg.norm(np.diff(feet, axis=0), axis=-1) < 2e-4  # rows between samples of the gait are interpolated
+    assert 0.4 < still.mean() < 0.6, still.mean(axis=0)
+    gait.anchor(0.0, mpc.start)
+    np.testing.assert_array_equal(gait([0.0])[0], mpc.start)
+
+
+def test_a_robot_is_steered_and_pushed(mpc):
+    push = dojo.Push(0.8, (0.0, 4.0, 0.0), duration=0.05)
+    loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, 2e-3, pushes=[push]), 1.6)
+    assert loop.survived, loop.message
+    assert (1.0 - 2.0 * (loop.x[:, 4] ** 2 + loop.x[:, 5] ** 2)).min() > 0.95
+    heading = 2.0 * np.arctan2(loop.x[:, 6], loop.x[:, 3])
+    assert heading[-1] > 0.4 and loop.x[-1, 0] > 0.2
+
+
+def test_an_unknown_gait_or_command_is_refused():
+    with pytest.raises(ValueError, match="gallop"):
+        dojo.tasks.legged_mpc(dojo.models.quadruped(), "gallop")
+    with pytest.raises(ValueError, match="command"):
+        dojo.tasks.legged_mpc(dojo.models.quadruped(), velocity=(0.1, 0.2))
+
+
+def test_an_arm_pushes_a_box_along_a_table():
+    box = dojo.Body("box", 0.5, shape=dojo.Box(0.1, 0.1, 0.1))
+    arm = dojo.models.panda(gripper=False)
+    start = (0, -0.8, 0, -2.3, 0, 1.6, 0.8)
+    problem = dojo.problems.push(arm, box, (0.0, 0.2), start=start, radius=0.05, duration=1.2)
+    plan = dojo.ilqr(problem)
+    assert plan.success and plan.nit < 60, plan.message
+    at = problem.sim.mechanism.q_slice("box")
+    np.testing.assert_allclose(plan.x[-1, at][:2] - plan.x[0, at][:2], (0.0, 0.2), atol=1e-3)
+    fine = problem.sim.replace(time_step=problem.sim.time_step / 5)
+    shot = fine.closed_loop(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=5, limits=problem.control_limits)
+    assert shot.success
+    np.testing.assert_allclose(shot.x[-1, at][:2] - shot.x[0, at][:2], (0.0, 0.2), atol=0.01)
+    with pytest.raises(ValueError, match="displacement"):
+        dojo.problems.push(arm, box, (0.0, 0.0))
+    with pytest.raises(ValueError, match="out of reach"):
+        dojo.problems.push(arm, box, (2.0, 0.0), start=start)

@@ -1,0 +1,54 @@
+"""Videos and pictures: files that other programs read, on which the robot moves."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+
+pytestmark = [  # a browser process that is closed leaves sockets to the garbage collector
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+
+@pytest.fixture(scope="module")
+def fall():
+    """A cube falls by half a metre in .3 s."""
+    sim = dojo.Simulator(dojo.models.block(), time_step=0.02)
+    x = sim.neutral()
+    x[2] += 1.0
+    return sim.rollout(x, np.zeros((15, sim.nu)))
+
+
+@pytest.mark.slow
+def test_a_robot_moves_in_a_video(fall, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    pytest.importorskip("playwright.sync_api")
+    if not any(map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))):
+        pytest.skip("no Chromium")
+    video = image.open(dojo.viewer.save_video(fall, tmp_path / "fall.gif", size=(160, 120), rate=10.0))
+    assert video.n_frames == 4 and video.size == (160, 120)
+    pictures = []
+    for k in range(video.n_frames):
+        video.seek(k)
+        pictures.append(np.asarray(video.convert("RGB"), dtype=float))
+    moved = np.abs(pictures[-1] - pictures[0]).max(axis=2) > 30.0
+    assert moved.sum() > 50  # the cube covers hundreds of pixels
+    still = image.open(dojo.viewer.save_picture(fall.simulator.mechanism, tmp_path / "cube.png", size=(160, 120)))
+    assert still.size == (160, 120) and np.ptp(np.asarray(still.convert("L")).astype(float)) > 60.0
+    pytest.importorskip("imageio_ffmpeg")
+    film = dojo.viewer.save_video(fall, tmp_path / "fall.mp4", size=(160, 120), rate=10.0)
+    assert b"ftyp" in film.read_bytes()[:12]
+
+
+def test_what_is_no_video_is_refused(fall, tmp_path):
+    with pytest.raises(ValueError, match="avi"):
+        dojo.viewer.save_video(fall, tmp_path / "fall.avi")
+    with pytest.raises(ValueError, match="even numbers"):
+        dojo.viewer.save_video(fall, tmp_path / "fall.mp4", size=(161, 120))
+    with pytest.raises(ValueError, match="no duration"):
+        dojo.viewer.save_video(fall.simulator.mechanism, tmp_path / "fall.gif")
+    with pytest.raises(ValueError, match="width"):
+        dojo.viewer.save_picture(fall, tmp_path / "fall.png", size=(1, 2, 3))

@@ -1,0 +1,67 @@
+"""A robot that collides with itself: which pairs of shapes, and that they keep apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from sim.mechanism.pose import HERE, Pose, turn
+from sim.mechanism.self_collisions import _gap
+from support.scenes import pendulum
+from support.urdf_files import collision, inertial, joint, link, write
+
+
+def test_gaps_of_shapes_are_those_of_geometry() -> None:
+    box, ball, rod = dojo.Box(0.2, 0.2, 0.2), dojo.Sphere(0.1), dojo.Capsule(0.05, 0.4)
+    aside = Pose(turn(np.array([0.0, 0.0, 1.0]), np.pi / 4), np.array([0.3, 0.0, 0.0]))
+    assert _gap(HERE, box, aside, box) == pytest.approx(0.3 - 0.1 - 0.1 * np.sqrt(2.0), abs=2e-5)  # an edge and a face
+    above = Pose(np.eye(3), np.array([0.25, 0.25, 0.25]))
+    assert _gap(HERE, box, above, ball) == pytest.approx(0.15 * np.sqrt(3.0) - 0.1, abs=2e-5)  # a corner and a ball
+    beside = Pose(turn(np.array([1.0, 0.0, 0.0]), np.pi / 2), np.array([0.2, 0.0, 0.1]))
+    assert _gap(HERE, rod, beside, rod) == pytest.approx(0.2 - 0.1, abs=2e-5)  # two rods that cross
+    assert _gap(HERE, box, Pose(np.eye(3), np.array([0.19, 0.19, 0.0])), box) < 0.0
+    assert _gap(HERE, box, Pose(np.eye(3), np.array([0.2, 0.0, 0.0])), box) < 0.0  # side by side
+
+
+def test_a_file_collides_with_itself_where_it_can(tmp_path: Path) -> None:
+    """Links a - b - c - d in a row, e on b and within d; a and its fixed tool are one body."""
+    ball = collision('<sphere radius="0.1"/>')
+    parts = [link(name, inertial(), ball) for name in "abcde"]
+    tool = link("tool", inertial(), collision('<box size="0.1 0.1 0.1"/>'))
+    along = 'xyz="0.3 0 0" rpy="0 0 0"'
+    file = write(
+        tmp_path,
+        *parts,
+        tool,
+        *(joint(f"{p}{q}", p, q, at=along) for p, q in ("ab", "bc", "cd")),
+        joint("be", "b", "e", at='xyz="0.55 0 0" rpy="0 0 0"'),
+        joint("at", "a", "tool", "fixed", "", at='xyz="-0.2 0 0" rpy="0 0 0"'),
+    )
+    assert not dojo.load_urdf(file).collisions
+    mech = dojo.load_urdf(file, collisions="self")
+    found = {collision.name for collision in mech.collisions}
+    assert found == {"a.a-c", "a.tool-c", "a.a-d", "a.tool-d", "a.a-e", "a.tool-e", "b-d", "c-e"}
+    assert mech.report is not None
+    listed = {name for note in mech.report.notes if "overlap" in note.text for name in note.names}
+    assert listed == {"d-e"}
+    again = replace(mech, collisions="self")
+    assert {collision.name for collision in again.collisions} == found
+    with pytest.raises(ValueError, match="all"):
+        dojo.load_urdf(file, collisions="all")
+
+
+def test_a_chain_folds_onto_itself_and_no_further() -> None:
+    chain = pendulum(3, damper=0.1)
+    bodies = [replace(body, shape=dojo.Sphere(0.2)) for body in chain.bodies]
+    mech = replace(chain, bodies=bodies, gravity=(0.0, 0.0, 0.0), collisions="self")
+    assert [collision.name for collision in mech.collisions] == ["rod0-rod2"]
+    sim = dojo.Simulator(mech, time_step=0.01)
+    motion = sim.rollout(sim.neutral(), np.tile([0.0, 2.0, 2.0], (200, 1)))
+    assert motion.success
+    z = sim.maximal(motion.x)
+    apart = np.linalg.norm(z[:, 0, :3] - z[:, 2, :3], axis=1)
+    assert 0.4 - 1e-4 < apart.min() < 0.41
