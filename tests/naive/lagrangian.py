@@ -195,15 +195,14 @@ def stiffness(scene: Scene, h: float) -> Array:
 def lag(scene: Scene, h: float) -> Array:
     """Weight of the velocity before the node in the impulse of a damper, (nv,)."""
     z = stiffness(scene, h)
-    return h * dampers(scene) * (3.0 + z) / (6.0 + 3.0 * z + z * z)
+    return 3.0 * h * dampers(scene) / (6.0 + z + z * z)
 
 
 def damped_mass(scene: Scene, q: Array, h: float) -> Array:
     """M + C: what takes the velocity of the node to the momentum that arrives there."""
     z = stiffness(scene, h)
-    slower = 1.0 + z + z**2 / 2.0 + z**3 / 6.0  # of a body with nothing but the damper, in a step
-    gain = np.where(z > 0.0, (slower - 1.0) / (slower + 1.0) / np.where(z > 0.0, z, 1.0), 0.0)
-    return mass_matrix(scene, q) + np.diag(h * dampers(scene) * gain)
+    share = 3.0 * z / (6.0 + z + z * z)  # lag/I; a body with nothing but the damper has I v2 = (I - lag) v
+    return mass_matrix(scene, q) + np.diag(lag(scene, h) / (1.0 - share))
 
 
 def motion_subspace(scene: Scene, q: Array) -> Array:

@@ -39,6 +39,15 @@ def test_second_order(mech: dojo.Mechanism) -> None:
     assert np.all(np.log2(coarse / fine) > 1.8), (coarse, fine)
 
 
+@pytest.mark.parametrize("damper", [1e-1, 1e1, 1e3, 1e5])
+def test_it_stops_after_its_momentum_over_the_damper(damper: float) -> None:
+    sim = dojo.Simulator(slider(mass=2.0, damper=damper), time_step=0.05, tolerance=1e-13)
+    steps = 100 + round(80.0 / (0.05 * damper))
+    xs = sim.rollout(sim.start(np.zeros(1), np.array([3.0])), steps=steps, throw=True).x
+    np.testing.assert_allclose(xs[-1, 0], 2.0 * 3.0 / damper, rtol=1e-6)
+    assert np.diff(xs[:, 0]).min() >= -1e-12
+
+
 def test_the_weights_keep_what_they_promise() -> None:
     """0 <= lag <= h d/2; the impulse does no work but on a rotor h d/2 - lag; rates against differences."""
     model, rng = dojo.Simulator(slider(), time_step=0.01).model, np.random.default_rng(1)
@@ -53,7 +62,8 @@ def test_the_weights_keep_what_they_promise() -> None:
         size, impulse = lag(d, seen), damper_impulse(model, 0.01, 0, nu, v)
         rotor = 0.5 * 0.01 * d - size
         assert 0.0 <= size <= 0.5 * 0.01 * d * (1.0 + 1e-15)
-        assert 0.0 <= node_damping(model, 0.01, 0) <= seen * (1.0 + 1e-15)
+        momentum = (seen - size) / seen * (seen + node_damping(model, 0.01, 0))
+        np.testing.assert_allclose(momentum, seen, rtol=1e-12)  # of the node: of a body with nothing but the damper
         work = 0.5 * impulse * (v + nu) + 0.5 * rotor * (v * v - nu * nu)
         np.testing.assert_allclose(work, 0.25 * 0.01 * d * (v + nu) ** 2, rtol=1e-9, atol=1e-12 * 0.01 * d)
         by_damper, by_seen = lag_rates(model, 0.01, 0)

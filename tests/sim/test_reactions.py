@@ -81,7 +81,7 @@ def test_springs_dampers_limits_and_armature_are_active() -> None:
     x = np.array([0.1, 0.0, 0.4, 0.3])
     v = sim.step(x).x[2]
     z = 0.01 * 0.2 / sim.model.dof_seen[0]
-    lag = 0.2 * (3.0 + z) / (6.0 + 3.0 * z + z * z)
+    lag = 3.0 * 0.2 / (6.0 + z + z * z)
     taken = -0.2 * v + lag * (v - 0.4) - 0.7 * (v - 0.4) / 0.01
     np.testing.assert_allclose(sim.reactions(x)["shoulder"].active_torque, [0, taken, 0], atol=1e-8)
 

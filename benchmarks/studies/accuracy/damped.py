@@ -61,7 +61,10 @@ def dampers(report: Report, everyone: list[PhysicsEngine], quick: bool) -> None:
 
 
 def _error(scene: SmoothScene, engine: PhysicsEngine, h: float, exact: Run) -> float:
-    """Largest distance of a body from the reference [m]; infinite where the run ended early."""
+    """Largest distance of a body from the reference [m]; infinite where the run ended early or the engine refused."""
     start = {"q": scene.q, "v": scene.v}
-    run = engine.simulate(scene.mechanism, time_step=h, duration=scene.duration, samples=SAMPLES, **start)
+    try:
+        run = engine.simulate(scene.mechanism, time_step=h, duration=scene.duration, samples=SAMPLES, **start)
+    except ValueError:
+        return np.inf
     return float(scene.errors(run, exact)["position"])

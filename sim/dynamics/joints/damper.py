@@ -1,13 +1,13 @@
 """Dampers: weights of the velocities before and after a configuration, by which a damper is of second order.
 
-    impulse = h d nu - lag (nu - v),      lag = h d (3 + z)/(6 + 3 z + z^2),      z = h d/I
+    impulse = h d nu - lag (nu - v),      lag = 3 h d/(6 + z + z^2),      z = h d/I
 
 v, nu: velocities of the intervals 1-2 and 2-3; I: the inertia that the damper sees, a constant of the mechanism
 (mechanism/seen_inertia.py). Where h d is small beside I the lag is h d/2, and the damper acts on the mean of both
 velocities: the trapezoidal rule. Where h d is large it acts on nu, as in the implicit method of Euler. A body of the
 inertia I, with nothing but the damper, slows down by
 
-    nu/v = 1/(1 + z + z^2/2 + z^3/6)
+    nu/v = (6 - 2 z + z^2)/(6 + 4 z + 2 z^2 + z^3)
 
 in a step: exp(-z) to third order, positive for every z, and zero in the limit.
 
@@ -15,9 +15,11 @@ The lag is at most h d/2. With a = h d/2 - lag >= 0 the impulse is h d (v + nu)/
 h d |v + nu|^2/4, and a rotor of inertia a, which keeps what it takes. So kinetic energy and a v^2/2 together only fall,
 whatever h, d and I are.
 
-The velocity at the node, with half the damper's impulse behind it, is such that the body I has the mean of both there:
+What a damper takes from a body in all is d times its way, if the momentum of the body at a node is I v - lag v, with
+half the impulse behind it. The velocity of the node is that of this momentum, I v2 = (I - lag) v, written such that the
+mass matrix M may be any, also one beside which the lag is large:
 
-    (M + C) v2 = p,    C = h d (6 + 3 z + z^2)/(12 + 6 z + 3 z^2 + z^3)        p: momentum that arrives (energy.py)
+    (M + C) v2 = p,    C = 3 h d/(6 - 2 z + z^2)        p: momentum that arrives (energy.py)
 """
 
 from __future__ import annotations
@@ -35,7 +37,7 @@ def damper_lag(model: Model, h: float, d: int) -> float:
     if y == 0.0:
         return 0.0
     z = y / model.dof_seen[d]
-    return y * (3.0 + z) / (6.0 + z * (3.0 + z))
+    return 3.0 * y / (6.0 + z * (1.0 + z))
 
 
 @kernel
@@ -51,8 +53,7 @@ def node_damping(model: Model, h: float, d: int) -> float:
     if y == 0.0:
         return 0.0
     z = y / model.dof_seen[d]
-    below = 6.0 + z * (3.0 + z)
-    return y * below / (12.0 + z * below)
+    return 3.0 * y / (6.0 + z * (z - 2.0))
 
 
 @kernel
@@ -67,10 +68,9 @@ def node_dampings(model_at: Table, h: float, out: Vector) -> None:
 def lag_rates(model: Model, h: float, d: int) -> tuple[float, float]:
     """Derivatives of the lag: by h d, and by I times -1.
 
-    With the lag h d g(z), g = (3 + z)/(6 + 3 z + z^2) and g' = -(3 + 6 z + z^2)/(6 + 3 z + z^2)^2, these are g + z g'
-    and z^2 g'.
+    With the lag h d g(z), g = 3/(6 + z + z^2) and g' = -3 (1 + 2 z)/(6 + z + z^2)^2, these are g + z g' and z^2 g'.
     """
     z = h * model.dof_damper[d] / model.dof_seen[d]
-    below = 6.0 + 3.0 * z + z * z
-    slope = -(3.0 + 6.0 * z + z * z) / below / below
-    return (3.0 + z) / below + z * slope, z * z * slope
+    below = 6.0 + z * (1.0 + z)
+    slope = -3.0 * (1.0 + 2.0 * z) / below / below
+    return 3.0 / below + z * slope, z * z * slope
