@@ -18,14 +18,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.learn.epochs import learn
-from dojo_opt.learn.evaluation import evaluate
+from dojo_opt.learn.evaluation import Evaluation
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import ACTIVATIONS, Adam, Network, clipped
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
+from dojo_opt.learn.run import Run
 from dojo_opt.learn.task import Task
 from dojo_opt.planning.plan import Plan
 from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
 
 Floats = NDArray[np.float64]
 
@@ -68,6 +70,8 @@ class ImitationOptions:
     verbose: bool = False
     stream: Any = None
 
+    __repr__ = brief_repr
+
     def __post_init__(self) -> None:
         for name in ("epochs", "batches", "episodes"):
             checks.whole_number(f"imitate({name}=...)", getattr(self, name))
@@ -103,15 +107,15 @@ class _Knots:
         self.x, self.actions, self.gains = (np.concatenate(column) for column in zip(*parts, strict=True))
 
 
-class _Imitation:
+class _Imitation(Run):
     """Policy and random numbers of a run."""
 
     algorithm = "imitate"
     plans: Sequence[Any] = ()
 
     def __init__(self, task: Task, options: ImitationOptions, seed: int) -> None:
-        self.task, self.options, self.seed = task, options, seed
-        self.rng, self.knots = np.random.default_rng((seed, 1)), _Knots(task, self.plans)
+        super().__init__(task, options, seed)
+        self.knots = _Knots(task, self.plans)
         network = Network((task.observations, *options.hidden, task.sim.nu), options.activation)
         statistics = ObservationStatistics.empty(task.observations)
         statistics.add(task.observe(self.knots.x)[0])
@@ -119,7 +123,6 @@ class _Imitation:
         self.policy = LearnedPolicy(network, network.start(np.random.default_rng((seed, 0)), 0.1), *scale, task)
         self.adam = Adam(network.count, (0.9, 0.99))
         self.spread = np.broadcast_to(checks.floats("imitate(spread=...)", options.spread), (task.sim.ndx,))
-        self.epoch, self.steps, self.unsolved, self.infinite, self.best = 0, 0, 0, 0, -np.inf
         self.chosen = self.policy
 
     def targets(self) -> tuple[Floats, Floats]:
@@ -151,38 +154,15 @@ class _Imitation:
             else:
                 self.infinite += 1
         self.epoch += 1
-        return {
-            "epoch": self.epoch, "steps": self.steps, "return": -total / actions.size, "evaluated": None,
-            "gradient": longest, "clipped": 0.0, "unsolved": self.unsolved, "infinite": self.infinite,
-        }  # fmt: skip
+        return self.record(-total / actions.size, longest, 0.0)
 
-    def assess(self) -> float:
-        """Mean return of the present policy, which is kept if it is the best."""
-        p = self.policy
-        policy = LearnedPolicy(p.network, p.weights.copy(), p.mean.copy(), p.deviation.copy(), self.task)
-        found = evaluate(policy, self.options.episodes, self.seed)
-        value = float(found.returns.mean())
+    def count(self, found: Evaluation) -> None:
+        """All steps are those of evaluations."""
         self.steps, self.unsolved = self.steps + int(found.lengths.sum()), self.unsolved + found.unsolved
-        if value > self.best:
-            self.best, self.chosen = value, policy
-        return value
 
-    _NUMBERS = ("epoch", "steps", "unsolved", "infinite", "best")
-
-    def state(self) -> dict[str, Any]:
-        """All that `resume` needs."""
-        out: dict[str, Any] = {name: getattr(self, name) for name in self._NUMBERS}
-        out |= {"weights": self.policy.weights.copy(), "moments": self.adam.moments.copy()}
-        return out | {"rng": self.rng.bit_generator.state}
-
-    def resume(self, learned: Learned) -> None:
-        """Go on where a run ended."""
-        for name in self._NUMBERS:
-            setattr(self, name, learned.state[name])
-        self.policy.weights[:], self.adam.moments[:] = learned.state["weights"], learned.state["moments"]
-        self.rng.bit_generator.state = learned.state["rng"]
-        p = learned.policy
-        self.chosen = LearnedPolicy(p.network, p.weights, p.mean, p.deviation, self.task)
+    def arrays(self) -> dict[str, Floats]:
+        """As Run.arrays, with the moments of Adam."""
+        return super().arrays() | {"moments": self.adam.moments}
 
 
 def imitate(

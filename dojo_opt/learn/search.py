@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.learn.epochs import learn
-from dojo_opt.learn.evaluation import evaluate
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.observation_statistics import ObservationStatistics
@@ -27,6 +26,7 @@ from dojo_opt.learn.pair_returns import PairInputs, PairReturns, pair_returns
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import roll_policy_batch
 from dojo_opt.learn.randomisation import Drawn, Models, Randomisation
+from dojo_opt.learn.run import Run
 from dojo_opt.learn.shared import Shared
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
@@ -129,15 +129,11 @@ class GradientSearchOptions:
         checks.number("gradient_search(costate=...)", self.costate, above=0.0)
 
 
-class WeightSearch:
-    """A policy that moves, its random numbers, and its record."""
-
-    algorithm = ""
-    executor: Executor | None = None
+class WeightSearch(Run):
+    """A policy that moves as a whole."""
 
     def __init__(self, task: Task, options: Any, seed: int) -> None:
-        self.task, self.options, self.seed = task, options, seed
-        self.rng = np.random.default_rng((seed, 1))
+        super().__init__(task, options, seed)
         self.models = Models(task, options.randomisation, np.random.default_rng((seed, 3)))
         network = Network((task.observations, *options.hidden, task.sim.nu), options.activation)
         n = task.observations
@@ -145,7 +141,6 @@ class WeightSearch:
         self.policy = LearnedPolicy(network, weights, np.zeros(n), np.ones(n), task)
         self.statistics = ObservationStatistics(n)
         self.horizon = task.steps if options.horizon is None else options.horizon
-        self.epoch, self.steps, self.unsolved, self.infinite, self.best = 0, 0, 0, 0, -np.inf
         self.chosen = self.policy
 
     def train(self) -> dict[str, Any]:
@@ -153,40 +148,15 @@ class WeightSearch:
         self.policy.mean[:], self.policy.deviation[:] = self.statistics.sums[0], self.statistics.deviation()
         found, length, share = self.update()
         self.epoch += 1
-        return {
-            "epoch": self.epoch, "steps": self.steps, "return": found, "evaluated": None, "gradient": length,
-            "clipped": share, "unsolved": self.unsolved, "infinite": self.infinite,
-        }  # fmt: skip
+        return self.record(found, length, share)
 
     def update(self) -> tuple[float, float, float]:
         """Move the policy: (mean return, length of the gradient, share of clipped costates)."""
         raise NotImplementedError
 
-    def assess(self) -> float:
-        """Mean return of the present policy, which is kept if it is the best."""
-        p = self.policy
-        policy = LearnedPolicy(p.network, p.weights.copy(), p.mean.copy(), p.deviation.copy(), self.task)
-        found = float(evaluate(policy, self.options.episodes, self.seed).returns.mean())
-        if found > self.best:
-            self.best, self.chosen = found, policy
-        return found
-
-    _NUMBERS = ("epoch", "steps", "unsolved", "infinite", "best")
-
-    def state(self) -> dict[str, Any]:
-        """All that `resume` needs."""
-        out: dict[str, Any] = {name: getattr(self, name) for name in self._NUMBERS}
-        out |= {"weights": self.policy.weights.copy(), "sums": self.statistics.sums.copy()}
-        return out | {"rng": self.rng.bit_generator.state}
-
-    def resume(self, learned: Learned) -> None:
-        """Go on where a run ended."""
-        for name in self._NUMBERS:
-            setattr(self, name, learned.state[name])
-        self.policy.weights[:], self.statistics.sums[:] = learned.state["weights"], learned.state["sums"]
-        self.rng.bit_generator.state = learned.state["rng"]
-        p = learned.policy
-        self.chosen = LearnedPolicy(p.network, p.weights, p.mean, p.deviation, self.task)
+    def arrays(self) -> dict[str, Floats]:
+        """As Run.arrays, with the statistics of observations."""
+        return super().arrays() | {"sums": self.statistics.sums}
 
 
 class RandomSearch(WeightSearch):

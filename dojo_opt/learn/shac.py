@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.learn.epochs import learn
-from dojo_opt.learn.evaluation import evaluate
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import ACTIVATIONS, Adam, Network, clipped
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import Noise, PolicyRollout, roll_policy_batch, value_network
 from dojo_opt.learn.randomisation import Models, Randomisation
+from dojo_opt.learn.run import Run
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
 
@@ -111,15 +111,15 @@ class ShacOptions:
             raise TypeError(f"shac(randomisation=...): expected a Randomisation, got {self.randomisation!r}")
 
 
-class _Shac:
+class _Shac(Run):
     """Policy, critic, environments and random numbers of a run."""
 
     algorithm = "shac"
 
     def __init__(self, task: Task, options: ShacOptions, seed: int) -> None:
-        self.task, self.options, self.seed = task, options, seed
+        super().__init__(task, options, seed)
         o, rng = options, np.random.default_rng((seed, 0))
-        self.rng, self.restarts = np.random.default_rng((seed, 1)), np.random.default_rng((seed, 2))
+        self.restarts = np.random.default_rng((seed, 2))
         self.models = Models(task, o.randomisation, np.random.default_rng((seed, 3)))
         network = Network((task.observations, *o.hidden, task.sim.nu), o.activation)
         self.critic = value_network(task, o.hidden, o.activation)
@@ -140,7 +140,6 @@ class _Shac:
         self.age = self.restarts.integers(self.limit, size=o.environments)
         self.running, self.known = np.zeros(o.environments), np.zeros(o.environments, dtype=np.bool_)
         self.finished: list[float] = []
-        self.epoch, self.steps, self.unsolved, self.infinite, self.best = 0, 0, 0, 0, -np.inf
         self.chosen = self.policy
         self.statistics.add(task.observe(self.x)[0])
 
@@ -196,10 +195,7 @@ class _Shac:
         self.epoch += 1
         self.steps += o.horizon * n
         recent = float(np.mean(self.finished)) if self.finished else None
-        return {
-            "epoch": self.epoch, "steps": self.steps, "return": recent, "evaluated": None, "gradient": length,
-            "clipped": share_clipped, "unsolved": self.unsolved, "infinite": self.infinite,
-        }  # fmt: skip
+        return self.record(recent, length, share_clipped)
 
     def _count(self, roll: PolicyRollout) -> None:
         """Returns of finished episodes, the last n of them, and unsolved steps."""
@@ -263,38 +259,22 @@ class _Shac:
         p = self.policy
         return LearnedPolicy(p.network, p.weights.copy(), *self._scale(self.statistics), self.task)
 
-    def assess(self) -> float:
-        """Mean return of the present policy, which is kept if it is the best."""
-        policy = self.snapshot()
-        found = float(evaluate(policy, self.options.episodes, self.seed).returns.mean())
-        if found > self.best:
-            self.best, self.chosen = found, policy
-        return found
+    _NUMBERS = (*Run._NUMBERS, "seed")
 
-    _ARRAYS = ("x", "age", "running", "known", "value", "target")
-    _NUMBERS = ("epoch", "steps", "unsolved", "infinite", "best", "finished", "seed")
+    def arrays(self) -> dict[str, Floats]:
+        """As Run.arrays, with rows, values, statistics and the moments of Adam."""
+        rows = {name: getattr(self, name) for name in ("x", "age", "running", "known", "value", "target")}
+        moments = {"actor": self.actor_adam.moments, "critic": self.critic_adam.moments}
+        return super().arrays() | rows | {"sums": self.statistics.sums} | moments
 
     def state(self) -> dict[str, Any]:
-        """All that `resume` needs."""
-        out: dict[str, Any] = {name: getattr(self, name).copy() for name in self._ARRAYS}
-        out |= {name: getattr(self, name) for name in self._NUMBERS} | {"finished": list(self.finished)}
-        out |= {"weights": self.policy.weights.copy(), "sums": self.statistics.sums.copy()}
-        out |= {"actor": self.actor_adam.moments.copy(), "critic": self.critic_adam.moments.copy()}
-        return out | {"rng": self.rng.bit_generator.state, "restarts": self.restarts.bit_generator.state}
+        """As Run.state, with the returns of finished episodes."""
+        return super().state() | {"finished": list(self.finished), "restarts": self.restarts.bit_generator.state}
 
     def resume(self, learned: Learned) -> None:
-        """Go on where a run ended."""
-        given = learned.state
-        for name in self._ARRAYS:
-            setattr(self, name, given[name].copy())
-        for name in self._NUMBERS:
-            setattr(self, name, given[name])
-        self.finished = list(given["finished"])
-        self.policy.weights[:], self.statistics.sums[:] = given["weights"], given["sums"]
-        self.actor_adam.moments[:], self.critic_adam.moments[:] = given["actor"], given["critic"]
-        self.rng.bit_generator.state, self.restarts.bit_generator.state = given["rng"], given["restarts"]
-        p = learned.policy
-        self.chosen = LearnedPolicy(p.network, p.weights, p.mean, p.deviation, self.task)
+        """As Run.resume."""
+        super().resume(learned)
+        self.finished, self.restarts.bit_generator.state = list(learned.state["finished"]), learned.state["restarts"]
 
 
 def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:

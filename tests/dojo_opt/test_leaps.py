@@ -21,7 +21,8 @@ def test_leap_is_found_from_standing_and_a_goal(distance, height):
     problem = problems.leap(distance=distance, height=height)
     assert np.ptp(problem.states0[1:], axis=0).max() == 0.0 and np.ptp(problem.controls0, axis=0).max() == 0.0
     plan = ilqr(problem)
-    assert plan.success and plan.nit <= 130, plan.summary()
+    # the longest takes 311 since dampers are of second order, and damp the motion within a step less
+    assert plan.success and plan.nit <= (320 if distance == 0.5 else 80), plan.summary()
     assert plan.nit == len(plan.history) and plan.substeps == 5 and plan.time[-1] == pytest.approx(1.0)
     assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(height, abs=0.01)
     assert lowest_foot(problem, plan).max() > 0.1
@@ -35,7 +36,7 @@ def test_a_leap_leads_to_a_longer_one():
     shorter, longer = (problems.leap(distance=distance, height=0.25) for distance in (0.4, 0.5))
     shorter.refinement = 1
     plan = ilqr(longer, warm_start=ilqr(shorter))
-    assert plan.success and plan.nit <= 90, plan.summary()
+    assert plan.success and plan.nit <= 200, plan.summary()  # 179, where it takes 311 without that guess
     assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(0.5, abs=2e-3)
     assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(0.25, abs=0.01)
     lands(longer, plan)

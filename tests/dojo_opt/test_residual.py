@@ -292,6 +292,6 @@ print((rss() - first) / COUNT)
 def test_memory_of_new_residuals_is_bounded():
     """Numba frees no code: a residual with a value of its own keeps some; one that was there before, nothing."""
     again = float(python(MEMORY.replace("COUNT", "10").replace("VALUE", "1.0")))
-    anew = float(python(MEMORY.replace("COUNT", "5").replace("VALUE", "10.0 + i")))
+    anew = float(python(MEMORY.replace("COUNT", "10").replace("VALUE", "10.0 + i")))
     assert again < 0.1
     assert anew < 3.0

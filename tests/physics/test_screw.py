@@ -98,8 +98,9 @@ def test_a_screw_is_a_hinge_on_a_slide_in_gear(rng) -> None:
     x = np.r_[ours.neutral()[:7], 0.3, rng.normal(size=6), -2.0]
     y = np.r_[x[:7], LEAD * x[7], x[7], x[8:14], LEAD * x[14], x[14]]
     a, b = ours.rollout(x, us, throw=True).x, theirs.rollout(y, us, throw=True).x
-    np.testing.assert_allclose(a[:, :7], b[:, :7], atol=1e-8)
-    np.testing.assert_allclose(a[:, 7], b[:, 8], atol=1e-8)
+    # the inertia by which a damper is judged stiff is that of the tree, which the gear is not part of
+    np.testing.assert_allclose(a[:, :7], b[:, :7], atol=1e-6)
+    np.testing.assert_allclose(a[:, 7], b[:, 8], atol=1e-6)
     assert a[:, 7].min() < -0.39, "it meets the stop"
 
 

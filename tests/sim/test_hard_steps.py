@@ -58,7 +58,7 @@ def test_extreme_state(robustness, cell):
 
 
 @pytest.mark.parametrize("kappa", [1e-4, 1e-8])
-@pytest.mark.parametrize("number", [67, 140])
+@pytest.mark.parametrize("number", [67, 155])
 def test_extreme_state_whose_solutions_gain_energy(robustness, number, kappa):
     """They were accepted with 2 to 5 times the energy before the step; the motion loses some, in finer steps."""
     sim = dojo.Simulator(robustness.MECHANISMS["quadruped"](0.0), time_step=0.05, kappa=kappa)
@@ -129,11 +129,11 @@ def test_friction_that_follows_the_impulses_from_a_large_kappa(name, start, knot
 
 
 @pytest.mark.parametrize("kappa", [None, 1e-6, 1e-10])
-@pytest.mark.parametrize("start, ends", [(1, dojo.Status.ENERGY_STEP), (2, dojo.Status.SOLVED)])
+@pytest.mark.parametrize("start, ends", [(2, dojo.Status.ENERGY_STEP), (3, dojo.Status.SOLVED)])
 def test_joints_give_no_energy(start, ends, kappa):
     """Atlas falls on its feet with 2 kJ. In one step, joints and friction wound one another up to 70 kJ and more.
 
-    The second start has a solution beside that. The first has none with 10 ms, and with half of it has.
+    The third start has a solution beside that. The second has none with 10 ms, and with half of it has.
     """
     sim = dojo.Simulator(dojo.models.atlas(), time_step=0.01, kappa=kappa)
     fall = sim.replace(divide=False).rollout(thrown(sim, start), np.zeros((100, sim.nu)))

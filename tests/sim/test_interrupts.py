@@ -111,7 +111,7 @@ STATES = {
     "integrate": (lambda n: QUADRUPED.integrate(rows(QUADRUPED, n), np.zeros((n, QUADRUPED.ndx))), 1_000_000),
     "difference": (lambda n: QUADRUPED.difference(rows(QUADRUPED, n), rows(QUADRUPED, n)), 1_000_000),
     "maximal": (lambda n: HOPPER.maximal(rows(HOPPER, n)), 1_500_000),
-    "minimal": (lambda n: HOPPER.minimal(standing_bodies(1_000_000)[:n]), 1_000_000),
+    "minimal": (lambda n: HOPPER.minimal(standing_bodies(600_000)[:n]), 600_000),
     "energy": (lambda n: HOPPER.energy(rows(HOPPER, n)), 1_500_000),
     "momentum": (lambda n: HOPPER.momentum(rows(HOPPER, n)), 1_500_000),
     "reactions": (lambda n: HOPPER.reactions(*(part[:n] for part in standing(HOPPER, n))), 50_000),

@@ -129,7 +129,7 @@ def _begin(data_at: Table) -> None:
 
 
 def test_a_motion_begins_without_the_state_of_the_one_before() -> None:
-    work = allocate_data(ALL._replace(nrow=3))
+    work = allocate_data(ALL._replace(nrow=3, ndry=2))
     for array in work:
         array[...] = 7
     _begin(table(work))

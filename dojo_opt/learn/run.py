@@ -1,0 +1,87 @@
+"""Run: an algorithm of learning between two epochs, with its counts and the best policy so far."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.learn.evaluation import Evaluation, evaluate
+from dojo_opt.learn.learned import Learned
+from dojo_opt.learn.policy import LearnedPolicy
+from dojo_opt.learn.task import Task
+
+Floats = NDArray[np.float64]
+
+
+class Run:
+    """What all algorithms keep; a subclass sets `policy` and `chosen`, and has `train`, which makes one epoch.
+
+    Args:
+        task: what to learn.
+        options: settings of the algorithm.
+        seed: of all random numbers.
+    """
+
+    algorithm = ""
+    executor: Executor | None = None
+    policy: LearnedPolicy  # moves in place
+    chosen: LearnedPolicy  # the best so far
+
+    _NUMBERS: tuple[str, ...] = ("epoch", "steps", "unsolved", "infinite", "best")
+
+    def __init__(self, task: Task, options: Any, seed: int) -> None:
+        self.task, self.options, self.seed = task, options, seed
+        self.rng = np.random.default_rng((seed, 1))
+        self.epoch, self.steps, self.unsolved, self.infinite, self.best = 0, 0, 0, 0, -np.inf
+
+    def train(self) -> dict[str, Any]:
+        """One epoch: its record, without an evaluation."""
+        raise NotImplementedError
+
+    def record(self, value: float | None, gradient: float, share: float) -> dict[str, Any]:
+        """The record of an epoch: its return, the length of its gradient, and the share of it that was clipped."""
+        return {
+            "epoch": self.epoch, "steps": self.steps, "return": value, "evaluated": None, "gradient": gradient,
+            "clipped": share, "unsolved": self.unsolved, "infinite": self.infinite,
+        }  # fmt: skip
+
+    def snapshot(self) -> LearnedPolicy:
+        """A copy of the policy as it is now."""
+        p = self.policy
+        return LearnedPolicy(p.network, p.weights.copy(), p.mean.copy(), p.deviation.copy(), self.task)
+
+    def assess(self) -> float:
+        """Mean return of the present policy, which is kept if it is the best."""
+        policy = self.snapshot()
+        found = evaluate(policy, self.options.episodes, self.seed)
+        self.count(found)
+        value = float(found.returns.mean())
+        if value > self.best:
+            self.best, self.chosen = value, policy
+        return value
+
+    def count(self, found: Evaluation) -> None:
+        """Count an evaluation; by default, the steps of training alone count."""
+
+    def arrays(self) -> dict[str, Floats]:
+        """By name, the arrays that training writes in place."""
+        return {"weights": self.policy.weights}
+
+    def state(self) -> dict[str, Any]:
+        """All that `resume` needs."""
+        numbers = {name: getattr(self, name) for name in self._NUMBERS}
+        arrays = {name: array.copy() for name, array in self.arrays().items()}
+        return {**numbers, **arrays, "rng": self.rng.bit_generator.state}
+
+    def resume(self, learned: Learned) -> None:
+        """Go on where a run ended."""
+        for name in self._NUMBERS:
+            setattr(self, name, learned.state[name])
+        for name, array in self.arrays().items():
+            array[...] = learned.state[name]
+        self.rng.bit_generator.state = learned.state["rng"]
+        p = learned.policy
+        self.chosen = LearnedPolicy(p.network, p.weights, p.mean, p.deviation, self.task)
