@@ -8,7 +8,7 @@ from _common import finish
 
 import dojo_opt as dojo
 
-FORWARD, UP = 0.15, 0.15  # [m]
+FORWARD, UP = 0.15, 0.18  # [m]
 sim = dojo.Simulator(dojo.models.minitaur_leg(), time_step=0.02)
 start = sim.neutral()
 apex, goal = start.copy(), start.copy()
