@@ -23,8 +23,8 @@ from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import ACTIVATIONS, Adam, Network, clipped
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
-from dojo_opt.learn.run import Run
 from dojo_opt.learn.task import Task
+from dojo_opt.learn.training import Training
 from dojo_opt.planning.plan import Plan
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
@@ -107,7 +107,7 @@ class _Knots:
         self.x, self.actions, self.gains = (np.concatenate(column) for column in zip(*parts, strict=True))
 
 
-class _Imitation(Run):
+class _Imitation(Training):
     """Policy and random numbers of a run."""
 
     algorithm = "imitate"
@@ -161,7 +161,7 @@ class _Imitation(Run):
         self.steps, self.unsolved = self.steps + int(found.lengths.sum()), self.unsolved + found.unsolved
 
     def arrays(self) -> dict[str, Floats]:
-        """As Run.arrays, with the moments of Adam."""
+        """As Training.arrays, with the moments of Adam."""
         return super().arrays() | {"moments": self.adam.moments}
 
 

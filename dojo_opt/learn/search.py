@@ -26,9 +26,9 @@ from dojo_opt.learn.pair_returns import PairInputs, PairReturns, pair_returns
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import roll_policy_batch
 from dojo_opt.learn.randomisation import Drawn, Models, Randomisation
-from dojo_opt.learn.run import Run
 from dojo_opt.learn.shared import Shared
 from dojo_opt.learn.task import Task
+from dojo_opt.learn.training import Training
 from sim.mechanism import checks
 
 Floats = NDArray[np.float64]
@@ -129,7 +129,7 @@ class GradientSearchOptions:
         checks.number("gradient_search(costate=...)", self.costate, above=0.0)
 
 
-class WeightSearch(Run):
+class WeightSearch(Training):
     """A policy that moves as a whole."""
 
     def __init__(self, task: Task, options: Any, seed: int) -> None:
@@ -155,7 +155,7 @@ class WeightSearch(Run):
         raise NotImplementedError
 
     def arrays(self) -> dict[str, Floats]:
-        """As Run.arrays, with the statistics of observations."""
+        """As Training.arrays, with the statistics of observations."""
         return super().arrays() | {"sums": self.statistics.sums}
 
 

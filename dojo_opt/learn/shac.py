@@ -21,8 +21,8 @@ from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import Noise, PolicyRollout, roll_policy_batch, value_network
 from dojo_opt.learn.randomisation import Models, Randomisation
-from dojo_opt.learn.run import Run
 from dojo_opt.learn.task import Task
+from dojo_opt.learn.training import Training
 from sim.mechanism import checks
 
 Floats = NDArray[np.float64]
@@ -111,7 +111,7 @@ class ShacOptions:
             raise TypeError(f"shac(randomisation=...): expected a Randomisation, got {self.randomisation!r}")
 
 
-class _Shac(Run):
+class _Shac(Training):
     """Policy, critic, environments and random numbers of a run."""
 
     algorithm = "shac"
@@ -259,20 +259,20 @@ class _Shac(Run):
         p = self.policy
         return LearnedPolicy(p.network, p.weights.copy(), *self._scale(self.statistics), self.task)
 
-    _NUMBERS = (*Run._NUMBERS, "seed")
+    _NUMBERS = (*Training._NUMBERS, "seed")
 
     def arrays(self) -> dict[str, Floats]:
-        """As Run.arrays, with rows, values, statistics and the moments of Adam."""
+        """As Training.arrays, with rows, values, statistics and the moments of Adam."""
         rows = {name: getattr(self, name) for name in ("x", "age", "running", "known", "value", "target")}
         moments = {"actor": self.actor_adam.moments, "critic": self.critic_adam.moments}
         return super().arrays() | rows | {"sums": self.statistics.sums} | moments
 
     def state(self) -> dict[str, Any]:
-        """As Run.state, with the returns of finished episodes."""
+        """As Training.state, with the returns of finished episodes."""
         return super().state() | {"finished": list(self.finished), "restarts": self.restarts.bit_generator.state}
 
     def resume(self, learned: Learned) -> None:
-        """As Run.resume."""
+        """As Training.resume."""
         super().resume(learned)
         self.finished, self.restarts.bit_generator.state = list(learned.state["finished"]), learned.state["restarts"]
 

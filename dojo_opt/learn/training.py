@@ -1,4 +1,4 @@
-"""Run: an algorithm of learning between two epochs, with its counts and the best policy so far."""
+"""Training: an algorithm of learning between two epochs, with its counts and the best policy so far."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dojo_opt.learn.task import Task
 Floats = NDArray[np.float64]
 
 
-class Run:
+class Training:
     """What all algorithms keep; a subclass sets `policy` and `chosen`, and has `train`, which makes one epoch.
 
     Args:
