@@ -163,8 +163,7 @@ def _stance(sim: Simulator) -> Array:
         hip, knee = (_origin(sim, bodies[name], x) for name in hinges[:2])
         foot = at[k] if len(hinges) == 2 else _origin(sim, bodies[hinges[2]], x)
         length = np.linalg.norm((knee - hip)[[0, 2]]) + np.linalg.norm((foot - knee)[[0, 2]])
-        body, point, turn = kin.place(contact.body)
-        del body
+        _, point, turn = kin.place(contact.body)
         kin.add(f"foot {k}", contact.body, turn.T @ (np.asarray(contact.point) - point))
         sole = float(foot[2] - at[k, 2])
         middle = hip[0] + (at[k, 0] - foot[0] if len(hinges) > 2 else 0.0)

@@ -10,6 +10,7 @@ import numpy as np
 
 from dojo_opt.learn.learned import Learned, LearningProgress
 from dojo_opt.learn.task import Task
+from dojo_opt.plant.monte_carlo import check_executor
 from sim.mechanism import checks
 from solvers.status import Status
 
@@ -30,8 +31,7 @@ def learn(
     if not isinstance(task, Task):
         raise TypeError(f"{name}(task): expected a Task, got {task!r}")
     checks.keywords(f"{name}(...)", given, [f.name for f in fields(settings)])
-    if executor is not None and not hasattr(executor, "submit"):
-        raise TypeError(f"{name}(executor=...): expected an Executor, with submit(), got {executor!r}")
+    check_executor(name, executor)
     run = search(task, settings(**given), checks.whole_number(f"{name}(seed=...)", seed, 0))
     run.executor = executor
     return _run_epochs(run, resume)

@@ -9,6 +9,7 @@ from typing import Any
 
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.task import Task
+from dojo_opt.plant.monte_carlo import check_executor
 from sim.mechanism import checks
 from solvers.status import Status
 
@@ -44,8 +45,7 @@ def seeds(
     """
     if not callable(algorithm):
         raise TypeError(f"seeds(algorithm): expected a function such as dojo.learn.shac, got {algorithm!r}")
-    if executor is not None and not hasattr(executor, "submit"):
-        raise TypeError(f"seeds(executor=...): expected an Executor, with submit(), got {executor!r}")
+    check_executor("seeds", executor)
     chosen = [checks.whole_number("seeds(numbers)", number, 0) for number in numbers]
     futures = [] if executor is None else [executor.submit(_run, algorithm, task, k, options) for k in chosen]
     out: list[Learned] = []

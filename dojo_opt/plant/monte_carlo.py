@@ -111,6 +111,12 @@ class MonteCarlo:
         return text
 
 
+def check_executor(call: str, executor: Any) -> None:
+    """Refuse what has no submit(); None is no executor."""
+    if executor is not None and not hasattr(executor, "submit"):
+        raise TypeError(f"{call}(executor=...): expected an Executor, with submit(), got {executor!r}")
+
+
 def monte_carlo(
     controller: Any,
     plant: Plant,
@@ -157,8 +163,7 @@ def monte_carlo(
     for name, function in (("controller", controller), ("sampler", sampler)):
         if not callable(function):
             raise TypeError(f"monte_carlo({name}): expected a function, got {function!r}")
-    if executor is not None and not hasattr(executor, "submit"):
-        raise TypeError(f"monte_carlo(executor=...): expected an Executor, with submit(), got {executor!r}")
+    check_executor("monte_carlo", executor)
     whole_number("monte_carlo(seed=...)", seed, 0)
     checks.number("monte_carlo(duration)", duration, above=0.0)
     children = np.random.SeedSequence(seed).spawn(count)
