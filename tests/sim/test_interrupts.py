@@ -11,7 +11,7 @@ import pytest
 
 import dojo_opt as dojo
 from sim.model import pace
-from support.interrupts import heard
+from support.interrupts import heard_in
 
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), 0.02)
 QUADRUPED = dojo.Simulator(dojo.models.quadruped(), 0.02)
@@ -102,7 +102,7 @@ DERIVATIVES = {
     "higher order": (lambda n: CHAIN.linearize_trajectory(*standing(CHAIN, n)), 60_000),
     "higher order, many substeps": (lambda n: CHAIN.linearize_trajectory(*standing(CHAIN, 1), substeps=n), 60_000),
     "higher order, rollout": (lambda n: CHAIN.linearize_rollout(CHAIN.neutral() + 0.1, inputs(CHAIN, n)), 60_000),
-    "higher order, gradient": (lambda n: gradient(CHAIN, n, ("state", "input")), 60_000),
+    "higher order, gradient": (lambda n: gradient(CHAIN, n, ("state", "input")), 100_000),
     "higher order, near": (lambda n: FALLING.linearize_trajectory(*standing(FALLING, n)), 20_000),
 }
 STATES = {
@@ -111,7 +111,7 @@ STATES = {
     "integrate": (lambda n: QUADRUPED.integrate(rows(QUADRUPED, n), np.zeros((n, QUADRUPED.ndx))), 1_000_000),
     "difference": (lambda n: QUADRUPED.difference(rows(QUADRUPED, n), rows(QUADRUPED, n)), 1_000_000),
     "maximal": (lambda n: HOPPER.maximal(rows(HOPPER, n)), 1_500_000),
-    "minimal": (lambda n: HOPPER.minimal(standing_bodies(500_000)[:n]), 1_000_000),
+    "minimal": (lambda n: HOPPER.minimal(standing_bodies(max(n, 500_000))[:n]), 1_000_000),
     "energy": (lambda n: HOPPER.energy(rows(HOPPER, n)), 1_500_000),
     "momentum": (lambda n: HOPPER.momentum(rows(HOPPER, n)), 1_500_000),
     "reactions": (lambda n: HOPPER.reactions(*(part[:n] for part in standing(HOPPER, n))), 50_000),
@@ -121,7 +121,7 @@ STATES = {
 def stopped(call: Callable[[int], Any], enough: int, after: float = 0.3, *, in_loop: bool = False) -> Any:
     """What Ctrl-C leaves of a call that is long enough; what it needs is compiled before."""
     call(2_000)
-    return heard(lambda: call(enough), after, in_loop=in_loop)
+    return heard_in(call, enough, after, in_loop=in_loop)
 
 
 @pytest.mark.slow

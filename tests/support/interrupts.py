@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from sim.model import pace
 
+LONGER = 4  # as many steps are tried where a call ends before its signal comes: machines differ
 HEARD = 0.2  # [s] of processor time of each thread within which a call has to answer
 _THREADS = os.cpu_count() or 1  # whose processor times are added
 
@@ -69,9 +70,20 @@ def interrupt(call: Callable[[], Any], after: float, *, in_loop: bool = False) -
     return Heard(stop, end - sent[0] if stop else 0.0)
 
 
-def heard(call: Callable[[], Any], after: float = 0.3, *, in_loop: bool = False) -> Any:
+def heard(call: Callable[[], Any], after: float = 0.3) -> Any:
     """What the exception carries that Ctrl-C ends the call with, which has to come soon; see `interrupt`."""
-    found = interrupt(call, after, in_loop=in_loop)
+    return _soon(interrupt(call, after), after)
+
+
+def heard_in(call: Callable[[int], Any], steps: int, after: float, *, in_loop: bool) -> Any:
+    """As `heard`, of a call with so many steps, or with more where these take less time."""
+    found = interrupt(lambda: call(steps), after, in_loop=in_loop)
+    if found.stop is None:
+        found = interrupt(lambda: call(LONGER * steps), after, in_loop=in_loop)
+    return _soon(found, after)
+
+
+def _soon(found: Heard, after: float) -> Any:
     assert found.stop is not None, f"the call took less than {after:g} s"
     assert found.seconds < (1 + _THREADS) * HEARD, f"heard after {found.seconds:.2f} s"
     return getattr(found.stop, "result", None)
