@@ -60,7 +60,11 @@ class Arguments:
     def paired(
         self, method: str, first: tuple[str, ArrayLike, int], second: tuple[str, ArrayLike, int]
     ) -> tuple[Floats, Floats, tuple[int, ...]]:
-        """Two arguments as rows, broadcast to common leading axes."""
+        """Two arguments as rows, broadcast to common leading axes: copies."""
+        if is_plain(first[1], first[2:]) and is_plain(second[1], second[2:]):
+            x, y = np.array(first[1], ndmin=2), np.array(second[1], ndmin=2)
+            if checks.finite(x) and checks.finite(y):
+                return x, y, ()
         a, b = (shaped(f"Simulator.{method}({n})", v, (size,)) for n, v, size in (first, second))
         try:
             lead = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
@@ -69,7 +73,7 @@ class Arguments:
                 f"Simulator.{method}: leading axes {a.shape[:-1]} of {first[0]} and {b.shape[:-1]} of {second[0]} "
                 "do not broadcast"
             ) from None
-        # copies by rows: kernels would be compiled once more for read-only arrays, and for columns
+        # by rows: kernels would be compiled once more for read-only arrays, and for columns
         rows = [np.array(np.broadcast_to(m, (*lead, m.shape[-1])), order="C").reshape(-1, m.shape[-1]) for m in (a, b)]
         return rows[0], rows[1], lead
 

@@ -12,7 +12,7 @@ import pytest
 from naive import rotation as rot
 
 import dojo_opt as dojo
-from support.jacobians import check_jacobian
+from support.jacobians import check_step
 from support.scenes import KINDS, LAWS, ball, block, chain, gaps, limited, pendulum, random_state, slider
 
 H = 0.02
@@ -29,21 +29,7 @@ def simulator(mech, kappa):
 
 def check(mech, x, u, kappa):
     """Both Jacobians."""
-    sim = simulator(mech, kappa)
-    result = sim.step(x, u)
-    assert result.status == 0
-    A, B = sim.linearize(x, u, kappa=kappa)
-
-    def step(state, control):
-        stepped = sim.step(state, control)
-        if stepped.status != 0:
-            return np.full(sim.ndx, np.nan)
-        return sim.difference(x1=stepped.x, x0=result.x)
-
-    check_jacobian(lambda state: step(state, u), A, x, sim.integrate)
-    if sim.nu:
-        check_jacobian(lambda control: step(x, control), B, u, np.add)
-    return result
+    return check_step(simulator(mech, kappa), x, u)
 
 
 def placed(mech, x, u, regime):

@@ -13,7 +13,7 @@ from sim.mechanism.gear import Gear
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Box
-from support.jacobians import check_jacobian
+from support.jacobians import check_step
 from support.linkage import fourbar
 from support.urdf_files import joint, link, write
 
@@ -90,10 +90,7 @@ def test_derivatives(name: str) -> None:
     sim = dojo.Simulator(mech, time_step=0.02, tolerance=1e-12, kappa=1e-3)
     x = sim.rollout(start(sim), np.zeros((3, sim.nu)), throw=True).x[-1]
     u = np.random.default_rng(2).normal(size=sim.nu)
-    now = sim.step(x, u, throw=True).x
-    A, B = sim.linearize(x, u)
-    check_jacobian(lambda y: sim.difference(sim.step(y, u, throw=True).x, now), A, x, sim.integrate)
-    check_jacobian(lambda w: sim.difference(sim.step(x, w, throw=True).x, now), B, u, np.add)
+    check_step(sim, x, u)
 
 
 def test_what_is_wrong_with_a_gear_is_said() -> None:

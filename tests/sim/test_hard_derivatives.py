@@ -16,7 +16,7 @@ import dojo_opt as dojo
 from sim.mechanism.shapes import String
 from support.case import kind_of
 from support.encounters import SHAPES, approaching, two
-from support.jacobians import check_jacobian, five_point
+from support.jacobians import check_step, five_point
 from support.scenes import block
 
 FREE = dojo.Joint("floating", None, "b")
@@ -102,15 +102,7 @@ SCENES: dict[str, Callable[[float, float], tuple[dojo.Simulator, np.ndarray]]] =
 
 def check(sim: dojo.Simulator, x: np.ndarray) -> float:
     """A against differences; returns the largest impulse."""
-    here = sim.step(x, throw=True)
-    A, _ = sim.linearize(x)
-
-    def change(y: np.ndarray) -> np.ndarray:
-        moved = sim.step(y)
-        return sim.difference(moved.x, here.x) if moved.success else np.full(sim.ndx, np.nan)
-
-    check_jacobian(change, A, x, sim.integrate)
-    return float(np.abs(here.contacts.impulse).max())
+    return float(np.abs(check_step(sim, x).contacts.impulse).max())
 
 
 @pytest.mark.sweep(6)

@@ -12,7 +12,7 @@ import dojo_opt as dojo
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Contact, Joint
 from sim.mechanism.shapes import Sphere, rotation_matrix
-from support.jacobians import check_jacobian
+from support.jacobians import check_step
 from support.linkage import COUPLER, CRANK, ROCKER, bar, fourbar
 
 Y = (0.0, 1.0, 0.0)
@@ -119,11 +119,7 @@ def test_derivatives(mechanism: Mechanism) -> None:
     x[sim.nq :] = 0.5 * np.random.default_rng(1).normal(size=sim.nv)
     x = sim.rollout(sim.close(x), np.zeros((3, sim.nu)), throw=True).x[-1]
     u = np.random.default_rng(2).normal(size=sim.nu)
-    now = sim.step(x, u, throw=True).x
-    A, B = sim.linearize(x, u)
-    check_jacobian(lambda y: sim.difference(sim.step(y, u, throw=True).x, now), A, x, sim.integrate)
-    if sim.nu:
-        check_jacobian(lambda w: sim.difference(sim.step(x, w, throw=True).x, now), B, u, np.add)
+    check_step(sim, x, u)
 
 
 def test_closing_positions_are_found_from_a_guess() -> None:

@@ -11,7 +11,7 @@ import dojo_opt as dojo
 from sim.derivatives.parameters.parameters import KINDS
 from support.case import Case
 from support.coupled_scenes import COUPLED, kinds
-from support.jacobians import check_jacobian
+from support.jacobians import check_jacobian, check_step
 from support.parameter_errors import error
 from support.situations import CASES
 
@@ -58,9 +58,7 @@ def test_a_pair_out_of_reach_leaves_nothing_behind() -> None:
 def test_a_joint_with_two_rotations_in_a_loop() -> None:
     """Its curvature needs the residual wrenches, before the loops use their place."""
     case = case_of("in a loop, orbital")
-    A, _ = case.sim.linearize(case.x, case.u)
-    here = case.sim.step(case.x, case.u).x
-    check_jacobian(lambda x: case.sim.difference(case.sim.step(x, case.u).x, here), A, case.x, case.sim.integrate)
+    check_step(case.sim, case.x, case.u)
 
 
 def rollout(case: Case, steps: int = 4) -> tuple[dojo.Trajectory, np.ndarray, np.ndarray]:

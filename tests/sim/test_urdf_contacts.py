@@ -10,7 +10,7 @@ import pytest
 
 import dojo_opt as dojo
 from sim.mechanism.stance import gaps
-from support.jacobians import check_jacobian
+from support.jacobians import check_step
 from support.urdf_files import collision, inertial, joint, link, write
 
 SPHERE, BOX = '<sphere radius="0.1"/>', '<box size="0.2 0.4 0.6"/>'
@@ -199,10 +199,7 @@ def test_derivatives_of_a_loaded_robot_are_differences(tmp_path: Path, rng: np.r
     sim = dojo.Simulator(dojo.load_urdf(biped(tmp_path)), time_step=0.02, kappa=1e-3, tolerance=3e-14)
     x = sim.integrate(sim.neutral(), 0.05 * rng.normal(size=sim.ndx))
     u = rng.normal(size=sim.nu)
-    y = sim.step(x, u, throw=True).x
-    A, B = sim.linearize(x, u, kappa=1e-3)
-    check_jacobian(lambda state: sim.difference(sim.step(state, u).x, y), A, x, sim.integrate)
-    check_jacobian(lambda control: sim.difference(sim.step(x, control).x, y), B, u, np.add)
+    check_step(sim, x, u)
 
 
 def test_messages_about_many_links_are_short(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""check_jacobian: a Jacobian on a manifold against central differences whose own error is known.
+"""Jacobians on manifolds, and those of a step, against central differences whose own error is known.
 
 Each column is differenced by the five-point formula (fourth order) at a ladder of steps; the estimate that agrees best
 with its neighbour is taken, and the disagreement is its uncertainty (Ridders). Nothing looks at the Jacobian meanwhile.
@@ -11,33 +11,35 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.simulator.results import StepResult
+from sim.simulator.simulator import Simulator
+
 Vector = NDArray[np.float64]
 STEPS = 10.0 ** np.arange(-1.5, -7.1, -0.5)
+STENCIL = np.array([-2.0, -1.0, 1.0, 2.0])  # [f(-2e) - 8 f(-e) + 8 f(e) - f(2e)] / 12e
+WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 
 
 def five_point(f: Callable[[Vector], Vector], direction: Vector, step: float) -> Vector:
-    """[f(-2e) - 8 f(-e) + 8 f(e) - f(2e)] / 12e."""
-    a, b, c, d = (f(k * step * direction) for k in (-2.0, -1.0, 1.0, 2.0))
-    return (a - 8.0 * b + 8.0 * c - d) / (12.0 * step)
+    """The derivative along a direction."""
+    return sum(w * f(k * step * direction) for w, k in zip(WEIGHTS, STENCIL, strict=True)) / step
 
 
-def differences(f: Callable[[Vector], Vector], n: int) -> tuple[Vector, Vector]:
-    """Jacobian of f at 0 and the uncertainty of every column; columns of f that fail give NaN and are not used."""
-    columns, doubts = zip(*(_column(f, direction) for direction in np.eye(n)), strict=True)
-    return np.array(columns).T, np.array(doubts)
+def differences(f: Callable[[Vector], Vector], n: int, *, rows: bool = False) -> tuple[Vector, Vector]:
+    """Jacobian of f at 0 and the uncertainty of every column; values of f that are NaN are not used.
 
-
-def _column(f: Callable[[Vector], Vector], direction: Vector) -> tuple[Vector, float]:
-    """The derivative along a direction, and its uncertainty."""
-    coarse, best, doubt = five_point(f, direction, STEPS[0]), None, np.inf
-    for step in STEPS[1:]:
-        fine = five_point(f, direction, step)
-        change = np.abs(fine - coarse).max()
-        if change < doubt:
-            best, doubt = fine, change
-        coarse = fine
-    assert best is not None, "the function could not be evaluated around the point"
-    return best, float(doubt)
+    rows: f takes all points at once, as rows.
+    """
+    points = (STEPS[:, None] * STENCIL)[..., None, None] * np.eye(n)  # step, place in the stencil, column
+    flat = points.reshape(-1, n)
+    values = np.asarray(f(flat) if rows else [f(point) for point in flat]).reshape(*points.shape[:-1], -1)
+    found = np.einsum("k,skcr->scr", WEIGHTS, values) / STEPS[:, None, None]
+    changes = np.abs(np.diff(found, axis=0)).max(axis=2)
+    doubts = np.where(np.isfinite(changes), changes, np.inf)
+    best = doubts.argmin(axis=0)
+    columns = np.arange(n)
+    assert np.isfinite(doubts[best, columns]).all(), "the function could not be evaluated around the point"
+    return found[best + 1, columns].T, doubts[best, columns]
 
 
 def check_jacobian(
@@ -46,9 +48,11 @@ def check_jacobian(
     x: Vector,
     retract: Callable[[Vector, Vector], Vector],
     tolerance: float = 1e-6,
+    *,
+    rows: bool = False,
 ) -> None:
     """Largest |J - J_differences| over largest |J_differences| <= tolerance; f(x) in tangent coordinates at f(x)."""
-    expected, doubt = differences(lambda dx: f(retract(x, dx)), J.shape[1])
+    expected, doubt = differences(lambda dx: f(retract(x, dx)), J.shape[1], rows=rows)
     scale = max(np.abs(expected).max(), 1e-12)
     error = np.abs(J - expected) / scale
     assert np.isfinite(error).all(), f"not finite: {np.argwhere(~np.isfinite(error)).tolist()}"
@@ -57,3 +61,23 @@ def check_jacobian(
         f"relative error {error[row, column]:.1e} > {tolerance:.0e} in row {row}, column {column}: "
         f"{J[row, column]:.9g}, differences {expected[row, column]:.9g} +- {doubt[column]:.1e}, scale {scale:.3g}"
     )
+
+
+def check_step(sim: Simulator, x: Vector, u: Vector | None = None, tolerance: float = 1e-6) -> StepResult:
+    """A and B of the step from x under u, which is returned; refused steps around it are not used."""
+    control = np.zeros(sim.nu) if u is None else u
+    result = sim.step(x, control, throw=True)
+    A, B = sim.linearize(x, control)
+
+    def moved(states: Vector, controls: Vector) -> Vector:
+        count = max(len(states), len(controls))
+        us = np.broadcast_to(controls, (count, sim.nu))[:, None]
+        ends = sim.rollout_batch(np.broadcast_to(states, (count, sim.nx)), us)
+        changes = np.array(sim.difference(ends.x[:, 1], result.x))
+        changes[ends.status != 0] = np.nan
+        return changes
+
+    check_jacobian(lambda states: moved(states, control[None]), A, x, sim.integrate, tolerance, rows=True)
+    if sim.nu:
+        check_jacobian(lambda controls: moved(x[None], controls), B, control, np.add, tolerance, rows=True)
+    return result
