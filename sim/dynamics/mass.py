@@ -29,11 +29,11 @@ def _add_rest(A: Vector, U: Vector, D: float, out: Vector) -> None:
 def eliminate_mass(
     model: Model, S: Matrix, A: Matrix, f: Matrix, U: Matrix, z: Vector, share: Vector, p: Vector
 ) -> bool:
-    """M = S^T A S + armature from the leaves to the root, one coordinate after the other: M is positive definite.
+    """M = S^T A S + armature + C from the leaves to the root, one coordinate after the other: M is positive definite.
 
-        U = A S,  D = S.U + armature,  z = (p - S.f)/D,      A -= U U^T/D,  f += U z;  both added to the parent's
+        U = A S,  D = S.U + armature + C,  z = (p - S.f)/D,      A -= U U^T/D,  f += U z;  both added to the parent's
 
-    share: 1/D, so that p.M^-1 p = sum of z^2/share. False when M is singular.
+    share: C in, the diagonal of a matrix; 1/D out. False when M is singular.
     S, U: (nv, 6); A: (nbody, 36), destroyed; f: (nbody, 6), zeros, destroyed; z, share, p: (nv,).
     """
     for i in range(model.body_parent.shape[0] - 1, -1, -1):
@@ -46,7 +46,7 @@ def eliminate_mass(
                 u[k] = (
                     (s0 * a[k] + s1 * a[6 + k]) + (s2 * a[12 + k] + s3 * a[18 + k]) + (s4 * a[24 + k] + s5 * a[30 + k])
                 )
-            D = model.dof_armature[d] + dot_six(S[d], u)
+            D = model.dof_armature[d] + share[d] + dot_six(S[d], u)
             if not D > 0.0:
                 return False
             D = 1.0 / D
@@ -69,23 +69,30 @@ def eliminate_mass(
 
 
 @kernel
-def solve_mass(model: Model, data: Data, p: Vector, out: Vector) -> bool:
-    """M out = p by `eliminate_mass`, and on the way down    out = z - U.V/D,  V += S out.
+def mass_velocities(model: Model, S: Matrix, U: Matrix, z: Vector, share: Vector, V: Matrix, out: Vector) -> None:
+    """out = M^-1 p after `eliminate_mass`, on the way down    out = z - U.V/D,  V += S out.
 
-    False when M is singular.   Leaves the twists of the bodies in data.twist.
+    V: (nbody, 6), the twists of the bodies, out. `out` may be z.
     """
-    spatial_inertia(model, data.origin, data.pos2, data.inertia_world, data.A)
-    clear(data.wrench)
-    if not eliminate_mass(model, data.S2, data.A, data.wrench, data.U, data.z, data.residual, p):
-        return False
     for i in range(model.body_parent.shape[0]):
-        V, q = data.twist[i], model.body_parent[i]
+        W, q = V[i], model.body_parent[i]
         for k in range(6):
-            V[k] = data.twist[q, k] if q >= 0 else 0.0
+            W[k] = V[q, k] if q >= 0 else 0.0
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-            S = data.S2[d]
-            t = data.z[d] - data.residual[d] * dot_six(data.U[d], V)
+            t = z[d] - share[d] * dot_six(U[d], W)
             out[d] = t
             for k in range(6):
-                V[k] += S[k] * t
+                W[k] += S[d, k] * t
+
+
+@kernel
+def solve_mass(model: Model, data: Data, p: Vector, out: Vector) -> bool:
+    """M out = p by `eliminate_mass`.   False when M is singular.   Leaves the twists of the bodies in data.twist."""
+    spatial_inertia(model, data.origin, data.pos2, data.inertia_world, data.A)
+    clear(data.wrench)
+    for d in range(p.shape[0]):
+        data.residual[d] = 0.0
+    if not eliminate_mass(model, data.S2, data.A, data.wrench, data.U, data.z, data.residual, p):
+        return False
+    mass_velocities(model, data.S2, data.U, data.z, data.residual, data.twist, out)
     return True

@@ -7,10 +7,11 @@ of a divided step.
 
     K23 - K12 - W > 0.09 max(K12, |G|) + |D| + slack
 
-K12, K23: p.M^-1 p/2 of the momentum p with which the bodies arrive at configurations 2 and 3. W: work of gravity,
-springs and inputs at 2, at the mean of the velocities of both intervals. |G|: that of gravity, |D|: that of the drives,
-the sum of its parts, each input and spring; where contacts make velocities jump against them, as a foot
-does that is set down, their work is known to its size only. Dampers and friction lose. Contacts and limits may give
+K12, K23: kinetic energies at configurations 2 and 3, of the momenta with which the bodies arrive there and half the
+impulses of dampers (dynamics/energy.py). W: work of gravity, springs and inputs at 2, at the mean of the velocities of
+both intervals. |G|: that of gravity, |D|: that of the drives, the sum of its parts, each input and spring; where
+contacts make velocities jump against them, as a foot does that is set down, their work is known to its size only.
+Dampers and friction lose. Contacts and limits may give
 
     slack = sum over contacts and limits of gamma max(0, gap3 - gap2)/h + kappa/h
 
@@ -41,11 +42,11 @@ from sim.dynamics.energy import (
     momentum_velocity,
     spatial_inertia,
 )
-from sim.dynamics.joints.damper import damper_impulse
+from sim.dynamics.joints.damper import damper_impulse, node_damping
 from sim.dynamics.joints.dry_friction import apply_dry
 from sim.dynamics.joints.terms import add_limit_impulse
 from sim.dynamics.loops.loop_work import loop_slack
-from sim.dynamics.mass import eliminate_mass
+from sim.dynamics.mass import eliminate_mass, mass_velocities
 from sim.dynamics.momentum_balance import world_inertia
 from sim.model.columns import Bound, BoundRow, Cone, Kin
 from sim.model.data import Data
@@ -110,7 +111,10 @@ def noise(model: Model, data: Data, options: StepOptions, v: Vector) -> float:
 
 @kernel
 def arriving_energy(model: Model, data: Data, h: float, v: Vector, third: bool) -> float:
-    """p.M^-1 p/2 of the bodies that arrive at configuration 2, or 3, with mean velocities v; 0 where M is singular."""
+    """Kinetic energy at configuration 2, or 3, of the bodies that arrive there with mean velocities v [J].
+
+    That of energy.py, without the impulses of gravity and springs at the node; 0 where M is singular.
+    """
     S = data.S3 if third else data.S2
     o = (data.origin[0], data.origin[1], data.origin[2])
     end = Arrival(data.pos2, data.move_in, data.turn_in, data.node_inertia)
@@ -121,13 +125,15 @@ def arriving_energy(model: Model, data: Data, h: float, v: Vector, third: bool) 
     add_children(model, data.node_momentum)
     for d in range(v.shape[0]):
         data.node_p[d] = dot_six(S[d], data.node_momentum[model.dof_body[d]]) + model.dof_armature[d] * v[d]
+        data.node_share[d] = node_damping(model, h, d)
     spatial_inertia(model, data.origin, end.pos, data.node_inertia, data.A1)
     clear(data.node_momentum)
     if not eliminate_mass(model, S, data.A1, data.node_momentum, data.F, data.z, data.node_share, data.node_p):
         return 0.0
+    mass_velocities(model, S, data.F, data.z, data.node_share, data.twist, data.z)
     energy = 0.0
     for d in range(v.shape[0]):
-        energy += 0.5 * data.z[d] * data.z[d] / data.node_share[d]
+        energy += 0.5 * (data.node_p[d] - node_damping(model, h, d) * data.z[d]) * data.z[d]
     return energy
 
 
