@@ -6,7 +6,7 @@
 Interrupts go to one process after another, each of which plans, controls, rolls out, or runs a batch for ever, compiled
 before. It has to answer within 0.2 s with a KeyboardInterrupt that carries what was done, and to compute the same as
 before afterwards.
-Caches: files of the compiled code are damaged, all at once, in seven ways; the next process has to compute the same.
+Caches: all files of compiled code are damaged, in seven ways; the next process has to compute the same.
 Killed: processes that compile into one cache are killed at random moments, and the next one has to compute the same.
 """
 
@@ -20,7 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,7 @@ from victims import FORKS, LONG, SMALL, Heard, Victim, answer, environment
 from dojo_opt.report.result import Report, Table
 
 ANSWER = 0.2  # [s]
+COMPILED = {"DOJO_OPT_SHIPPED": "0"}  # what came with an installation is no cache
 PARTS = ("signals", "caches", "killed", "forks")
 
 
@@ -72,49 +73,56 @@ DAMAGE: dict[str, Callable[[Path, np.random.Generator], object]] = {
 }
 
 
-def caches(rng: np.random.Generator, kinds: list[str]) -> list[tuple[str, str, str]]:
-    """(damage, files, what came of it) with every file of a cache damaged: indices, code, or both."""
+def caches(rng: np.random.Generator, kinds: list[str], filled: Filled) -> list[tuple[str, int, str]]:
+    """(damage, damaged files, what came of it) with every file of compiled code damaged."""
     found = []
-    with tempfile.TemporaryDirectory() as folder:
-        whole = Path(folder) / "whole"
-        expected = answer(SMALL, whole)
-        for kind in progress()([(kind, kind) for kind in kinds], "chaos, caches"):
-            for suffix in ("nbi", "nbc"):
-                copy = Path(folder) / "copy"
-                shutil.copytree(whole, copy)
-                for file in sorted(copy.rglob(f"*.{suffix}")):
-                    DAMAGE[kind](file, rng)
-                said = answer(SMALL, copy)
-                found.append((kind, suffix, "same" if said == expected else said or "nothing printed"))
-                subprocess.run(["chmod", "-R", "u+rw", str(copy)], check=False)
-                shutil.rmtree(copy)
+    for kind in progress()([(kind, kind) for kind in kinds], "chaos, caches"):
+        copy = filled.folder.with_name("copy")
+        shutil.copytree(filled.folder, copy)
+        files = sorted(copy.rglob("*.nbc"))
+        assert files, "nothing was compiled: there is nothing to damage"
+        for file in files:
+            DAMAGE[kind](file, rng)
+        found.append((kind, len(files), filled.compare(copy)))
+        subprocess.run(["chmod", "-R", "u+rw", str(copy)], check=False)
+        shutil.rmtree(copy)
     return found
 
 
-def killed(count: int, rng: np.random.Generator) -> list[str]:
+def killed(count: int, rng: np.random.Generator, filled: Filled) -> list[str]:
     """What processes compute whose forerunners with the same cache were killed."""
     found = []
-    with tempfile.TemporaryDirectory() as folder:
-        expected = answer(SMALL, Path(folder) / "whole")
-        for _ in progress()([(f"kill {k}", k) for k in range(count)], "chaos, killed"):
-            cache = Path(folder) / "shared"
-            pair = [
-                subprocess.Popen(
-                    [sys.executable, "-c", SMALL],
-                    env=environment(NUMBA_CACHE_DIR=str(cache)),
-                    stdout=subprocess.DEVNULL,
-                    stderr=subprocess.DEVNULL,
-                )
-                for _ in range(2)
-            ]
-            time.sleep(1.0 + 6.0 * rng.random())
-            for process in pair:
-                process.kill()
-                process.wait()
-            said = answer(SMALL, cache)
-            found.append("same" if said == expected else said)
-            shutil.rmtree(cache, ignore_errors=True)
+    for _ in progress()([(f"kill {k}", k) for k in range(count)], "chaos, killed"):
+        cache = filled.folder.with_name("shared")
+        pair = [
+            subprocess.Popen(
+                [sys.executable, "-c", SMALL],
+                env=environment(NUMBA_CACHE_DIR=str(cache), **COMPILED),
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+            for _ in range(2)
+        ]
+        time.sleep(1.0 + 6.0 * rng.random())
+        for process in pair:
+            process.kill()
+            process.wait()
+        found.append(filled.compare(cache))
+        shutil.rmtree(cache, ignore_errors=True)
     return found
+
+
+class Filled:
+    """A cache that a process has filled, and what it computed."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.expected = answer(SMALL, folder, **COMPILED)
+
+    def compare(self, cache: Path) -> str:
+        """Whether a process with another cache computes the same."""
+        said = answer(SMALL, cache, **COMPILED)
+        return "same" if said == self.expected else said or "nothing printed"
 
 
 def run(args: argparse.Namespace) -> Report:
@@ -124,20 +132,9 @@ def run(args: argparse.Namespace) -> Report:
     parts = args.only or PARTS
     if "signals" in parts:
         _add_signals(report, signals(12 if args.quick else args.interrupts, rng))
-    if "caches" in parts:
-        found = caches(rng, ["truncated"] if args.quick else list(DAMAGE))
-        report.rows += [
-            number("damaged caches", len(found)),
-            number("damaged caches, other than the same result", sum(said != "same" for *_, said in found), 0),
-        ]
-        report.tables.append(Table("Damaged caches", ("damage", "files", "the next process"), [list(f) for f in found]))
-    if "killed" in parts:
-        ends = killed(1 if args.quick else args.kills, rng)
-        report.rows += [
-            number("killed pairs of processes", len(ends)),
-            number("killed, other than the same result next", sum(said != "same" for said in ends), 0),
-        ]
-        report.details["killed"] = ends
+    if {"caches", "killed"} & set(parts):
+        with tempfile.TemporaryDirectory() as folder:
+            _add_caches(report, parts, args, rng, Filled(Path(folder) / "filled"))
     if "forks" in parts:
         layers = ("omp", "workqueue")
         outcomes = {layer: _forked(layer) for layer in layers}
@@ -146,6 +143,27 @@ def run(args: argparse.Namespace) -> Report:
         ]
         report.details["forks"] = outcomes
     return report
+
+
+def _add_caches(
+    report: Report, parts: Sequence[str], args: argparse.Namespace, rng: np.random.Generator, filled: Filled
+) -> None:
+    """What came of damaged caches and of processes that were killed while they filled one."""
+    if "caches" in parts:
+        found = caches(rng, ["truncated"] if args.quick else list(DAMAGE), filled)
+        report.rows += [
+            number("damaged caches", len(found)),
+            number("damaged caches, other than the same result", sum(said != "same" for *_, said in found), 0),
+        ]
+        header = ("damage", "damaged files", "the next process")
+        report.tables.append(Table("Damaged caches", header, [list(line) for line in found]))
+    if "killed" in parts:
+        ends = killed(1 if args.quick else args.kills, rng, filled)
+        report.rows += [
+            number("killed pairs of processes", len(ends)),
+            number("killed, other than the same result next", sum(said != "same" for said in ends), 0),
+        ]
+        report.details["killed"] = ends
 
 
 def _forked(layer: str) -> str:

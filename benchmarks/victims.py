@@ -132,15 +132,15 @@ class Victim:
             self.process.kill()
 
 
-def answer(program: str, cache: Path, timeout: float = PATIENCE) -> str:
+def answer(program: str, cache: Path, **more: str) -> str:
     """What a process prints that has this cache, or what became of it."""
     try:
         done = subprocess.run(
             [sys.executable, "-c", program],
-            env=environment(NUMBA_CACHE_DIR=str(cache)),
+            env=environment(NUMBA_CACHE_DIR=str(cache), **more),
             capture_output=True,
             text=True,
-            timeout=timeout,
+            timeout=PATIENCE,
         )
     except subprocess.TimeoutExpired:
         return "hung"
