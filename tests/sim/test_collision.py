@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 from sim.contact.collision.edge_axes import OPEN
 from sim.mechanism.shapes import Box, Capsule, HalfSpace, Solid, Sphere, String
 from sim.model.shape_kinds import OUT, SIZES, SWAPPED, Pair, Shape, count, pair
-from support.collide import arrange, choose, collide, collide_chosen, open_sides
+from support.collide import arrange, choose, collide_chosen, open_sides
 from support.jacobians import differences
-from support.shape_pairs import CORE, NAMES, NO_HULL, SIMPLE, deepest, random_pose, shapes, touch
+from support.shape_pairs import CORE, NAMES, NO_HULL, SIMPLE, contacts_at, deepest, random_pose, shapes, touch
 
 Array = np.ndarray
 SOLIDS: dict[Shape, type[Solid]] = {Shape.SPHERE: Sphere, Shape.CAPSULE: Capsule, Shape.BOX: Box}
@@ -46,12 +46,11 @@ def test_derivatives_are_central_differences(kind: Pair, depth: float, rng: np.r
             if out[0] > 1e8:
                 continue
 
-            def moved(twist: Array, feature: int = feature, sizes: Array = sizes, R: Array = R, r: Array = r) -> Array:
-                turn = Rotation.from_rotvec(twist[3:]).as_matrix()
-                out = touch(kind, feature, sizes, turn @ R, turn @ r + twist[:3])
-                return out[:7] if out[0] < 1e8 else np.full(7, np.nan)
+            def moved(twists: Array, feature: int = feature, sizes: Array = sizes, R: Array = R, r: Array = r) -> Array:
+                turns = Rotation.from_rotvec(twists[:, 3:]).as_matrix()
+                return contacts_at(kind, feature, sizes, turns @ R, turns @ r + twists[:, :3])
 
-            expected, doubt = differences(moved, 6)
+            expected, doubt = differences(moved, 6, rows=True)
             n, p = out[1:4], out[4:7]
             J = np.vstack([np.append(n, np.cross(p, n)), out[7:].reshape(6, 6)])
             np.testing.assert_allclose(np.linalg.norm(n), 1.0, atol=1e-14)
@@ -68,26 +67,28 @@ def test_pairs_that_have_changed_places(kind: Pair, rng: np.random.Generator) ->
         sizes = rng.uniform(0.15, 0.5, 2 * SIZES)
         R, r = random_pose(rng, kind, sizes, 0.02, aligned=trial % 2 == 1)
         for feature in range(count(kind)):
+            swapped = int(kind) + SWAPPED
 
-            def exchanged(R: Array, r: Array, feature: int = feature, sizes: Array = sizes) -> Array:
-                out = np.empty(OUT)
-                collide(int(kind) + SWAPPED, feature, sizes, NO_HULL, np.ascontiguousarray(R).ravel(), r, out)
-                return out
-
-            def moved(twist: Array, R: Array = R, r: Array = r) -> Array:
+            def moved(
+                twists: Array,
+                pair: int = swapped,
+                feature: int = feature,
+                sizes: Array = sizes,
+                R: Array = R,
+                r: Array = r,
+            ) -> Array:
                 """b turned and shifted in the frame of a: seen from b, a moves the other way."""
-                turn = Rotation.from_rotvec(twist[3:]).as_matrix()
-                B, b = turn @ R.T, twist[:3] - turn @ R.T @ r
-                out = exchanged(B.T, -B.T @ b)
-                return out[:7] if out[0] < 1e8 else np.full(7, np.nan)
+                turns = Rotation.from_rotvec(twists[:, 3:]).as_matrix() @ R.T
+                back = turns.transpose(0, 2, 1)
+                return contacts_at(pair, feature, sizes, back, r - np.einsum("nij,nj->ni", back, twists[:, :3]))
 
-            out, before = exchanged(R, r), touch(kind, feature, sizes, R, r)
+            out, before = touch(swapped, feature, sizes, R, r), touch(kind, feature, sizes, R, r)
             if out[0] > 1e8:
                 continue
             np.testing.assert_allclose(
                 out[:7], [before[0], *(-R.T @ before[1:4]), *(R.T @ (before[4:7] - r))], atol=1e-12
             )
-            expected, _ = differences(moved, 6)
+            expected, _ = differences(moved, 6, rows=True)
             n, p = out[1:4], out[4:7]
             J = np.vstack([np.append(n, np.cross(p, n)), out[7:].reshape(6, 6)])
             assert np.abs(J - expected).max() <= 1e-6 * max(1.0, np.abs(expected).max()), feature

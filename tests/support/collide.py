@@ -12,6 +12,7 @@ from sim.contact.collision.edge_axes import Arrangement
 from sim.contact.collision.pair_kernels import KERNELS
 from sim.model.layout import Sizes, allocate_model, model_view, table
 from sim.model.model import Model
+from sim.model.shape_kinds import OUT
 from solvers.compiler import Table, kernel, link
 from solvers.types import Matrix, Vector
 
@@ -33,6 +34,12 @@ def _at(hull: Matrix) -> Table:
 @kernel
 def _collide(at: Table, kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     kernels.collide(model_view(at), kind, feature, sizes, R, r, out)
+
+
+@kernel
+def _collide_rows(at: Table, kind: int, feature: int, sizes: Vector, Rs: Matrix, rs: Matrix, out: Matrix) -> None:
+    for row in range(out.shape[0]):
+        kernels.collide(model_view(at), kind, feature, sizes, Rs[row], rs[row], out[row])
 
 
 @kernel
@@ -61,6 +68,13 @@ def _collide_chosen(
 
 def collide(kind: int, feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
     _collide(_at(hull), kind, feature, sizes, R, r, out)
+
+
+def collide_rows(kind: int, feature: int, sizes: Vector, hull: Matrix, Rs: Matrix, rs: Matrix) -> Matrix:
+    """The contacts (n, OUT) at poses: rotations Rs (n, 9) and positions rs (n, 3) of b in the frame of a."""
+    out = np.empty((len(rs), OUT))
+    _collide_rows(_at(hull), kind, feature, sizes, np.ascontiguousarray(Rs), np.ascontiguousarray(rs), out)
+    return out
 
 
 def open_sides(kind: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:

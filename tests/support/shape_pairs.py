@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim.model.shape_kinds import OUT, Pair, Shape, count
-from support.collide import collide
+from support.collide import collide, collide_rows
 
 Array = np.ndarray
 NO_HULL = np.zeros((1, 4))
@@ -19,6 +19,13 @@ NAMES = {p: p.name.lower() for p in Pair}
 def touch(kind: Pair, feature: int, sizes: Array, R: Array, r: Array) -> Array:
     out = np.empty(OUT)
     collide(int(kind), feature, sizes, NO_HULL, np.ascontiguousarray(R).ravel(), np.ascontiguousarray(r), out)
+    return out
+
+
+def contacts_at(kind: int, feature: int, sizes: Array, Rs: Array, rs: Array) -> Array:
+    """Distance, normal and point (n, 7) at poses (n, 3, 3), (n, 3); NaN where the feature has no contact."""
+    out = collide_rows(int(kind), feature, sizes, NO_HULL, Rs.reshape(-1, 9), rs)[:, :7]
+    out[out[:, 0] >= 1e8] = np.nan
     return out
 
 
