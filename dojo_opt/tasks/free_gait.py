@@ -28,7 +28,7 @@ _KAPPA = 1e-2  # [N s m] at 3e-3 and below the robot leans forward and stands: n
 _POSE = (20.0, 20.0, 80.0, 10.0, 10.0, 10.0)  # [1/m^2], [1/rad^2] of the trunk; joints weigh 1
 _SETTLING = 30.0  # weights of coordinates over those of their rates
 _END = 10.0  # times the weights, at the end
-_EFFORT, _ALIKE = 2e-4, 1e-2  # [1/(N m)^2]
+_ALIKE = 1e-2  # [1/(N m)^2]
 _SLIP, _NEAR = 3.0, 0.03  # [1/(m/s)^2], [m]
 _SERVO = 40.0, 1.0  # [N m/rad], [N m s/rad]
 _DIAGONAL = ((0, 3), (1, 2))  # legs in the order of the inputs
@@ -93,13 +93,18 @@ class Lead:
 
 
 def free_gait_mpc(
-    velocity: ArrayLike = (0.3, 0.0, 0.0), *, robot: Mechanism | None = None, lead: float = 0.35, **settings: Any
+    velocity: ArrayLike = (0.3, 0.0, 0.0),
+    *,
+    robot: Mechanism | None = None,
+    lead: float = 0.35,
+    effort: float = 2e-4,
+    **settings: Any,
 ) -> MPC:
     """A quadruped walks at a commanded velocity with no gait, footfall or swing given: 20 knots of 25 ms at 40 Hz.
 
     The reference is one standing pose that moves on, see `Lead`. Squares of the trunk's position weigh 20, of its
     height 80, of its rotation 10, of joint angles 1, rates a thirtieth of that, all of them ten times as much at the
-    end; torques weigh 2e-4, the slip of feet near the ground 3, differences of torques between diagonal legs .01.
+    end; torques weigh `effort`, the slip of feet near the ground 3, differences of torques between diagonal legs .01.
     Costs are those of Kim et al. 2023 (arXiv 2312.08961), but for a slip that weighs three times as much, and no term
     for long swings. Plans are made at a kappa of .01, where contact acts at a distance of a centimetre: it is this
     smoothing that lets a foot leave the ground. Servos follow them on the plant, whose contact is hard.
@@ -108,6 +113,7 @@ def free_gait_mpc(
         velocity: (3,) velocity forward and to the left, and rate of the heading [m/s, m/s, rad/s].
         robot: a mechanism with the joints and inputs of `models.quadruped` (default None: that).
         lead: largest distance from the robot to the pose that it follows [m].
+        effort: weight of the torques [1/(N m)^2].
         **settings: settings of `dojo.MPC`.
 
     Returns:
@@ -127,7 +133,7 @@ def free_gait_mpc(
     running = np.concatenate([weight, weight / _SETTLING])
     cost = [
         Tracking(pose, np.vstack([np.tile(running, (_HORIZON, 1)), _END * running])),
-        Effort(_EFFORT),
+        Effort(effort),
         Slip(weight=_SLIP, near=_NEAR),
         _alike(sim),
     ]
