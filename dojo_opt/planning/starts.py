@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
@@ -26,7 +26,7 @@ _LESS = 0.3  # times the largest input of a guess: of 12 hops planned so, 10 are
 _GRAVITY = 9.81  # [m/s^2]
 
 # controls, states and warm start
-Guess = tuple[Matrix | None, Matrix | None, Plan | None]
+Guess = tuple[ArrayLike | None, ArrayLike | None, Plan | None]
 
 
 def check_executor(call: str, executor: Any) -> None:
