@@ -21,7 +21,7 @@ _RATE = 60.0  # [Hz]
 _WAY, _LOW, _TILT = 3.2, 0.15, 0.5  # [m] in 10 s, [m] and [rad] of the trunk
 _STANCE = (0.0, -0.8, 1.6)  # [rad] abduction, hip, knee
 _EFFORT = (18.0, 18.0, 26.0)  # [N m]
-_FRICTION = 0.3  # that plans count on; with .4 some runs fall, with the .67 of the plant all
+_FRICTION = 0.3  # that plans count on; with the .67 of the plant the robot falls at once
 _TORQUE = 5e-4  # [1/(N m)^2]
 _SERVO = 50.0, 2.0  # [N m/rad], [N m s/rad]
 _LEGS = {"fl": (1.0, 1.0), "fr": (1.0, -1.0), "hl": (-1.0, 1.0), "hr": (-1.0, -1.0)}
@@ -108,7 +108,7 @@ def mini_cheetah(*, speed: float = 0.4, terrain: Terrain | None = None, **settin
 
     With hard contact the publication's cost is least for a robot that leans forward and stands. The cost is therefore
     that of `tasks.free_gait_mpc`, with knots half as long, and plans that count on a friction of .3. They act at once:
-    with a delay of one tick the robot jumps at the start, and some runs fall.
+    with a delay of one tick the robot jumps at the start. It walks from the given start; of perturbed ones many fall.
 
     Args:
         speed: speed of the nominal motion [m/s].
