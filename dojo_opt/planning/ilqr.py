@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -26,6 +27,7 @@ from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.plan import History, Plan
 from dojo_opt.planning.problem import Problem
+from dojo_opt.planning.starts import check_executor, multi_start
 from sim.mechanism import checks
 from sim.simulator.results import Interrupted
 from solvers.riccati import Promise, Quadratic, Regularization, backward, value_hessian, work_size
@@ -61,6 +63,9 @@ def ilqr(
     states: ArrayLike | None = None,
     *,
     warm_start: Plan | None = None,
+    starts: int = 1,
+    seed: int = 0,
+    executor: Executor | None = None,
     options: Options | None = None,
     **settings: Any,
 ) -> Plan:
@@ -79,6 +84,12 @@ def ilqr(
         states: (T + 1, nx) guess of the states; by default that of the problem, or the rollout of the inputs.
         warm_start: an earlier plan of the same problem, whose trajectory, multipliers and penalties are taken over. A
             plan of an easier variant, with more damping, say, often helps where a direct solve fails.
+        starts: number of guesses to plan from: the given one, and others whose inputs are changed at random (default
+            1). The best plan is returned: the cheapest of the solved ones, else that with the least violation.
+        seed: seed of these changes (default 0). A plan depends on it, neither on the executor nor on its workers.
+        executor: whose workers plan from the guesses: anything with the interface of `concurrent.futures.Executor`, as
+            for `dojo.monte_carlo`. A ThreadPoolExecutor uses all cores, as the compiled loops of its threads run at
+            the same time (default None: one after the other).
         options: settings of the planner.
         **settings: fields of `dojo.Options` by name; they take precedence over `options`.
 
@@ -95,7 +106,14 @@ def ilqr(
         raise TypeError(f"ilqr(options=...): expected Options, got {options!r}")
     if warm_start is not None and not isinstance(warm_start, Plan):
         raise TypeError(f"ilqr(warm_start=...): expected a Plan, got {warm_start!r}")
+    if not isinstance(problem, Problem):
+        raise TypeError(f"ilqr(problem): expected a Problem, got {problem!r}")
     options = Options(**settings) if options is None else replace(options, **settings)
+    check_executor("ilqr", executor)
+    checks.whole_number("ilqr(seed=...)", seed, 0)
+    if checks.whole_number("ilqr(starts=...)", starts) > 1:
+        guess = (controls, states, warm_start)
+        return multi_start(ilqr, problem, guess, {"options": options}, starts, seed, executor)
     solver = Solver(problem, options)
     finer = None if problem.refinement == 1 else problem.refined(problem.refinement)  # refused before any work
     plan = solver.solve(controls, states, warm_start)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.planning.starts import check_executor
 from dojo_opt.plant.loop import closed_loop
 from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
@@ -109,12 +110,6 @@ class MonteCarlo:
             fallbacks = sum(tick.fallback for o in self.outcomes for tick in o.log)
             text += f"; tick median {np.median(ms):.2f} ms, 99 % {np.percentile(ms, 99):.2f} ms, {fallbacks} fallbacks"
         return text
-
-
-def check_executor(call: str, executor: Any) -> None:
-    """Refuse what has no submit(); None is no executor."""
-    if executor is not None and not hasattr(executor, "submit"):
-        raise TypeError(f"{call}(executor=...): expected an Executor, with submit(), got {executor!r}")
 
 
 def monte_carlo(

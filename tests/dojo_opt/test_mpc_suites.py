@@ -10,6 +10,7 @@ from dojo_opt.__main__ import main
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.mpc.moving import Onward
 from dojo_opt.mpc.servo import ModelServo
+from dojo_opt.tasks.free_gait import Lead
 from dojo_opt.tasks.suite import servo_effort
 
 
@@ -37,6 +38,45 @@ def test_the_spinner_starts_to_turn():
     outcome = task.outcome(loop)
     assert outcome.penetration < 1e-4
     assert set(outcome.measures) == {"mean speed [rad/s]"}
+
+
+def test_an_arm_rolls_a_ball():
+    """Towards the goal within 1 s, the stub of the arm on it."""
+    task = dojo.tasks.idto.jaco_ball()
+    loop = task.run(seconds=1.0)
+    assert loop.survived
+    assert loop.x[-1, 8] < 0.22  # of .27
+    assert loop.contacts.gap[-1].min() > -1e-5
+    assert np.abs(loop.x[-1, 22]) > 0.05
+
+
+@pytest.mark.slow
+def test_a_quadruped_finds_its_gait():
+    """From a velocity and one pose: it is half a metre on after 2.5 s, and has lifted every foot."""
+    task = dojo.tasks.idto.mini_cheetah()
+    loop = task.run(seed=3, seconds=2.5)
+    assert loop.survived
+    assert loop.x[-1, 0] - loop.x[0, 0] > 0.5
+    assert np.all(loop.contacts.gap[:, :4].max(axis=0) > 5e-3)
+    assert task.outcome(loop).measures["tilt [rad]"] < 0.3
+
+
+def test_a_lead_moves_on_and_waits():
+    """At its velocity in its own axes, and no further from the robot than allowed; a new run begins anew."""
+    pose = dojo.Simulator(dojo.models.quadruped(), time_step=0.025).neutral()
+    lead = Lead(pose, (0.4, 0.1, 0.5), 0.3)
+    lead.anchor(0.0, pose)
+    lead.anchor(0.5, pose)
+    np.testing.assert_allclose(lead([0.5, 0.7])[:, :2], [[0.2, 0.05]] * 2)
+    assert 2.0 * np.arctan2(*lead([0.5])[0, [6, 3]]) == pytest.approx(0.25)
+    lead.anchor(10.0, pose)
+    assert np.hypot(*lead([10.0])[0, :2]) == pytest.approx(0.3)
+    moved = pose.copy()
+    moved[:2] = 1.0, 2.0
+    lead.anchor(0.0, moved)
+    np.testing.assert_allclose(lead([0.0])[0, :3], moved[:3])
+    with pytest.raises(ValueError, match="12 driven joints"):
+        dojo.tasks.free_gait_mpc(robot=dojo.models.raiberthopper())
 
 
 def test_a_start_is_perturbed_and_lifted_out_of_the_ground():

@@ -1,0 +1,166 @@
+"""A quadruped that finds its gait: a velocity and one pose are all that it is given."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt import models
+from dojo_opt.cost import Effort, ResidualCost, Slip, Tracking
+from dojo_opt.gaits.equilibrium import equilibrium
+from dojo_opt.gaits.feet import Feet
+from dojo_opt.mpc.controller import MPC
+from dojo_opt.planning.options import Options, Stage
+from dojo_opt.planning.problem import Problem
+from sim.mechanism import checks
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+__all__ = ["Lead", "free_gait_mpc"]
+
+_KNOT, _HORIZON, _ITERATIONS = 0.025, 20, 2  # [s], knots, per tick
+_KAPPA = 1e-2  # [N s m] at 3e-3 and below the robot leans forward and stands: no gradient lifts a foot
+_POSE = (20.0, 20.0, 80.0, 10.0, 10.0, 10.0)  # [1/m^2], [1/rad^2] of the trunk; joints weigh 1
+_SETTLING = 30.0  # weights of coordinates over those of their rates
+_END = 10.0  # times the weights, at the end
+_ALIKE = 1e-2  # [1/(N m)^2]
+_SLIP, _NEAR = 3.0, 0.03  # [1/(m/s)^2], [m]
+_SERVO = 40.0, 1.0  # [N m/rad], [N m s/rad]
+_DIAGONAL = ((0, 3), (1, 2))  # legs in the order of the inputs
+_LEG = 3  # inputs of a leg: hip, thigh and calf
+
+
+class Lead:
+    """One pose that moves on at a commanded velocity, and waits for a robot that falls behind.
+
+    It is the same at all knots of a horizon, and at most `lead` ahead of where the robot is measured.
+
+    Args:
+        pose: (nx,) nominal state, whose base looks along x.
+        velocity: (3,) velocity of the base forward and to the left, and rate of its heading [m/s, m/s, rad/s].
+        lead: largest distance [m].
+
+    Raises:
+        ValueError: for a velocity of the wrong shape, or a distance that is not positive.
+    """
+
+    def __init__(self, pose: Vector, velocity: ArrayLike, lead: float) -> None:
+        self.velocity = checks.array("Lead(velocity)", velocity, (3,))
+        self.lead = checks.number("Lead(lead)", lead, above=0.0)
+        self._pose, self._time = pose.copy(), np.inf
+        self._begin(pose)
+
+    def _begin(self, x: Vector) -> None:
+        """Begin where the base of the state x (nx,) is."""
+        self._place = np.array(x[:2])
+        self._heading = float(2.0 * np.arctan2(x[6], x[3]))
+
+    def anchor(self, time: float, x: Vector) -> None:
+        """Move on.
+
+        Args:
+            time: beginning of the horizon [s].
+            x: (nx,) state there.
+        """
+        if time < self._time:
+            self._begin(x)
+            self._time = time
+        elapsed, self._time = time - self._time, time
+        c, s = np.cos(self._heading), np.sin(self._heading)
+        forward, left, turn = elapsed * self.velocity
+        ahead = self._place + (c * forward - s * left, s * forward + c * left) - x[:2]
+        self._place = x[:2] + ahead * min(1.0, self.lead / max(self.lead, float(np.hypot(*ahead))))
+        self._heading += turn
+
+    def __call__(self, times: ArrayLike) -> Matrix:
+        """The target.
+
+        Args:
+            times: (n,) times [s].
+
+        Returns:
+            (n, nx) states, all the same.
+        """
+        row = self._pose.copy()
+        row[:2] = self._place
+        row[3], row[6] = np.cos(0.5 * self._heading), np.sin(0.5 * self._heading)
+        return np.tile(row, (np.size(times), 1))
+
+
+def free_gait_mpc(
+    velocity: ArrayLike = (0.3, 0.0, 0.0),
+    *,
+    robot: Mechanism | None = None,
+    lead: float = 0.35,
+    effort: float = 2e-4,
+    **settings: Any,
+) -> MPC:
+    """A quadruped walks at a commanded velocity with no gait, footfall or swing given: 20 knots of 25 ms at 40 Hz.
+
+    The reference is one standing pose that moves on, see `Lead`. Squares of the trunk's position weigh 20, of its
+    height 80, of its rotation 10, of joint angles 1, rates a thirtieth of that, all of them ten times as much at the
+    end; torques weigh `effort`, the slip of feet near the ground 3, differences of torques between diagonal legs .01.
+    Costs are those of Kim et al. 2023 (arXiv 2312.08961), but for a slip that weighs three times as much, and no term
+    for long swings. Plans are made at a kappa of .01, where contact acts at a distance of a centimetre: it is this
+    smoothing that lets a foot leave the ground. Servos follow them on the plant, whose contact is hard.
+
+    Args:
+        velocity: (3,) velocity forward and to the left, and rate of the heading [m/s, m/s, rad/s].
+        robot: a mechanism with the joints and inputs of `models.quadruped` (default None: that).
+        lead: largest distance from the robot to the pose that it follows [m].
+        effort: weight of the torques [1/(N m)^2].
+        **settings: settings of `dojo.MPC`.
+
+    Returns:
+        The controller; `tasks.plant(mpc)` is a plant for it.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument of the wrong shape or out of range, or a robot with other inputs.
+    """
+    sim = Simulator(models.quadruped() if robot is None else robot, time_step=_KNOT, kappa=_KAPPA)
+    if sim.nu != 4 * _LEG or sim.nv != 6 + sim.nu:
+        raise ValueError(
+            f"tasks.free_gait_mpc(robot=...): expected a floating base and 12 driven joints, got {robot!r}"
+        )
+    pose = Feet(sim).put_down(sim.neutral())
+    weight = np.array([*_POSE, *np.ones(sim.nu)])
+    running = np.concatenate([weight, weight / _SETTLING])
+    cost = [
+        Tracking(pose, np.vstack([np.tile(running, (_HORIZON, 1)), _END * running])),
+        Effort(effort),
+        Slip(weight=_SLIP, near=_NEAR),
+        _alike(sim),
+    ]
+    problem = Problem(sim, pose, _HORIZON, cost=cost, controls0=equilibrium(sim, pose)[1])
+    usual: dict[str, Any] = {"iterations": _ITERATIONS, "kappa": _KAPPA, "servo": _SERVO}
+    usual |= {"first": Options(stages=(Stage(_KAPPA, _KAPPA),))}
+    return MPC(problem, reference={0: Lead(pose, velocity, lead)}, **{**usual, **settings})
+
+
+def _alike(sim: Simulator) -> ResidualCost:
+    """sum_t w |u_a - u_b|^2 over thighs and calves of diagonal legs a and b."""
+    rows = np.zeros((2 * len(_DIAGONAL), sim.nu))
+    for i, (a, b) in enumerate(_DIAGONAL):
+        for k in (1, 2):
+            rows[2 * i + k - 1, [_LEG * a + k, _LEG * b + k]] = 1.0, -1.0
+    count, nu, ndx = len(rows), sim.nu, sim.ndx
+
+    def difference(x, u, out):  # type: ignore[no-untyped-def]
+        for i in range(count):
+            out[i] = 0.0
+            for j in range(nu):
+                out[i] += rows[i, j] * u[j]
+
+    def slope(x, u, out):  # type: ignore[no-untyped-def]
+        for i in range(count):
+            out[i, :] = 0.0
+            for j in range(nu):
+                out[i, ndx + j] = rows[i, j]
+
+    return ResidualCost(difference, count, _ALIKE, slope, knots=range(_HORIZON))

@@ -1,0 +1,44 @@
+"""Multi-start: one plan from several guesses."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+
+
+def swing():
+    """A pendulum to a height that its torque cannot hold: guesses to the left and right end in different plans."""
+    sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.05)
+    goal = np.array([np.pi, 0.0])
+    cost = [dojo.cost.Tracking(goal, [0.1, 0.01]), dojo.cost.Effort(1e-3)]
+    return dojo.Problem(sim, sim.neutral(), 30, cost=cost, constraints=[dojo.constraint.Goal(goal)])
+
+
+def test_the_best_of_several_starts_is_returned():
+    """At least as good as the first, the same in threads as one after the other, and of the caller's problem."""
+    problem = swing()
+    one = dojo.ilqr(problem)
+    best = dojo.ilqr(problem, starts=4, seed=1)
+    with ThreadPoolExecutor(2) as pool:
+        spread = dojo.ilqr(problem, starts=4, seed=1, executor=pool)
+    other = dojo.ilqr(problem, starts=4, seed=2)
+    assert best.success and best.fun <= one.fun
+    assert np.array_equal(best.u, spread.u) and best.message == spread.message
+    assert best.problem is problem and best.simulator is problem.sim
+    assert "best of 4 starts" in best.message
+    assert other.fun <= one.fun
+
+
+def test_unsolved_starts_return_the_least_violation():
+    plan = dojo.ilqr(swing(), starts=3, max_iterations=1)
+    assert not plan.success
+    assert "0 of them solved" in plan.message
+    assert plan.violation <= dojo.ilqr(swing(), max_iterations=1).violation
+
+
+def test_starts_are_checked():
+    for wrong, error in (({"starts": 0}, ValueError), ({"seed": -1}, ValueError), ({"executor": 3}, TypeError)):
+        with pytest.raises(error, match="ilqr"):
+            dojo.ilqr(swing(), **wrong)
