@@ -23,7 +23,7 @@ import numpy as np
 
 import dojo_opt as dojo
 from dojo_opt.learn.gymnasium_tasks import TRANSFER
-from dojo_opt.learn.registration import TASKS
+from dojo_opt.learn.registration import task_of
 
 LOCOMOTION = dojo.learn.Randomisation(substeps=(2, 4), kappa=(10.0**-4, 10.0**-2.5))
 COARSE = dojo.learn.Randomisation(substeps=(2, 3), kappa=(10.0**-3.5, 1e-2))
@@ -59,7 +59,7 @@ def run(folder: Path, name: str, algorithm: str, seed: int, epochs: int | None) 
     path = folder / f"{name}_{algorithm}_{seed}.npz"
     if path.exists():
         return
-    task = getattr(dojo.learn, TASKS[name][0])()
+    task = task_of(name)
     options = SETTINGS[name][algorithm] | ({} if epochs is None else {"epochs": epochs})
     if algorithm == "best_of":
         trio = range(3 * seed, 3 * seed + 3)

@@ -16,6 +16,7 @@ from dojo_opt.learn.search import GradientSearchOptions, RandomSearchOptions, ar
 from dojo_opt.learn.seeds import best_of, seeds
 from dojo_opt.learn.shac import ShacOptions, shac
 from dojo_opt.learn.task import Task
+from dojo_opt.learn.velocity_task import quadruped
 
 if find_spec("gymnasium") is not None:
     from dojo_opt.learn.registration import register
@@ -45,6 +46,7 @@ __all__ = [
     "humanoid",
     "imitate",
     "pendulum",
+    "quadruped",
     "roll_policy_batch",
     "seeds",
     "shac",

@@ -2,7 +2,10 @@
 
     L(weights) = -1/(n H) sum_i [ sum_t gamma^t r_t + gamma^H V(x_H) ],   V trained on TD(lambda) returns
 
-A row of the batch goes on where the last epoch left it; the sums start anew where its episode ends.
+A row of the batch goes on where the last epoch left it; the sums start anew where its episode ends. The end of an
+episode has no derivative, so that a policy would learn to lunge into it. Where a task tells a smooth
+`survival_probability` s(x), the discount of all that follows a state is gamma s(x) instead of gamma, and is
+differentiated.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.discounted_sum import DiscountedSum
 from dojo_opt.learn.epochs import learn
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import ACTIVATIONS, Adam, Network, clipped
@@ -171,6 +175,7 @@ class _Shac(Training):
         if len(rows):
             states[rows] = self.task.starts([self.restarts] * len(rows))
             self.age[rows] = 0
+        self.task.redraw(states, self.age, [self.restarts] * len(states))
         return anew
 
     def train(self) -> dict[str, Any]:
@@ -180,7 +185,7 @@ class _Shac(Training):
         share = self.epoch / o.epochs
         deviation = o.deviation[0] + share * (o.deviation[1] - o.deviation[0])
         drawn = self.models.draw(self.rng, n)
-        noise = Noise.draw(self.rng, self.task, (o.horizon, n), (deviation, o.randomisation.noise))
+        noise = Noise.draw(self.rng, self.task, (o.horizon, n), deviation, o.randomisation)
         roll = roll_policy_batch(
             self.policy, self.x, o.horizon, drawn=drawn, noise=noise, slopes=True,
             kappa_grad=o.kappa_grad, restart=self.restart,
@@ -188,8 +193,9 @@ class _Shac(Training):
         self._count(roll)
         after, by_value = self.values(self.target, roll.after.reshape(o.horizon * n, -1), slopes=True)
         after, by_value = after.reshape(o.horizon, n), by_value.reshape(o.horizon, n, -1)
-        length, share_clipped = self._improve(roll, by_value, o.rate * (1.0 - share))
-        self._fit(roll, self._returns(roll, after))
+        total = DiscountedSum(roll, after, o.gamma)
+        length, share_clipped = self._improve(total, by_value, o.rate * (1.0 - share))
+        self._fit(roll, total.traced(o.trace))
         self.statistics.add(roll.observations.reshape(o.horizon * n, -1))
         self.x = roll.x[-1].copy()
         self.epoch += 1
@@ -207,34 +213,17 @@ class _Shac(Training):
             self.running[cut] = 0.0
         self.finished = self.finished[-self.options.environments :]
 
-    def _improve(self, roll: PolicyRollout, by_value: Floats, rate: float) -> tuple[float, float]:
+    def _improve(self, total: DiscountedSum, by_value: Floats, rate: float) -> tuple[float, float]:
         """Step of the policy: (length of the gradient, share of clipped costates)."""
         o = self.options
-        weights, ends = np.zeros_like(roll.rewards), np.zeros_like(by_value)
-        discount = np.ones(o.environments)
-        for t in range(o.horizon):
-            weights[t] = discount
-            last = roll.cut[t] | (t == o.horizon - 1)
-            going = last & ~roll.terminated[t] & ~roll.unsolved[t]
-            ends[t, going] = (o.gamma * discount)[going, None] * by_value[t, going]
-            discount = np.where(roll.cut[t], 1.0, o.gamma * discount)
-        found = roll.gradient(weights, ends, o.costate)
+        weights, ends = total.weights(by_value)
+        found = total.roll.gradient(weights, ends, o.costate)
         gradient, length = clipped(-found.weights / weights.size, o.norm)
         if np.isfinite(length):
             self.actor_adam.step(self.policy.weights, gradient, rate)
         else:
             self.infinite += 1
         return length, found.clipped / weights.size
-
-    def _returns(self, roll: PolicyRollout, after: Floats) -> Floats:
-        """TD(lambda) returns (T, n) from the values of the states after the steps."""
-        o = self.options
-        out, later = np.zeros_like(after), after[-1]
-        for t in range(o.horizon - 1, -1, -1):
-            later = np.where(roll.cut[t], after[t], (1.0 - o.trace) * after[t] + o.trace * later)
-            later = np.where(roll.terminated[t], 0.0, later)
-            out[t] = later = roll.rewards[t] + o.gamma * later
-        return out
 
     def _fit(self, roll: PolicyRollout, returns: Floats) -> None:
         """Steps of the critic towards the returns of solved steps, then of its target network."""

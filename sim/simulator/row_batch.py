@@ -6,17 +6,19 @@ from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import isfinite
+from threading import get_ident
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.integrators.batch import RowTables, linearize_rows, roll_rows
-from sim.integrators.rollout import BatchBuffers, Linearized
+from sim.integrators.rollout import BatchBuffers, Linearized, MotionBuffers
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
 from sim.model.pace import DEADLINE, pieces
-from sim.simulator.engine import DIVISIBLE, REPORT, Engine, finite_rows, refuse
+from sim.simulator.engine import DIVISIBLE, REPORT, Division, Engine, finite_rows, refuse
 from sim.simulator.link import link_gradient, link_step
 from sim.simulator.results import Result, ended
 from sim.simulator.state_space import StateSpace
@@ -45,6 +47,12 @@ class BatchStep(Result):
         return np.flatnonzero(self.status)
 
     __repr__ = brief_repr
+
+
+def _is_row(values: Any, size: int) -> bool:
+    """Whether it is an array (1, size) of finite floats, which needs no other check."""
+    fits = type(values) is np.ndarray and values.dtype == np.float64 and values.shape == (1, size)
+    return fits and isfinite(float(values.sum()))
 
 
 class RowModels:
@@ -195,6 +203,34 @@ class RowBatch:
                 x_next[rows] = found[:, -1]
 
 
+class SingleRow:
+    """Knots of one row after another, in buffers of its own: its threads and arrays would take as long as its steps.
+
+    Args:
+        engine: of a simulator.
+        steps: per knot.
+    """
+
+    def __init__(self, engine: Engine, steps: int) -> None:
+        self._engine, self._steps = engine, steps
+        xs, us, reports = np.empty((steps + 1, engine.nx)), np.empty((steps, engine.nu)), np.empty((steps, REPORT))
+        self._motion = MotionBuffers(xs, us, engine.external(None), reports, *engine.unkept)
+        self._division = Division.none(steps)
+        self._none = np.zeros((0, engine.ndx, engine.ndx)), np.zeros((0, engine.ndx, engine.nu))
+
+    def step(self, states: Floats, inputs: Floats) -> BatchStep:
+        """The knot of a row (1, nx) under inputs (1, nu)."""
+        xs, us, _, reports, *_ = self._motion
+        xs[0], us[:], reports[:] = states[0], inputs[0], 0.0
+        knot = self._engine.take_steps(self._engine.linked(link_step), self._motion, None, self._division)
+        last = reports[min(knot, self._steps - 1)]
+        status, iterations = last[:2].astype(np.int64)[:, None]
+        if knot == self._steps:
+            return BatchStep(xs[-1:].copy(), status, iterations, *self._none)
+        reason = MESSAGES[Status(int(status[0]))]
+        return BatchStep(states, status, iterations, *self._none, f"Simulator.step_batch: row 0: {reason}")
+
+
 class RowStepping(StateSpace):
     """Steps of independent rows, for simulators."""
 
@@ -231,11 +267,19 @@ class RowStepping(StateSpace):
             ValueError: a value is out of range, or has the wrong shape.
         """
         call = "Simulator.step_batch"
-        inputs = self._arguments.inputs("step_batch", "U", U, ("n", self.nu))
+        quick = _is_row(X, self.nx) and _is_row(U, self.nu)
+        inputs: Any = U if quick else self._arguments.inputs("step_batch", "U", U, ("n", self.nu))
         count = len(inputs)
-        states = self._arguments.states(f"{call}(X)", checks.array(f"{call}(X)", X, (count, self.nx)))
+        given: Any = X if quick else checks.array(f"{call}(X)", X, (count, self.nx))
+        states = self._arguments.states(f"{call}(X)", given)
         steps = checks.whole_number(f"{call}(substeps=...)", substeps)
-        if count == 1 and kappa is None and not parameters and not derivatives and self.order == 2:
+        if (
+            count == 1
+            and kappa is None
+            and not parameters
+            and not derivatives
+            and type(self._engine).roll is Engine.roll
+        ):
             return ended(self._step_row(states, inputs, steps), throw)
         kappas = np.full(count, np.nan)
         if kappa is not None:
@@ -252,23 +296,17 @@ class RowStepping(StateSpace):
             found = replace(found, detail=f"{call}: row {i}: {MESSAGES[reason]}")
         return ended(found, throw)
 
-    def _step_row(self, states: Floats, inputs: Floats, steps: int) -> BatchStep:
-        """The knot of a single row: threads would take longer to wake up."""
-        us = np.empty((steps, self.nu))
-        us[:] = inputs[0]
-        rolled = self._engine.roll(states[0], us)
-        report = rolled.reports[min(rolled.knot, steps - 1)]
-        solved = rolled.knot == steps
-        status = np.array([Status.SOLVED if solved else report[0]], dtype=np.int64)
-        detail = "" if solved else f"Simulator.step_batch: row 0: {MESSAGES[Status(int(report[0]))]}"
-        x = rolled.xs[-1:] if solved else states
-        A, B = self._no_derivatives
-        return BatchStep(x, status, report[1:2].astype(np.int64), A, B, detail)
-
     @cached_property
-    def _no_derivatives(self) -> tuple[Floats, Floats]:
-        """A and B of no rows."""
-        return np.zeros((0, self.ndx, self.ndx)), np.zeros((0, self.ndx, self.nu))
+    def _single_rows(self) -> dict[tuple[int, int], SingleRow]:
+        """By threads and numbers of steps."""
+        return {}
+
+    def _step_row(self, states: Floats, inputs: Floats, steps: int) -> BatchStep:
+        """The knot of a single row."""
+        key = get_ident(), steps
+        if key not in self._single_rows:
+            self._single_rows[key] = SingleRow(self._engine, steps)
+        return self._single_rows[key].step(states, inputs)
 
     @cached_property
     def _row_models(self) -> RowModels:
