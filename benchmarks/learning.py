@@ -22,31 +22,30 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
-from dojo_opt.learn.gymnasium_tasks import TRANSFER
+from dojo_opt.learn.gymnasium_tasks import BALANCE, TRANSFER
 from dojo_opt.learn.registration import task_of
 
-LOCOMOTION = dojo.learn.Randomisation(substeps=(2, 4), kappa=(10.0**-4, 10.0**-2.5))
-COARSE = dojo.learn.Randomisation(substeps=(2, 3), kappa=(10.0**-3.5, 1e-2))
-_RARELY: dict[str, Any] = {"evaluations": 3, "episodes": 4}  # an evaluation takes as long as several epochs
-SETTINGS: dict[str, dict[str, dict[str, Any]]] = {
+_RARELY: dict[str, Any] = {"evaluations": 5, "episodes": 4}  # an evaluation takes as long as several epochs
+SETTINGS: dict[str, dict[str, dict[str, Any]]] = {  # of shac, beside those of the task
     "HalfCheetah": {
-        "shac": {"epochs": 450, "environments": 32, "episode": 128, "randomisation": TRANSFER} | _RARELY,
-        "best_of": {"epochs": 450, "environments": 32, "episode": 128, "randomisation": TRANSFER} | _RARELY,
+        "shac": {},
+        "best_of": {"epochs": 450},
         "ars": {"epochs": 30, "rate": 0.02, "randomisation": TRANSFER} | _RARELY,
         "gradient_search": {"epochs": 60, "horizon": 80, "randomisation": TRANSFER} | _RARELY,
     },
     "Hopper": {
-        "shac": {"epochs": 450, "environments": 32, "horizon": 32, "gamma": 0.995, "randomisation": LOCOMOTION},
-        "ars": {"epochs": 100, "rate": 0.01, "noise": 0.025, "shift": 1.0, "randomisation": LOCOMOTION},
+        "shac": {},
+        "ars": {"epochs": 100, "rate": 0.01, "noise": 0.025, "shift": 1.0, "randomisation": BALANCE} | _RARELY,
     },
     "Walker2d": {
-        "shac": {"epochs": 450, "environments": 32, "horizon": 32, "gamma": 0.995, "randomisation": LOCOMOTION},
-        "ars": {"epochs": 100, "rate": 0.03, "noise": 0.025, "shift": 1.0, "randomisation": LOCOMOTION},
+        "shac": {},
+        "ars": {"epochs": 100, "rate": 0.03, "noise": 0.025, "shift": 1.0, "randomisation": BALANCE} | _RARELY,
     },
     "Ant": {
-        "shac": {"epochs": 450, "environments": 32, "episode": 128, "randomisation": COARSE},
-        "ars": {"epochs": 30, "rate": 0.015, "noise": 0.025, "shift": 1.0},
+        "shac": {},
+        "ars": {"epochs": 30, "rate": 0.015, "noise": 0.025, "shift": 1.0} | _RARELY,
     },
+    "Quadruped": {"shac": {}},
     "Pendulum": {"shac": {"epochs": 100}, "ars": {"epochs": 30}, "gradient_search": {"epochs": 100}},
     "Cartpole": {"shac": {"epochs": 100}, "ars": {"epochs": 30}},
 }
@@ -54,13 +53,13 @@ JUDGED = ("HalfCheetah", "Hopper", "Walker2d", "Ant")
 UNSEEN = ((10, 3e-5), (7, 2e-3))  # time steps per action, smoothing [N s m]
 
 
-def run(folder: Path, name: str, algorithm: str, seed: int, epochs: int | None) -> None:
+def run(folder: Path, name: str, algorithm: str, seed: int, given: dict[str, Any]) -> None:
     """One run, unless it is saved."""
     path = folder / f"{name}_{algorithm}_{seed}.npz"
     if path.exists():
         return
     task = task_of(name)
-    options = SETTINGS[name][algorithm] | ({} if epochs is None else {"epochs": epochs})
+    options = SETTINGS[name][algorithm] | given
     if algorithm == "best_of":
         trio = range(3 * seed, 3 * seed + 3)
         learned = dojo.learn.best_of(dojo.learn.shac, task, trio, verbose=True, **options)
@@ -140,13 +139,16 @@ def main() -> None:
     parser.add_argument("--algorithms", nargs="+", default=["shac"])
     parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2, 3, 4])
     parser.add_argument("--epochs", type=int, default=None)
+    parser.add_argument("--time-limit", type=float, default=None, help="of a run [s of processor time]")
     parser.add_argument("--only-figure", action="store_true")
     parser.add_argument("--table", action="store_true")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
+    limits = {"epochs": given.epochs, "time_limit": given.time_limit}
+    limits = {name: limit for name, limit in limits.items() if limit is not None}
     for algorithm in [] if given.only_figure or given.table else given.algorithms:
         for seed in given.seeds:
-            run(given.folder, given.task, algorithm, seed, given.epochs)
+            run(given.folder, given.task, algorithm, seed, limits)
     figure(given.folder, given.task)
     if given.table:
         table(given.folder, given.task)

@@ -16,7 +16,7 @@ from dojo_opt.learn.search import GradientSearchOptions, RandomSearchOptions, ar
 from dojo_opt.learn.seeds import best_of, seeds
 from dojo_opt.learn.shac import ShacOptions, shac
 from dojo_opt.learn.task import Task
-from dojo_opt.learn.velocity_task import quadruped
+from dojo_opt.learn.velocity_task import quadruped, velocity_error
 
 if find_spec("gymnasium") is not None:
     from dojo_opt.learn.registration import register
@@ -50,5 +50,6 @@ __all__ = [
     "roll_policy_batch",
     "seeds",
     "shac",
+    "velocity_error",
     "walker2d",
 ]

@@ -71,8 +71,8 @@ class _TaskEpisode:
         return observation, reward, over, late, {}
 
     def state(self) -> Vector:
-        """The present one."""
-        return self.x[0]
+        """The present one, of the simulator."""
+        return self.x[0, : self.sim.nx]
 
 
 class _ProblemEpisode:

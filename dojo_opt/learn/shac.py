@@ -273,7 +273,7 @@ def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options:
         task: what to learn.
         seed: of all random numbers; the same seed gives the same policy, to the last bit, on any number of cores.
         resume: a run to go on with, of the same task, seed and options: epochs that are done are not done again.
-        **options: fields of `ShacOptions`.
+        **options: fields of `ShacOptions`; by default those of `task.settings`.
 
     Returns:
         Learned, with the best of the evaluated policies.
@@ -282,4 +282,4 @@ def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options:
         TypeError: for an argument of the wrong kind.
         ValueError: for a value out of range, or a run that does not fit.
     """
-    return learn(_Shac, ShacOptions, task, seed, resume, options)
+    return learn(_Shac, ShacOptions, task, seed, resume, {**getattr(task, "settings", {}), **options})

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -167,6 +167,7 @@ class Task:
         commands: number of entries of a command (default 0).
         command: function of a generator that draws a command (commands,) (default None).
         hold: actions after which a command is drawn anew (default None: never; random search does not, either).
+        settings: options of `shac` that suit the task; those of a call come first (default: none).
     """
 
     sim: Simulator
@@ -185,6 +186,7 @@ class Task:
     commands: int = 0
     command: Callable[[np.random.Generator], Floats] | None = None
     hold: int | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     __repr__ = brief_repr
 

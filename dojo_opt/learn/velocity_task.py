@@ -20,7 +20,7 @@ from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
-__all__ = ["WALKING", "quadruped"]
+__all__ = ["WALKING", "quadruped", "velocity_error"]
 
 _TIME_STEP, _SUBSTEPS = 0.01, 2  # [s], per action
 _KAPPA = 1e-4  # [N s m]
@@ -41,13 +41,11 @@ WALKING = Randomisation(
 
 
 @kernel
-def in_body(q, v, out):  # type: ignore[no-untyped-def]
-    """out = R(q)^T v of a unit quaternion (w, x, y, z)."""
+def in_body(q, x, y, z):  # type: ignore[no-untyped-def]
+    """R(q)^T (x, y, z) of a unit quaternion (w, x, y, z), as three numbers: arrays would be allocated."""
     w, a, b, c = q[0], -q[1], -q[2], -q[3]
-    tx, ty, tz = 2.0 * (b * v[2] - c * v[1]), 2.0 * (c * v[0] - a * v[2]), 2.0 * (a * v[1] - b * v[0])
-    out[0] = v[0] + w * tx + b * tz - c * ty
-    out[1] = v[1] + w * ty + c * tx - a * tz
-    out[2] = v[2] + w * tz + a * ty - b * tx
+    tx, ty, tz = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)
+    return x + w * tx + b * tz - c * ty, y + w * ty + c * tx - a * tz, z + w * tz + a * ty - b * tx
 
 
 @kernel
@@ -58,12 +56,12 @@ def distance(error, width):  # type: ignore[no-untyped-def]
 
 def _observation(nq: int, home: tuple[float, ...]) -> Callable[..., Any]:
     """Direction of gravity and velocities as the trunk sees them, angles from the stance, their rates, the command."""
-    joints, up = nq - 7, (0.0, 0.0, 1.0)
+    joints = nq - 7
 
     def observation(x, out):  # type: ignore[no-untyped-def]
         q = x[3:7]
-        in_body(q, up, out[0:3])
-        in_body(q, x[nq : nq + 3], out[3:6])
+        out[0], out[1], out[2] = in_body(q, 0.0, 0.0, 1.0)
+        out[3], out[4], out[5] = in_body(q, x[nq], x[nq + 1], x[nq + 2])
         for k in range(3):
             out[6 + k] = x[nq + 3 + k]
             out[9 + k] = x[2 * nq - 1 + k]
@@ -76,17 +74,17 @@ def _observation(nq: int, home: tuple[float, ...]) -> Callable[..., Any]:
 
 def _reward(nq: int, height: float) -> Callable[..., Any]:
     """1 minus smooth distances from the command, minus what a trunk should not do, and effort."""
-    up, width = (0.0, 0.0, 1.0), _WIDTH
+    width = _WIDTH
 
     def reward(x, a, after):  # type: ignore[no-untyped-def]
-        q, v = after[3:7], np.empty(3)
-        in_body(q, after[nq : nq + 3], v)
+        q = after[3:7]
+        vx, vy, vz = in_body(q, after[nq], after[nq + 1], after[nq + 2])
         command = after[2 * nq - 1 :]
-        total = 1.0 - distance(np.hypot(v[0] - command[0], v[1] - command[1]), width)
+        total = 1.0 - distance(np.hypot(vx - command[0], vy - command[1]), width)
         total -= 0.5 * distance(after[nq + 5] - command[2], width)
-        total -= 0.5 * v[2] ** 2 + 0.02 * (after[nq + 3] ** 2 + after[nq + 4] ** 2)
-        in_body(q, up, v)
-        total -= 2.0 * (v[0] ** 2 + v[1] ** 2) + 20.0 * (after[2] - height) ** 2
+        total -= 0.5 * vz**2 + 0.02 * (after[nq + 3] ** 2 + after[nq + 4] ** 2)
+        ux, uy, _ = in_body(q, 0.0, 0.0, 1.0)
+        total -= 2.0 * (ux**2 + uy**2) + 20.0 * (after[2] - height) ** 2
         for i in range(a.shape[0]):
             total -= 0.01 * a[i] ** 2
         for i in range(nq + 6, 2 * nq - 1):
@@ -108,6 +106,27 @@ def _ends(height: float) -> tuple[Callable[..., Any], Callable[..., Any]]:
         return 1.0 / ((1.0 + np.exp((low - x[2]) / 0.01)) * (1.0 + np.exp((0.5 - up) / 0.05)))
 
     return terminated, survival_probability
+
+
+def velocity_error(x: ArrayLike, command: ArrayLike) -> Floats:
+    """Velocity of a floating base as it sees it, less the commanded one: forwards, to the left, and turning.
+
+    Args:
+        x: (..., nx) states of a robot with a floating base and hinges.
+        command: (..., 3) [m/s, m/s, rad/s].
+
+    Returns:
+        (..., 3) errors [m/s, m/s, rad/s].
+    """
+    states = np.asarray(x, dtype=np.float64)
+    nq = (states.shape[-1] + 1) // 2
+    w, a = states[..., 3:4], -states[..., 4:7]
+    v = states[..., nq : nq + 3]
+    t = 2.0 * np.cross(a, v)
+    own = v + w * t + np.cross(a, t)
+    seen = np.concatenate([own[..., :2], states[..., nq + 5 : nq + 6]], axis=-1)
+    out: Floats = seen - np.asarray(command, dtype=np.float64)
+    return out
 
 
 def quadruped(
@@ -161,4 +180,8 @@ def quadruped(
         _reward(nq, float(home[2])), home[7:] - reach, home[7:] + reach, start, terminated, steps=500,
         name=mech.name, survival_probability=survival_probability, commands=3,
         command=lambda rng: rng.uniform(-limits, limits), hold=_HOLD,
+        settings={
+            "epochs": 2000, "environments": 32, "horizon": 24, "evaluations": 5, "episodes": 16,
+            "randomisation": WALKING,
+        },
     )  # fmt: skip
