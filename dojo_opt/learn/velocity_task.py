@@ -73,14 +73,14 @@ def _observation(nq: int, home: tuple[float, ...]) -> Callable[..., Any]:
 
 
 def _reward(nq: int, height: float) -> Callable[..., Any]:
-    """1 minus smooth distances from the command, minus what a trunk should not do, and effort."""
+    """Minus smooth distances from the command, what a trunk should not do, and effort."""
     width = _WIDTH
 
     def reward(x, a, after):  # type: ignore[no-untyped-def]
         q = after[3:7]
         vx, vy, vz = in_body(q, after[nq], after[nq + 1], after[nq + 2])
         command = after[2 * nq - 1 :]
-        total = 1.0 - distance(np.hypot(vx - command[0], vy - command[1]), width)
+        total = -distance(np.hypot(vx - command[0], vy - command[1]), width)
         total -= 0.5 * distance(after[nq + 5] - command[2], width)
         total -= 0.5 * vz**2 + 0.02 * (after[nq + 3] ** 2 + after[nq + 4] ** 2)
         ux, uy, _ = in_body(q, 0.0, 0.0, 1.0)
@@ -103,7 +103,7 @@ def _ends(height: float) -> tuple[Callable[..., Any], Callable[..., Any]]:
 
     def survival_probability(x):  # type: ignore[no-untyped-def]
         up = 1.0 - 2.0 * (x[4] ** 2 + x[5] ** 2)
-        return 1.0 / ((1.0 + np.exp((low - x[2]) / 0.01)) * (1.0 + np.exp((0.5 - up) / 0.05)))
+        return 1.0 / ((1.0 + np.exp((low - x[2]) / 0.02)) * (1.0 + np.exp((0.5 - up) / 0.06)))
 
     return terminated, survival_probability
 
@@ -177,11 +177,11 @@ def quadruped(
 
     return Task(
         Simulator(mech, time_step=_TIME_STEP, kappa=_KAPPA), _SUBSTEPS, _observation(nq, tuple(home[7:])), 2 * nq - 2,
-        _reward(nq, float(home[2])), home[7:] - reach, home[7:] + reach, start, terminated, steps=500,
+        _reward(nq, float(home[2])), home[7:] - reach, home[7:] + reach, start, terminated, survival=1.0, steps=500,
         name=mech.name, survival_probability=survival_probability, commands=3,
         command=lambda rng: rng.uniform(-limits, limits), hold=_HOLD,
         settings={
-            "epochs": 2000, "environments": 32, "horizon": 24, "evaluations": 5, "episodes": 16,
+            "epochs": 1600, "environments": 32, "horizon": 24, "rate": 2e-3, "evaluations": 5, "episodes": 16,
             "randomisation": WALKING,
         },
     )  # fmt: skip

@@ -43,11 +43,11 @@ def test_the_best_reward_is_that_of_the_command(task):
     x[:, -3:] = x[:, task.sim.nq : task.sim.nq + 3] = 0.4, -0.2, 0.0
     still = np.zeros((1, task.sim.nu))
     best, slopes = task.rewards(x, still, x, slopes=True)
-    np.testing.assert_allclose(best, 1.0, atol=1e-6)
+    np.testing.assert_allclose(best, 0.0, atol=1e-6)
     n = task.sim.ndx
     np.testing.assert_allclose(slopes[0, n + task.sim.nu :], 0.0, atol=1e-6)
     x[:, -3] += 0.3
-    assert 0.7 < task.rewards(x, still, x)[0][0] < 0.8
+    assert -0.3 < task.rewards(x, still, x)[0][0] < -0.2
 
 
 def test_commands_change_in_batches_as_in_single_environments(task):
