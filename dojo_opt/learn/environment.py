@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from time import perf_counter, sleep
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.learn.randomisation import Drawn
 from dojo_opt.learn.task import Task
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.monte_carlo import Sampler
 from dojo_opt.plant.plant import Plant
 from dojo_opt.viewer.live import Live, live
 from sim.mechanism import checks
+from sim.simulator.row_batch import BatchStep
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
 
@@ -45,7 +46,7 @@ class _TaskEpisode:
         self.observations, self.steps, self.knot_time = task.observations, task.steps, task.knot_time
         self.edge, self.kind = np.ones(task.sim.nu), np.float32
         self.x, self._count = np.zeros((1, task.nx)), task.steps
-        self._model, self._rngs = Drawn.of(task), [np.random.default_rng()]
+        self._rngs, self._quick = [np.random.default_rng()], task.sim.has_single_rows
 
     def reset(self, rng: np.random.Generator) -> Vector:
         """To a first state."""
@@ -58,8 +59,8 @@ class _TaskEpisode:
         if self._count >= task.steps:
             raise RuntimeError("Environment.step: the episode is over; call reset()")
         given = np.array(action, dtype=np.float64)
-        found = self._model.step(before, task.inputs(_limited(given))[None])
-        self.x = found.x
+        found = self._step(before, given)
+        self.x = found.x if task.commands == 0 else np.concatenate([found.x, before[:, task.sim.nx :]], axis=1)
         self._count += 1
         late = self._count >= task.steps
         if found.status[0] != _SOLVED:
@@ -69,6 +70,14 @@ class _TaskEpisode:
             task.redraw(self.x, np.array([self._count]), self._rngs)
             observation = task.observe(self.x)[0][0]
         return observation, reward, over, late, {}
+
+    def _step(self, x: Vector, action: Vector) -> BatchStep:
+        """One action; checks of arguments take longer than their question."""
+        sim, steps = self.sim, self.task.substeps
+        if action.shape != (sim.nu,) or not isfinite(float(action.sum())):
+            raise ValueError(f"Environment.step(action): expected ({sim.nu},) finite numbers, got {action}")
+        inputs = self.task.inputs(_limited(action))[None]
+        return sim.single_row(steps).step(x, inputs) if self._quick else sim.step_batch(x[:, : sim.nx], inputs, steps)
 
     def state(self) -> Vector:
         """The present one, of the simulator."""

@@ -219,16 +219,26 @@ class SingleRow:
         self._none = np.zeros((0, engine.ndx, engine.ndx)), np.zeros((0, engine.ndx, engine.nu))
 
     def step(self, states: Floats, inputs: Floats) -> BatchStep:
-        """The knot of a row (1, nx) under inputs (1, nu)."""
+        """The knot of a row.
+
+        Args:
+            states: (1, nx) finite state; what follows it, as a command, is left aside.
+            inputs: (1, nu) finite inputs [N, N m].
+
+        Returns:
+            BatchStep without derivatives.
+        """
         xs, us, _, reports, *_ = self._motion
-        xs[0], us[:], reports[:] = states[0], inputs[0], 0.0
+        xs[0], us[:], reports[:] = states[0, : xs.shape[1]], inputs[0], 0.0
         knot = self._engine.take_steps(self._engine.linked(link_step), self._motion, None, self._division)
         last = reports[min(knot, self._steps - 1)]
         status, iterations = last[:2].astype(np.int64)[:, None]
         if knot == self._steps:
             return BatchStep(xs[-1:].copy(), status, iterations, *self._none)
         reason = MESSAGES[Status(int(status[0]))]
-        return BatchStep(states, status, iterations, *self._none, f"Simulator.step_batch: row 0: {reason}")
+        return BatchStep(
+            states[:, : xs.shape[1]], status, iterations, *self._none, f"Simulator.step_batch: row 0: {reason}"
+        )
 
 
 class RowStepping(StateSpace):
@@ -280,7 +290,7 @@ class RowStepping(StateSpace):
             and not derivatives
             and type(self._engine).roll is Engine.roll
         ):
-            return ended(self._step_row(states, inputs, steps), throw)
+            return ended(self.single_row(steps).step(states, inputs), throw)
         kappas = np.full(count, np.nan)
         if kappa is not None:
             if self.order > 2:
@@ -301,12 +311,30 @@ class RowStepping(StateSpace):
         """By threads and numbers of steps."""
         return {}
 
-    def _step_row(self, states: Floats, inputs: Floats, steps: int) -> BatchStep:
-        """The knot of a single row."""
-        key = get_ident(), steps
+    def single_row(self, substeps: int = 1) -> SingleRow:
+        """What `step_batch` uses for a single row, without checks of arguments: for loops of many short calls.
+
+        Args:
+            substeps: time steps per knot.
+
+        Returns:
+            SingleRow of this thread, whose `step(X, U)` takes finite (1, nx) and (1, nu).
+
+        Raises:
+            ValueError: substeps is not a whole number above 0, or the steps have an accuracy or a higher order.
+        """
+        key = get_ident(), substeps
         if key not in self._single_rows:
+            steps = checks.whole_number("Simulator.single_row(substeps)", substeps)
+            if not self.has_single_rows:
+                raise ValueError("Simulator.single_row: expected a simulator of order 2 without an accuracy")
             self._single_rows[key] = SingleRow(self._engine, steps)
-        return self._single_rows[key].step(states, inputs)
+        return self._single_rows[key]
+
+    @property
+    def has_single_rows(self) -> bool:
+        """Whether it has them: steps of order 2 without an accuracy."""
+        return type(self._engine).roll is Engine.roll
 
     @cached_property
     def _row_models(self) -> RowModels:
