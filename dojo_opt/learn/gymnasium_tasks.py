@@ -59,6 +59,7 @@ BALANCE = Randomisation(
     kappa=(2e-5, 1e-3),
     noise=0.02,
     by_row=False,
+    pushes=(0.5, (0.3, 0.1, 0.5)),  # without them, a walker may stand rigid until it falls in the direction it knows
 )
 COARSE = Randomisation(
     factors={"friction": (0.6, 1.2), "damper": (0.7, 1.3), "mass": (0.9, 1.1)},
