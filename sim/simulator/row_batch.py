@@ -61,12 +61,13 @@ class RowModels:
     def __init__(self, simulator: Any) -> None:
         self._simulator = simulator
         self._kept: OrderedDict[bytes, Engine] = OrderedDict()
+        self._sizes: dict[str, int] = {}
 
     def of(self, call: str, parameters: Mapping[str, ArrayLike] | None, count: int) -> tuple[list[Engine], Integers]:
         """Distinct engines, and which of them each of `count` rows has."""
         if not parameters:
             return [self._simulator._engine], np.zeros(count, dtype=np.int64)
-        sizes = {name: len(self._simulator.parameters((name,)).values) for name in parameters}
+        sizes = {name: self._size(name) for name in parameters}
         columns = []
         for name, values in parameters.items():
             given = checks.floats(f"{call}: {name!r}", values)
@@ -77,7 +78,7 @@ class RowModels:
                 raise ValueError(
                     f"{call}: {name!r}: expected shape ({count}, {sizes[name]}), or one row of it, got {given.shape}"
                 ) from None
-        rows, index = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)
+        rows, index = _distinct(np.concatenate(columns, axis=1))
         bounds = np.cumsum([0, *sizes.values()])
         engines = []
         for row in rows:
@@ -89,7 +90,21 @@ class RowModels:
             engines.append(self._kept[key])
         while len(self._kept) > max(_KEPT, len(rows)):
             self._kept.popitem(last=False)
-        return engines, index.reshape(-1)
+        return engines, index
+
+    def _size(self, name: str) -> int:
+        """Number of components of a parameter."""
+        if name not in self._sizes:
+            self._sizes[name] = len(self._simulator.parameters((name,)).values)
+        return self._sizes[name]
+
+
+def _distinct(rows: Floats) -> tuple[Floats, Integers]:
+    """The different rows, and which of them each is; mostly all are alike, which a comparison tells sooner."""
+    if len(rows) and (rows == rows[0]).all():
+        return rows[:1], np.zeros(len(rows), dtype=np.int64)
+    found, index = np.unique(rows, axis=0, return_inverse=True)
+    return found, index.reshape(-1)
 
 
 @dataclass(frozen=True)
