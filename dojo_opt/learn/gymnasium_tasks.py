@@ -71,7 +71,7 @@ COARSE = Randomisation(
 # Of shac; an evaluation takes as long as several epochs.
 _RARELY: dict[str, Any] = {"environments": 32, "evaluations": 5, "episodes": 4}
 _CHEETAH = {**_RARELY, "epochs": 450, "episode": 128, "randomisation": TRANSFER, "evaluations": 3}
-_LEGGED = {**_RARELY, "epochs": 800, "horizon": 32, "gamma": 0.998, "randomisation": BALANCE}
+_LEGGED = {**_RARELY, "epochs": 800, "horizon": 32, "gamma": 0.998, "saturation": 0.2, "randomisation": BALANCE}
 _ANT = {**_RARELY, "epochs": 700, "episode": 128, "rate": 3e-3, "randomisation": COARSE}
 
 

@@ -21,6 +21,7 @@ Flags = NDArray[np.bool_]
 __all__ = ["Noise", "PolicyGradient", "PolicyRollout", "roll_policy_batch"]
 
 _SPAN = 10.0  # as in policy.py
+_STEEP = 1.5  # outputs that are squashed to actions beyond 0.9
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,7 @@ class PolicyRollout:
         self.x = np.zeros((steps + 1, rows, self.task.nx))
         self.after = np.zeros((steps, rows, self.task.nx))
         self.observations = np.zeros((steps, rows, self.task.observations))
+        self.outputs = np.zeros((steps, rows, sim.nu))  # before they are squashed
         self.actions, self.rewards = np.zeros((steps, rows, sim.nu)), np.zeros((steps, rows))
         self.terminated, self.unsolved, self.cut = (np.zeros((steps, rows), dtype=np.bool_) for _ in range(3))
         self._slopes: list[tuple[Floats, ...]] = []
@@ -115,7 +117,7 @@ class PolicyRollout:
         y, kept = policy.network.forward(policy.weights, np.clip(scaled, -_SPAN, _SPAN))
         if noise is not None:
             y = y + noise.actions[t]
-        self.actions[t] = policy.squashed(y)
+        self.outputs[t], self.actions[t] = y, policy.squashed(y)
         if slopes:
             self._inside.append(np.abs(scaled) < _SPAN)
             self._kept.append(kept)
@@ -129,7 +131,9 @@ class PolicyRollout:
         """
         self._slopes.append(slopes)
 
-    def gradient(self, weights: Floats, ends: Floats | None = None, limit: float = np.inf) -> PolicyGradient:
+    def gradient(
+        self, weights: Floats, ends: Floats | None = None, limit: float = np.inf, saturation: float = 0.0
+    ) -> PolicyGradient:
         """Gradient of sum_t,i weights_ti r_ti + sum_t,i e_ti(after_ti), by one sweep from the end.
 
             l_t = A_t^T m_t + dr/dx + O_t^T dL/do_t,    m_t = l_t+1 + dr/dx' + e_t',    dL/da_t = B_t^T m_t + dr/da
@@ -138,6 +142,7 @@ class PolicyRollout:
             weights: (T, n) of the rewards.
             ends: (T, n, ndx) derivatives e' of further terms by the states after the steps.
             limit: length of the costate l of a row, beyond which it is shortened.
+            saturation: cost of outputs y beyond 1.5, this times (|y| - 1.5)^2, whose actions have hardly a derivative.
 
         Returns:
             The gradient, by the weights and by the first states.
@@ -157,6 +162,8 @@ class PolicyRollout:
             costate = np.matmul(after[:, None], A)[:, 0] + scale * reward[:, :ndx]
             a = self.actions[t]
             by_output = by_action * (np.abs(a) < 1.0 if policy.linear else 1.0 - a**2)
+            y = self.outputs[t]
+            by_output = by_output - 2.0 * saturation * np.sign(y) * np.maximum(np.abs(y) - _STEEP, 0.0)
             by_scaled = policy.network.backward(policy.weights, self._kept[t], by_output, out)
             costate += np.matmul((by_scaled * self._inside[t] / policy.deviation)[:, None], rates)[:, 0]
             length = np.sqrt(np.einsum("ni,ni->n", costate, costate))

@@ -57,6 +57,9 @@ class ShacOptions:
         betas: of Adam (default (0.7, 0.95)).
         norm: largest length of the gradient (default 1).
         costate: largest length of the costate of a row; longer ones are shortened and counted (default 100).
+        saturation: cost of outputs y of the network beyond 1.5, this times (|y| - 1.5)^2 in each step: squashed to
+            actions of nearly 1, they have hardly a derivative, and what a policy does there it can no longer unlearn
+            (default 0).
         deviation: first and last standard deviation of the noise of actions, before they are squashed (default .4, .3).
         passes: passes of the critic over the data of an epoch (default 4).
         batches: minibatches per pass (default 4).
@@ -85,6 +88,7 @@ class ShacOptions:
     betas: tuple[float, float] = (0.7, 0.95)
     norm: float = 1.0
     costate: float = 100.0
+    saturation: float = 0.0
     deviation: tuple[float, float] = (0.4, 0.3)
     passes: int = 4
     batches: int = 4
@@ -109,6 +113,7 @@ class ShacOptions:
             checks.share(f"shac({name}=...)", getattr(self, name))
         for name in ("rate", "critic_rate", "norm", "costate"):
             checks.number(f"shac({name}=...)", getattr(self, name), above=0.0)
+        checks.number("shac(saturation=...)", self.saturation, at_least=0.0)
         if not (self.start is None or isinstance(self.start, LearnedPolicy)):
             raise TypeError(f"shac(start=...): expected a LearnedPolicy, got {self.start!r}")
         if not isinstance(self.randomisation, Randomisation):
@@ -217,7 +222,7 @@ class _Shac(Training):
         """Step of the policy: (length of the gradient, share of clipped costates)."""
         o = self.options
         weights, ends = total.weights(by_value)
-        found = total.roll.gradient(weights, ends, o.costate)
+        found = total.roll.gradient(weights, ends, o.costate, o.saturation)
         gradient, length = clipped(-found.weights / weights.size, o.norm)
         if np.isfinite(length):
             self.actor_adam.step(self.policy.weights, gradient, rate)

@@ -86,9 +86,9 @@ def _reward(nq: int, height: float) -> Callable[..., Any]:
         ux, uy, _ = in_body(q, 0.0, 0.0, 1.0)
         total -= 2.0 * (ux**2 + uy**2) + 20.0 * (after[2] - height) ** 2
         for i in range(a.shape[0]):
-            total -= 0.04 * a[i] ** 2
-        for i in range(nq + 6, 2 * nq - 1):  # without it, robots hop on three legs with every action
-            total -= 2e-4 * after[i] ** 2 + 6e-4 * (after[i] - x[i]) ** 2
+            total -= 0.01 * a[i] ** 2
+        for i in range(nq + 6, 2 * nq - 1):
+            total -= 2e-4 * after[i] ** 2
         return total
 
     return reward
@@ -181,7 +181,7 @@ def quadruped(
         name=mech.name, survival_probability=survival_probability, commands=3,
         command=lambda rng: rng.uniform(-limits, limits), hold=_HOLD,
         settings={
-            "epochs": 1600, "environments": 32, "horizon": 24, "rate": 2e-3, "evaluations": 5, "episodes": 16,
+            "epochs": 1400, "environments": 32, "horizon": 24, "rate": 2e-3, "evaluations": 5, "episodes": 16,
             "randomisation": WALKING,
         },
     )  # fmt: skip

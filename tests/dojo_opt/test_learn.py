@@ -87,7 +87,9 @@ def test_gradients_of_returns_are_those_of_central_differences(hidden, activatio
     assert found.clipped == 0
 
 
-def test_a_smooth_probability_of_survival_has_the_derivative_of_what_it_makes_less(task):
+def test_a_smooth_probability_of_survival_has_the_derivative_of_what_it_makes_less():
+    task = _task(tolerance=1e-12)
+
     def survival_probability(x):
         return 1.0 / (1.0 + np.exp((abs(x[1]) - 8.0) / 4.0))
 
@@ -108,8 +110,18 @@ def test_a_smooth_probability_of_survival_has_the_derivative_of_what_it_makes_le
             policy.weights[i] = kept + step
             sides.append(total().first().sum())
         policy.weights[i] = kept
-        np.testing.assert_allclose(gradient[i], (sides[0] - sides[1]) / 2e-5, **ROOT)
+        np.testing.assert_allclose(gradient[i], (sides[0] - sides[1]) / 2e-5, **CLOSE)
     np.testing.assert_allclose(found.traced(1.0)[0], found.first())  # which the critic learns
+
+
+def test_saturated_outputs_cost_what_brings_them_back(task):
+    policy, starts = _policy(task), np.array([[0.25, -1.0], [0.8, 1.5]])
+    policy.weights[-1] = 4.0  # the bias of the output
+    roll = dojo.learn.roll_policy_batch(policy, starts, 1, slopes=True)
+    assert roll.outputs.min() > 1.5
+    nothing = np.zeros((1, 2))
+    pull = roll.gradient(nothing, saturation=0.1).weights[-1] - roll.gradient(nothing).weights[-1]
+    np.testing.assert_allclose(pull, -0.2 * (roll.outputs - 1.5).sum())
 
 
 def test_a_row_that_starts_anew_passes_no_gradient_back(task):
