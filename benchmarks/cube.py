@@ -29,7 +29,6 @@ H, HALF = 1.0 / 148.0, 0.0524  # [s], [m]
 GRID = (1, 2, 4, 8, 16, 40, 80, 120)
 NOISE = np.repeat((2e-3, 0.03, 0.1, 2.0), 3)  # [m, rad, m/s, rad/s]
 KAPPAS = (1e-5, 1e-6)
-FEW = 32  # tosses that the way from afar is found on
 PRIOR = {  # of a block of which a ruler, scales and a table of materials tell something
     "friction:*": (0.3, 0.3),  # dry plastics: 0.1 to 0.6
     "restitution:*": (0.2, 0.2),
@@ -98,13 +97,10 @@ def fit(motions: list[Floats], window: int, names: tuple[str, ...], known: bool)
         prior = {k: v for k, v in PRIOR.items() if any(label.startswith(k) for label in labels)}
         prior["contact_point"] = (HALF * np.array(list(product((-1.0, 1.0), repeat=3))).ravel(), PRIOR["contact_point"])
     data = [(xs, np.zeros((len(xs) - 1, 0))) for xs in motions]
-    wanted = ("friction:*", "restitution:*", "contact_point", *names)
-    common: dict[str, Any] = {"prior": prior, "noise": NOISE, "window": window, "every": 8, "tolerance": 5e-3}
-    common |= {"max_iterations": 8, "verbose": True}
-    few = dojo.identify(start, data[:FEW], wanted, kappas=KAPPAS, **common)
-    if len(data) <= FEW:
-        return few
-    return dojo.identify(few.simulator, data, wanted, kappas=KAPPAS[-1:], **common)  # a few of them lead near the end
+    return dojo.identify(
+        start, data, ("friction:*", "restitution:*", "contact_point", *names),
+        prior=prior, noise=NOISE, window=window, every=8, kappas=KAPPAS, tolerance=5e-3, max_iterations=8, verbose=True,
+    )  # fmt: skip
 
 
 def main() -> None:
