@@ -7,7 +7,7 @@ python benchmarks/learning.py DIR HalfCheetah --table           and tabulates it
 `best_of` with seed k begins with the seeds 3k, 3k + 1, 3k + 2 of SHAC. A run is DIR/TASK_ALGORITHM_SEED.npz, and its
 policy DIR/....policy.npz. For one core, set NUMBA_NUM_THREADS=1 and OPENBLAS_NUM_THREADS=1. Policies are also evaluated
 at time steps and smoothings that they have not learnt on, and in MuJoCo by benchmarks/evaluate_policy.py, which imports
-nothing of dojo-opt.
+nothing of dojo-opt. Runs of other libraries are those of benchmarks/learning_peers.py in the same folder.
 """
 
 from __future__ import annotations
@@ -20,47 +20,50 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import dojo_opt as dojo
-from dojo_opt.learn.gymnasium_tasks import TRANSFER
-from dojo_opt.learn.registration import TASKS
+from dojo_opt.learn.gymnasium_tasks import BALANCE, TRANSFER
+from dojo_opt.learn.registration import task_of
 
-LOCOMOTION = dojo.learn.Randomisation(substeps=(2, 4), kappa=(10.0**-4, 10.0**-2.5))
-COARSE = dojo.learn.Randomisation(substeps=(2, 3), kappa=(10.0**-3.5, 1e-2))
-_RARELY: dict[str, Any] = {"evaluations": 3, "episodes": 4}  # an evaluation takes as long as several epochs
-SETTINGS: dict[str, dict[str, dict[str, Any]]] = {
+Floats = NDArray[np.float64]
+
+_RARELY: dict[str, Any] = {"evaluations": 5, "episodes": 4}  # an evaluation takes as long as several epochs
+SETTINGS: dict[str, dict[str, dict[str, Any]]] = {  # of shac, beside those of the task
     "HalfCheetah": {
-        "shac": {"epochs": 450, "environments": 32, "episode": 128, "randomisation": TRANSFER} | _RARELY,
-        "best_of": {"epochs": 450, "environments": 32, "episode": 128, "randomisation": TRANSFER} | _RARELY,
+        "shac": {},
+        "best_of": {"epochs": 450},
         "ars": {"epochs": 30, "rate": 0.02, "randomisation": TRANSFER} | _RARELY,
         "gradient_search": {"epochs": 60, "horizon": 80, "randomisation": TRANSFER} | _RARELY,
     },
     "Hopper": {
-        "shac": {"epochs": 450, "environments": 32, "horizon": 32, "gamma": 0.995, "randomisation": LOCOMOTION},
-        "ars": {"epochs": 100, "rate": 0.01, "noise": 0.025, "shift": 1.0, "randomisation": LOCOMOTION},
+        "shac": {},
+        "ars": {"epochs": 100, "rate": 0.01, "noise": 0.025, "shift": 1.0, "randomisation": BALANCE} | _RARELY,
     },
     "Walker2d": {
-        "shac": {"epochs": 450, "environments": 32, "horizon": 32, "gamma": 0.995, "randomisation": LOCOMOTION},
-        "ars": {"epochs": 100, "rate": 0.03, "noise": 0.025, "shift": 1.0, "randomisation": LOCOMOTION},
+        "shac": {},
+        "ars": {"epochs": 100, "rate": 0.03, "noise": 0.025, "shift": 1.0, "randomisation": BALANCE} | _RARELY,
     },
     "Ant": {
-        "shac": {"epochs": 450, "environments": 32, "episode": 128, "randomisation": COARSE},
-        "ars": {"epochs": 30, "rate": 0.015, "noise": 0.025, "shift": 1.0},
+        "shac": {},
+        "ars": {"epochs": 30, "rate": 0.015, "noise": 0.025, "shift": 1.0} | _RARELY,
     },
+    "Quadruped": {"shac": {}},
     "Pendulum": {"shac": {"epochs": 100}, "ars": {"epochs": 30}, "gradient_search": {"epochs": 100}},
     "Cartpole": {"shac": {"epochs": 100}, "ars": {"epochs": 30}},
 }
+PEERS = ("ppo", "sac")  # of learning_peers.py
 JUDGED = ("HalfCheetah", "Hopper", "Walker2d", "Ant")
 UNSEEN = ((10, 3e-5), (7, 2e-3))  # time steps per action, smoothing [N s m]
 
 
-def run(folder: Path, name: str, algorithm: str, seed: int, epochs: int | None) -> None:
+def run(folder: Path, name: str, algorithm: str, seed: int, given: dict[str, Any]) -> None:
     """One run, unless it is saved."""
     path = folder / f"{name}_{algorithm}_{seed}.npz"
     if path.exists():
         return
-    task = getattr(dojo.learn, TASKS[name][0])()
-    options = SETTINGS[name][algorithm] | ({} if epochs is None else {"epochs": epochs})
+    task = task_of(name)
+    options = SETTINGS[name][algorithm] | given
     if algorithm == "best_of":
         trio = range(3 * seed, 3 * seed + 3)
         learned = dojo.learn.best_of(dojo.learn.shac, task, trio, verbose=True, **options)
@@ -78,37 +81,59 @@ def run(folder: Path, name: str, algorithm: str, seed: int, epochs: int | None) 
         )
 
 
-def figure(folder: Path, name: str) -> None:
-    """Median and range over seeds of each algorithm, of what is saved."""
+def saved(folder: Path, name: str, algorithm: str) -> list[Path]:
+    """Files of the runs."""
+    return sorted(p for p in folder.glob(f"{name}_{algorithm}_*.npz") if not p.name.endswith(".policy.npz"))
+
+
+def curve(path: Path) -> Floats:
+    """(n, 2) processor time [s] and return of a run."""
+    with np.load(path, allow_pickle=False) as data:
+        if "returns" in data:
+            return np.column_stack([data["seconds"], data["returns"]])
+    history = dojo.learn.Learned.load(path).history
+    return np.array([(r["seconds"], r["evaluated"]) for r in history if r["evaluated"] is not None])
+
+
+def figure(folder: Path, names: list[str]) -> None:
+    """Median and range over seeds of each algorithm, of what is saved; one panel per task."""
     from matplotlib.figure import Figure
 
-    page = Figure(figsize=(6.5, 4.0), layout="constrained")
-    axes = page.subplots()
-    for algorithm in SETTINGS[name]:
-        curves = []
-        for path in sorted(folder.glob(f"{name}_{algorithm}_*.npz")):
-            if path.name.endswith(".policy.npz"):
+    page = Figure(figsize=(5.0 * len(names) + 1.0, 4.0), layout="constrained")
+    for axes, name in zip(page.subplots(1, len(names), squeeze=False)[0], names, strict=True):
+        for algorithm in (*SETTINGS[name], *PEERS):
+            curves = [c for c in map(curve, saved(folder, name, algorithm)) if len(c)]
+            if not curves:
                 continue
-            history = dojo.learn.Learned.load(path).history
-            curves.append(np.array([(r["seconds"], r["evaluated"]) for r in history if r["evaluated"] is not None]))
-        if curves:
             rows = min(map(len, curves))
             seconds = np.median([c[:rows, 0] for c in curves], axis=0)
             returns = np.array([c[:rows, 1] for c in curves])
-            axes.plot(seconds, np.median(returns, axis=0), marker=".", label=f"{algorithm}, {len(curves)} seeds")
+            label = f"{algorithm}, {len(curves)} seed{'s' if len(curves) > 1 else ''}"
+            axes.plot(seconds, np.median(returns, axis=0), marker=".", label=label)
             axes.fill_between(seconds, returns.min(axis=0), returns.max(axis=0), alpha=0.2)
-    axes.set(xlabel="processor time [s]", ylabel="return in the task", title=name, xlim=(0.0, None))
-    axes.legend()
-    page.savefig(folder / f"{name}.png", dpi=150)
-    print(f"wrote {folder / f'{name}.png'}")
+        axes.set(xlabel="processor time [s]", ylabel="return in the task", title=name, xlim=(0.0, None))
+        if axes.lines:
+            axes.legend()
+    target = folder / f"{'_'.join(names)}.png"
+    page.savefig(target, dpi=150)
+    print(f"wrote {target}")
 
 
 def table(folder: Path, name: str) -> None:
     """Returns of all saved runs: here, and in MuJoCo where Gymnasium has the task."""
     rows: dict[str, Any] = {}
     print(f"{name}: return here (mean, least over seeds), minutes of a core, in MuJoCo, at a fifth of its time step")
+    for algorithm in PEERS:
+        ends = [curve(path)[-1] for path in saved(folder, name, algorithm)]
+        if ends:
+            seconds, best = np.array(ends).T
+            rows[algorithm] = {"returns": best.tolist(), "minutes": (seconds / 60.0).tolist()}
+            minutes = seconds.mean() / 60.0
+            print(
+                f"{algorithm:16} {len(ends)} seeds {best.mean():8.1f} {best.min():8.1f} {minutes:6.2f} min (its last)"
+            )
     for algorithm in SETTINGS[name]:
-        paths = sorted(p for p in folder.glob(f"{name}_{algorithm}_*.npz") if not p.name.endswith(".policy.npz"))
+        paths = saved(folder, name, algorithm)
         if not paths:
             continue
         runs = [dojo.learn.Learned.load(path) for path in paths]
@@ -140,14 +165,18 @@ def main() -> None:
     parser.add_argument("--algorithms", nargs="+", default=["shac"])
     parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2, 3, 4])
     parser.add_argument("--epochs", type=int, default=None)
+    parser.add_argument("--time-limit", type=float, default=None, help="of a run [s of processor time]")
     parser.add_argument("--only-figure", action="store_true")
+    parser.add_argument("--beside", nargs="*", choices=SETTINGS, default=[], help="further tasks of the figure")
     parser.add_argument("--table", action="store_true")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
+    limits = {"epochs": given.epochs, "time_limit": given.time_limit}
+    limits = {name: limit for name, limit in limits.items() if limit is not None}
     for algorithm in [] if given.only_figure or given.table else given.algorithms:
         for seed in given.seeds:
-            run(given.folder, given.task, algorithm, seed, given.epochs)
-    figure(given.folder, given.task)
+            run(given.folder, given.task, algorithm, seed, limits)
+    figure(given.folder, [given.task, *given.beside])
     if given.table:
         table(given.folder, given.task)
 

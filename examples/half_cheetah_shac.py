@@ -11,20 +11,10 @@ from _common import QUICK, finish
 from matplotlib.figure import Figure
 
 import dojo_opt as dojo
-from dojo_opt.learn.gymnasium_tasks import TRANSFER
 
 EPOCHS = 100 if QUICK else 450
 task = dojo.learn.half_cheetah()
-learned = dojo.learn.shac(
-    task,
-    seed=0,
-    epochs=EPOCHS,
-    environments=32,
-    episode=128,
-    randomisation=TRANSFER,
-    evaluations=3,
-    verbose=True,
-)
+learned = dojo.learn.shac(task, seed=0, epochs=EPOCHS, verbose=True)
 print(learned)
 learned.policy.save("half_cheetah_shac.npz")
 harder = dojo.learn.evaluate(learned.policy, episodes=4, seed=1, substeps=10, kappa=3e-5)  # never seen while learning

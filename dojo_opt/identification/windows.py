@@ -16,7 +16,7 @@ from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.planning.manifold import tangent_layout
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
-from sim.simulator.results import Trajectory, path_of
+from sim.simulator.results import Linearization, Trajectory, path_of
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
 
@@ -98,6 +98,13 @@ class Predictor:
         self._space, self._every = space, every
         self.measured = np.flatnonzero(np.isfinite(noise))
         self._scale = 1.0 / noise[self.measured]
+        self._found: Integers | None = None
+
+    def _layout(self, sim: Simulator) -> Integers:
+        """That of the tangent space, which is the same for all simulators of the space."""
+        if self._found is None:
+            self._found = tangent_layout(sim, sim.neutral())
+        return self._found
 
     def steps(self, window: Window) -> Integers:
         """The compared steps: the start, every so many, and the last one."""
@@ -108,9 +115,9 @@ class Predictor:
         self, sim: Simulator, theta: Floats, window: Window, start: Floats, kappa: float, slopes: bool
     ) -> WindowErrors:
         """Errors of a window from a start (nx,), and with `slopes` their derivatives."""
-        rows, space, ndx, n = self.steps(window), self._space, sim.ndx, len(theta)
+        rows, ndx, n = self.steps(window), sim.ndx, len(theta)
         if slopes:
-            xs, line = sim.linearize_rollout(start, window.u, kappa, space.wrt)
+            xs, line = sim.linearize_rollout(start, window.u, kappa, self._space.wrt)
             solved = not np.any(line.status)
         else:
             found = sim.rollout_batch(start[None], window.u[None])
@@ -119,16 +126,25 @@ class Predictor:
         scaled = errors[:, self.measured] * self._scale
         if not slopes:
             return WindowErrors(scaled, np.zeros((0, 0, ndx)), np.zeros((0, 0, n)), solved)
-        by_theta = space.chain(theta, {name: np.asarray(block) for name, block in line.parameters.items()})
-        S, P = np.eye(ndx), np.zeros((ndx, n))
-        moved = np.empty((len(rows), ndx, ndx + n))
-        k = 0
-        for t in range(len(window.u) + 1):
-            if t == rows[k]:
-                moved[k, :, :ndx], moved[k, :, ndx:] = S, P
-                k += 1
-            if t < len(window.u):
-                S, P = line.A[t] @ S, line.A[t] @ P + by_theta[t]
-        slope = difference_slopes(tangent_layout(sim, sim.neutral()), errors) @ moved
+        moved = self._moved(line, rows, theta)
+        slope = difference_slopes(self._layout(sim), errors) @ moved
         slope = slope[:, self.measured] * self._scale[:, None]
         return WindowErrors(scaled, slope[..., :ndx], slope[..., ndx:], solved)
+
+    def _moved(self, line: Linearization, rows: Integers, theta: Floats) -> Floats:
+        """(len(rows), ndx, ndx + n) derivatives of the states at some steps by the start and by theta."""
+        ndx = line.A.shape[1]
+        blocks = {name: np.asarray(block) for name, block in line.parameters.items()}
+        by_parameters = np.concatenate([*blocks.values(), np.zeros((len(line.A), ndx, 0))], axis=2)
+        width = ndx + by_parameters.shape[2]
+        slope, moved = np.eye(ndx, width), np.empty((len(rows), ndx, width))
+        k = 0
+        for t in range(len(line.A) + 1):
+            if t == rows[k]:
+                moved[k], k = slope, k + 1
+            if t < len(line.A):
+                slope = line.A[t] @ slope
+                slope[:, ndx:] += by_parameters[t]
+        ends = np.cumsum([ndx, *(block.shape[2] for block in blocks.values())])
+        compared = {name: moved[..., i:j] for name, i, j in zip(blocks, ends[:-1], ends[1:], strict=True)}
+        return np.concatenate([moved[..., :ndx], self._space.chain(theta, compared)], axis=2)

@@ -16,6 +16,7 @@ from dojo_opt.learn.search import GradientSearchOptions, RandomSearchOptions, ar
 from dojo_opt.learn.seeds import best_of, seeds
 from dojo_opt.learn.shac import ShacOptions, shac
 from dojo_opt.learn.task import Task
+from dojo_opt.learn.velocity_task import quadruped, velocity_error
 
 if find_spec("gymnasium") is not None:
     from dojo_opt.learn.registration import register
@@ -45,8 +46,10 @@ __all__ = [
     "humanoid",
     "imitate",
     "pendulum",
+    "quadruped",
     "roll_policy_batch",
     "seeds",
     "shac",
+    "velocity_error",
     "walker2d",
 ]

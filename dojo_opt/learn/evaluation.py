@@ -65,13 +65,15 @@ def evaluate(
     if substeps is not None:
         steps = whole_number("evaluate(substeps=...)", substeps)
         model = Drawn(task.sim.replace(time_step=task.knot_time / steps, kappa=task.sim.kappa), steps, None, {}, 0.0)
-    xs = task.starts([np.random.default_rng((seed, i)) for i in range(count)])
+    rngs = [np.random.default_rng((seed, i)) for i in range(count)]
+    xs = task.starts(rngs)
     returns, lengths, unsolved = np.zeros(count), np.zeros(count, dtype=np.int64), 0
     alive, path = np.arange(count), [xs[0].copy()]
-    for _ in range(task.steps):
+    for age in range(task.steps):
+        task.redraw(xs, np.full(count, age), rngs)
         x = xs[alive]
         actions = policy.actions(task.observe(x)[0])
-        found = model.sim.step_batch(x, task.inputs(actions), model.substeps, kappa=kappa)
+        found = model.step(x, task.inputs(actions), kappa=kappa)
         bad = found.status != Status.SOLVED
         over = task.ends(found.x)
         returns[alive] += np.where(bad, 0.0, task.rewards(x, actions, found.x)[0] + task.survival * ~over)

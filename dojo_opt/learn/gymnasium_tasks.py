@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.learn.randomisation import Randomisation
 from dojo_opt.learn.task import Task, never
+from dojo_opt.planning.residual import kernel
 from sim.io.mjcf.load import load_mjcf
 from sim.io.mjcf.report import MjcfMechanism, MjcfWarning
 from sim.mechanism.mechanism import Mechanism
@@ -42,6 +43,27 @@ TRANSFER = Randomisation(
     noise=0.05,
     by_row=False,
 )
+
+# The same for robots that fall: steps of milliseconds carry small impulses, which ask for a small kappa.
+BALANCE = Randomisation(
+    factors={"friction": (0.6, 1.2), "damper": (0.7, 1.3), "armature": (0.9, 1.1), "mass": (0.9, 1.1)},
+    substeps=(2, 2, 4),
+    kappa=(2e-5, 1e-3),
+    noise=0.02,
+    by_row=False,
+)
+COARSE = Randomisation(
+    factors={"friction": (0.6, 1.2), "damper": (0.7, 1.3), "mass": (0.9, 1.1)},
+    substeps=(2, 2, 3),
+    kappa=(10.0**-3.5, 1e-2),
+    noise=0.02,
+    by_row=False,
+)
+# Of shac; an evaluation takes as long as several epochs.
+_RARELY: dict[str, Any] = {"environments": 32, "evaluations": 5, "episodes": 4}
+_CHEETAH = {**_RARELY, "epochs": 450, "episode": 128, "randomisation": TRANSFER, "evaluations": 3}
+_LEGGED = {**_RARELY, "epochs": 800, "horizon": 32, "gamma": 0.997, "randomisation": BALANCE}
+_ANT = {**_RARELY, "epochs": 700, "episode": 128, "rate": 3e-3, "randomisation": COARSE}
 
 
 def _model(file: str) -> MjcfMechanism:
@@ -98,6 +120,12 @@ def _runs(time: float, effort: float) -> Callable[..., Any]:
     return reward
 
 
+@kernel
+def within(value, low, high, width):  # type: ignore[no-untyped-def]
+    """1 well between two bounds, 1/2 on them, 0 outside, over a few widths: a smooth probability of survival."""
+    return 1.0 / ((1.0 + np.exp((low - value) / width)) * (1.0 + np.exp((value - high) / width)))
+
+
 def _task(mech: MjcfMechanism, substeps: int, time_step: float, **fields: Any) -> Task:
     """A task of a model, with its gears as limits."""
     assert mech.report is not None
@@ -115,16 +143,17 @@ def half_cheetah() -> Task:
     return _task(
         mech, 5, 0.01, observation=_tailed(1, mech.nq, np.inf), observations=17, reward=_runs(0.05, 0.1),
         start=_starts(mech, 1, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)), name="HalfCheetah",
+        settings=_CHEETAH,
     )  # fmt: skip
 
 
-def _legged(name: str, file: str, observations: int, terminated: Callable[..., Any]) -> Task:
+def _legged(name: str, file: str, observations: int, *ends: Callable[..., Any]) -> Task:
     """A robot in a plane that moves forward on one leg or two, and ends where it falls."""
     mech = _model(file)
     return _task(
         mech, 4, 0.002, observation=_tailed(1, mech.nq, _FASTEST), observations=observations, reward=_runs(0.008, 1e-3),
-        start=_starts(mech, 1, 5e-3, lambda rng, n: rng.uniform(-5e-3, 5e-3, n)), terminated=terminated, survival=1.0,
-        name=name,
+        start=_starts(mech, 1, 5e-3, lambda rng, n: rng.uniform(-5e-3, 5e-3, n)), terminated=ends[0], survival=1.0,
+        survival_probability=ends[1], name=name, settings=_LEGGED,
     )  # fmt: skip
 
 
@@ -141,7 +170,10 @@ def hopper() -> Task:
                 return True
         return not (x[1] > 0.7 and abs(x[2]) < 0.2)
 
-    return _legged("Hopper", "hopper.xml", 11, terminated)
+    def survival_probability(x):  # type: ignore[no-untyped-def]
+        return within(x[1], 0.7, np.inf, 0.02) * within(x[2], -0.2, 0.2, 0.02)
+
+    return _legged("Hopper", "hopper.xml", 11, terminated, survival_probability)
 
 
 def walker2d() -> Task:
@@ -154,7 +186,10 @@ def walker2d() -> Task:
     def terminated(x):  # type: ignore[no-untyped-def]
         return not (0.8 < x[1] < 2.0 and abs(x[2]) < 1.0)
 
-    return _legged("Walker2d", "walker2d_v5.xml", 17, terminated)
+    def survival_probability(x):  # type: ignore[no-untyped-def]
+        return within(x[1], 0.8, 2.0, 0.03) * within(x[2], -1.0, 1.0, 0.08)
+
+    return _legged("Walker2d", "walker2d_v5.xml", 17, terminated, survival_probability)
 
 
 def ant() -> Task:
@@ -168,10 +203,13 @@ def ant() -> Task:
     def terminated(x):  # type: ignore[no-untyped-def]
         return not 0.2 <= x[2] <= 1.0
 
+    def survival_probability(x):  # type: ignore[no-untyped-def]
+        return within(x[2], 0.2, 1.0, 0.02)
+
     return _task(
         mech, 5, 0.01, observation=_tailed(2, mech.nq, np.inf), observations=27, reward=_runs(0.05, 0.5),
         start=_starts(mech, 2, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)), terminated=terminated, survival=1.0,
-        name="Ant",
+        survival_probability=survival_probability, name="Ant", settings=_ANT,
     )  # fmt: skip
 
 
@@ -193,6 +231,9 @@ def humanoid() -> Task:
     def terminated(x):  # type: ignore[no-untyped-def]
         return not 1.0 < x[2] < 2.0
 
+    def survival_probability(x):  # type: ignore[no-untyped-def]
+        return within(x[2], 1.0, 2.0, 0.03)
+
     def reward(x, a, after):  # type: ignore[no-untyped-def]
         total = 1.25 * (after[0] - x[0]) / 0.015
         for i in range(a.shape[0]):
@@ -202,7 +243,7 @@ def humanoid() -> Task:
     return _task(
         mech, 3, 0.005, observation=_tailed(2, mech.nq, np.inf), observations=45, reward=reward,
         start=_starts(mech, 2, 0.01, lambda rng, n: rng.uniform(-0.01, 0.01, n), home), terminated=terminated,
-        survival=5.0, name="Humanoid",
+        survival=5.0, survival_probability=survival_probability, name="Humanoid",
     )  # fmt: skip
 
 

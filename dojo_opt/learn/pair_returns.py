@@ -66,7 +66,7 @@ def pair_returns(shared: Shared, given: PairInputs, horizon: int, shift: float) 
         observed = task.observe(here)[0]
         seen.add(observed)
         actions = policy.actions(observed, weights[alive])
-        found = own.sim.step_batch(here, task.inputs(actions), own.substeps, False, own.kappa, own.parameters)
+        found = own.step(here, task.inputs(actions))
         bad, over = found.status != Status.SOLVED, task.ends(found.x)
         rewards = task.rewards(here, actions, found.x)[0] + task.survival * ~over - shift
         out[alive] += np.where(bad, 0.0, rewards)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -102,10 +103,10 @@ class LearnedPolicy:
         return np.clip(y, -1.0, 1.0) if self.linear else np.tanh(y)
 
     def __call__(self, x: ArrayLike) -> Floats:
-        """Input (nu,) for a state (nx,)."""
+        """Input (nu,) for a state (nx,) of the task: that of its simulator, followed by a command where it has one."""
         if self.task is None:
             raise ValueError("LearnedPolicy(x): a loaded policy has no task; LearnedPolicy.load(path, task)")
-        state = checks.array("LearnedPolicy(x)", x, (self.task.sim.nx,))
+        state = checks.array("LearnedPolicy(x)", x, (self.task.nx,))
         return self.task.inputs(self.action(self.task.observe(state[None])[0][0]))
 
     def controller(self, time: float, x: Floats) -> Floats:
@@ -119,6 +120,21 @@ class LearnedPolicy:
             (nu,) input [N, N m].
         """
         return self(x)
+
+    def commanded(self, command: ArrayLike | Callable[[float], ArrayLike]) -> Callable[[float, Floats], Floats]:
+        """A controller, as `dojo.closed_loop` takes one, that follows a command.
+
+        Args:
+            command: (task.commands,), or a function of time [s] with it.
+
+        Returns:
+            Function of (time, state (sim.nx,)) with the input (nu,) [N, N m].
+        """
+
+        def controller(time: float, x: Floats) -> Floats:
+            return self(np.concatenate([x, np.asarray(command(time) if callable(command) else command)]))
+
+        return controller
 
     @cached_property
     def _buffers(self) -> tuple[Any, Floats]:

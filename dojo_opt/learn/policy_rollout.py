@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
-from dojo_opt.learn.randomisation import Drawn
+from dojo_opt.learn.randomisation import Drawn, Randomisation
 from dojo_opt.learn.task import Task
 from sim.mechanism.brief import brief_repr
 from solvers.status import Status
@@ -21,24 +21,33 @@ Flags = NDArray[np.bool_]
 __all__ = ["Noise", "PolicyGradient", "PolicyRollout", "roll_policy_batch"]
 
 _SPAN = 10.0  # as in policy.py
+_STEEP = 1.5  # outputs that are squashed to actions beyond 0.9
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of a rollout: before the squashing of actions, and of scaled observations."""
+    """Noise of a rollout: before the squashing of actions, of scaled observations, and of velocities after actions."""
 
     actions: Floats  # (T, n, nu)
     observations: Floats  # (T, n, no)
+    pushes: Floats | None = None  # (T, n, nv) [m/s, rad/s]
 
     __repr__ = brief_repr
 
     @classmethod
     def draw(
-        cls, rng: np.random.Generator, task: Task, shape: tuple[int, int], deviations: tuple[float, float]
+        cls, rng: np.random.Generator, task: Task, shape: tuple[int, int], deviation: float, given: Randomisation
     ) -> Noise:
-        """Normal, with the deviations of actions and observations."""
-        actions = deviations[0] * rng.standard_normal((*shape, task.sim.nu))
-        return cls(actions, deviations[1] * rng.standard_normal((*shape, task.observations)))
+        """Normal noise of actions with a deviation, of observations and pushes with those of a randomisation."""
+        actions = deviation * rng.standard_normal((*shape, task.sim.nu))
+        observations, pushes = given.noise * rng.standard_normal((*shape, task.observations)), None
+        if given.pushes is not None:
+            mean_time, spread = given.pushes
+            pushed = rng.uniform(size=(*shape, 1)) < task.knot_time / mean_time
+            size = np.zeros(task.sim.nv)
+            size[: np.size(spread)] = spread
+            pushes = pushed * size * rng.standard_normal((*shape, task.sim.nv))
+        return cls(actions, observations, pushes)
 
 
 @dataclass(frozen=True)
@@ -79,9 +88,10 @@ class PolicyRollout:
         assert policy.task is not None
         self.policy, self.task = policy, policy.task
         sim = self.task.sim
-        self.x = np.zeros((steps + 1, rows, sim.nx))
-        self.after = np.zeros((steps, rows, sim.nx))
+        self.x = np.zeros((steps + 1, rows, self.task.nx))
+        self.after = np.zeros((steps, rows, self.task.nx))
         self.observations = np.zeros((steps, rows, self.task.observations))
+        self.outputs = np.zeros((steps, rows, sim.nu))  # before they are squashed
         self.actions, self.rewards = np.zeros((steps, rows, sim.nu)), np.zeros((steps, rows))
         self.terminated, self.unsolved, self.cut = (np.zeros((steps, rows), dtype=np.bool_) for _ in range(3))
         self._slopes: list[tuple[Floats, ...]] = []
@@ -107,7 +117,7 @@ class PolicyRollout:
         y, kept = policy.network.forward(policy.weights, np.clip(scaled, -_SPAN, _SPAN))
         if noise is not None:
             y = y + noise.actions[t]
-        self.actions[t] = policy.squashed(y)
+        self.outputs[t], self.actions[t] = y, policy.squashed(y)
         if slopes:
             self._inside.append(np.abs(scaled) < _SPAN)
             self._kept.append(kept)
@@ -121,7 +131,9 @@ class PolicyRollout:
         """
         self._slopes.append(slopes)
 
-    def gradient(self, weights: Floats, ends: Floats | None = None, limit: float = np.inf) -> PolicyGradient:
+    def gradient(
+        self, weights: Floats, ends: Floats | None = None, limit: float = np.inf, saturation: float = 0.0
+    ) -> PolicyGradient:
         """Gradient of sum_t,i weights_ti r_ti + sum_t,i e_ti(after_ti), by one sweep from the end.
 
             l_t = A_t^T m_t + dr/dx + O_t^T dL/do_t,    m_t = l_t+1 + dr/dx' + e_t',    dL/da_t = B_t^T m_t + dr/da
@@ -130,6 +142,7 @@ class PolicyRollout:
             weights: (T, n) of the rewards.
             ends: (T, n, ndx) derivatives e' of further terms by the states after the steps.
             limit: length of the costate l of a row, beyond which it is shortened.
+            saturation: cost of outputs y beyond 1.5, this times (|y| - 1.5)^2, whose actions have hardly a derivative.
 
         Returns:
             The gradient, by the weights and by the first states.
@@ -149,6 +162,8 @@ class PolicyRollout:
             costate = np.matmul(after[:, None], A)[:, 0] + scale * reward[:, :ndx]
             a = self.actions[t]
             by_output = by_action * (np.abs(a) < 1.0 if policy.linear else 1.0 - a**2)
+            y = self.outputs[t]
+            by_output = by_output - 2.0 * saturation * np.sign(y) * np.maximum(np.abs(y) - _STEEP, 0.0)
             by_scaled = policy.network.backward(policy.weights, self._kept[t], by_output, out)
             costate += np.matmul((by_scaled * self._inside[t] / policy.deviation)[:, None], rates)[:, 0]
             length = np.sqrt(np.einsum("ni,ni->n", costate, costate))
@@ -199,10 +214,10 @@ def roll_policy_batch(
     for t in range(steps):
         rates = out.act(t, noise, slopes)
         x, inputs = out.x[t], task.inputs(out.actions[t])
-        found = model.sim.step_batch(x, inputs, model.substeps, one_pass, model.kappa, model.parameters)
+        found = model.step(x, inputs, one_pass)
         A, B, unsolved = found.A, found.B, found.status != Status.SOLVED
         if slopes and not one_pass:
-            smooth = model.sim.step_batch(x, inputs, model.substeps, True, kappa_grad, model.parameters)
+            smooth = model.step(x, inputs, True, kappa_grad)
             A, B, unsolved = smooth.A, smooth.B, unsolved | (smooth.status != Status.SOLVED)
         out.after[t] = out.x[t + 1] = found.x
         out.rewards[t], by_reward = task.rewards(x, out.actions[t], found.x, slopes)
@@ -211,6 +226,8 @@ def roll_policy_batch(
         out.rewards[t, unsolved] = 0.0
         if slopes:
             out.keep(rates, A, B, by_reward)
+        if noise is not None and noise.pushes is not None:
+            out.x[t + 1, :, task.sim.nq : task.sim.nx] += noise.pushes[t]
         out.cut[t] = unsolved
         if restart is not None:
             out.cut[t] |= restart(t, out.terminated[t], unsolved, out.x[t + 1])

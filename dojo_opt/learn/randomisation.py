@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
+from sim.simulator.row_batch import BatchStep
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
@@ -29,6 +30,8 @@ class Randomisation:
         kappa: (low, high) of the smoothing [N s m], drawn by row and epoch, logarithmically (default None).
         noise: of observations, in their standard deviations (default 0).
         models: number of models per choice of substeps (default 16).
+        pushes: mean time between pushes [s], and the standard deviations of the changes that one makes to the first
+            velocities, such as the six of a floating base [m/s, rad/s] (default None: none).
         by_row: whether every row of an epoch has a model and a kappa of its own; otherwise all have one, drawn anew for
             the next epoch (default True).
     """
@@ -40,6 +43,7 @@ class Randomisation:
     noise: float = 0.0
     models: int = 16
     by_row: bool = True
+    pushes: tuple[float, ArrayLike] | None = None
 
     def __post_init__(self) -> None:
         for name, (low, high) in {**self.values, **self.factors}.items():
@@ -53,6 +57,9 @@ class Randomisation:
             raise ValueError(f"Randomisation(kappa=...): expected 0 < low <= high, got {self.kappa}")
         checks.number("Randomisation(noise=...)", self.noise, at_least=0.0)
         checks.whole_number("Randomisation(models=...)", self.models)
+        if self.pushes is not None:
+            checks.number("Randomisation(pushes=...)", self.pushes[0], above=0.0)
+            checks.floats("Randomisation(pushes=...)", self.pushes[1])
 
 
 class Models:
@@ -102,6 +109,12 @@ class Drawn:
     noise: float
 
     __repr__ = brief_repr
+
+    def step(self, xs: Floats, inputs: Floats, derivatives: bool = False, kappa: float | None = None) -> BatchStep:
+        """One action of every row, from states of the task to states of the task; a kappa instead of that of rows."""
+        nx, level = self.sim.nx, self.kappa if kappa is None else kappa
+        found = self.sim.step_batch(xs[:, :nx], inputs, self.substeps, derivatives, level, self.parameters)
+        return found if xs.shape[1] == nx else replace(found, x=np.concatenate([found.x, xs[:, nx:]], axis=1))
 
     def rows(self, chosen: NDArray[np.int64]) -> Drawn:
         """Those of some rows."""

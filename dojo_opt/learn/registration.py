@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -15,25 +16,25 @@ if TYPE_CHECKING:
     from dojo_opt.learn.task import Task
     from dojo_opt.learn.vector_environment import VectorEnvironment
 
-__all__ = ["TASKS", "environment", "register", "vector_environment"]
+__all__ = ["TASKS", "environment", "register", "task_of", "vector_environment"]
 
-TASKS = {  # name: function of gymnasium_tasks.py, steps of an episode
-    "HalfCheetah": ("half_cheetah", 1000),
-    "Hopper": ("hopper", 1000),
-    "Walker2d": ("walker2d", 1000),
-    "Ant": ("ant", 1000),
-    "Humanoid": ("humanoid", 1000),
-    "Cartpole": ("cartpole", 1000),
-    "Pendulum": ("pendulum", 200),
+TASKS = {  # name: module and function, steps of an episode
+    "HalfCheetah": ("gymnasium_tasks", "half_cheetah", 1000),
+    "Hopper": ("gymnasium_tasks", "hopper", 1000),
+    "Walker2d": ("gymnasium_tasks", "walker2d", 1000),
+    "Ant": ("gymnasium_tasks", "ant", 1000),
+    "Humanoid": ("gymnasium_tasks", "humanoid", 1000),
+    "Cartpole": ("gymnasium_tasks", "cartpole", 1000),
+    "Pendulum": ("gymnasium_tasks", "pendulum", 200),
+    "Quadruped": ("velocity_task", "quadruped", 500),
 }
 
 
 @cache
-def _task(name: str) -> Task:
+def task_of(name: str) -> Task:
     """One task for all environments of a process: its models and compiled functions are shared."""
-    from dojo_opt.learn import gymnasium_tasks
-
-    found: Task = getattr(gymnasium_tasks, TASKS[name][0])()
+    module, function, _ = TASKS[name]
+    found: Task = getattr(import_module(f"dojo_opt.learn.{module}"), function)()
     return found
 
 
@@ -41,20 +42,20 @@ def environment(task: str, render_mode: str | None = None) -> Environment:
     """A single environment."""
     from dojo_opt.learn.environment import Environment
 
-    return Environment(_task(task), render_mode=render_mode)
+    return Environment(task_of(task), render_mode=render_mode)
 
 
 def vector_environment(task: str, num_envs: int = 1, **options: Any) -> VectorEnvironment:
     """Many environments."""
     from dojo_opt.learn.vector_environment import VectorEnvironment
 
-    return VectorEnvironment(_task(task), num_envs, **options)
+    return VectorEnvironment(task_of(task), num_envs, **options)
 
 
 def register() -> None:
     """Register all names; those that are there stay."""
     here = "dojo_opt.learn.registration"
-    for name, (_, steps) in TASKS.items():
+    for name, (_, _, steps) in TASKS.items():
         if f"dojo/{name}-v0" not in gymnasium.registry:
             gymnasium.register(
                 f"dojo/{name}-v0",

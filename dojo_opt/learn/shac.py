@@ -2,7 +2,10 @@
 
     L(weights) = -1/(n H) sum_i [ sum_t gamma^t r_t + gamma^H V(x_H) ],   V trained on TD(lambda) returns
 
-A row of the batch goes on where the last epoch left it; the sums start anew where its episode ends.
+A row of the batch goes on where the last epoch left it; the sums start anew where its episode ends. The end of an
+episode has no derivative, so that a policy would learn to lunge into it. Where a task tells a smooth
+`survival_probability` s(x), the discount of all that follows a state is gamma s(x) instead of gamma, and is
+differentiated.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.discounted_sum import DiscountedSum
 from dojo_opt.learn.epochs import learn
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import ACTIVATIONS, Adam, Network, clipped
@@ -53,6 +57,9 @@ class ShacOptions:
         betas: of Adam (default (0.7, 0.95)).
         norm: largest length of the gradient (default 1).
         costate: largest length of the costate of a row; longer ones are shortened and counted (default 100).
+        saturation: cost of outputs y of the network beyond 1.5, this times (|y| - 1.5)^2 in each step: squashed to
+            actions of nearly 1, they have hardly a derivative, and what a policy does there it can no longer unlearn
+            (default 0).
         deviation: first and last standard deviation of the noise of actions, before they are squashed (default .4, .3).
         passes: passes of the critic over the data of an epoch (default 4).
         batches: minibatches per pass (default 4).
@@ -81,6 +88,7 @@ class ShacOptions:
     betas: tuple[float, float] = (0.7, 0.95)
     norm: float = 1.0
     costate: float = 100.0
+    saturation: float = 0.0
     deviation: tuple[float, float] = (0.4, 0.3)
     passes: int = 4
     batches: int = 4
@@ -105,6 +113,7 @@ class ShacOptions:
             checks.share(f"shac({name}=...)", getattr(self, name))
         for name in ("rate", "critic_rate", "norm", "costate"):
             checks.number(f"shac({name}=...)", getattr(self, name), above=0.0)
+        checks.number("shac(saturation=...)", self.saturation, at_least=0.0)
         if not (self.start is None or isinstance(self.start, LearnedPolicy)):
             raise TypeError(f"shac(start=...): expected a LearnedPolicy, got {self.start!r}")
         if not isinstance(self.randomisation, Randomisation):
@@ -171,6 +180,7 @@ class _Shac(Training):
         if len(rows):
             states[rows] = self.task.starts([self.restarts] * len(rows))
             self.age[rows] = 0
+        self.task.redraw(states, self.age, [self.restarts] * len(states))
         return anew
 
     def train(self) -> dict[str, Any]:
@@ -180,7 +190,7 @@ class _Shac(Training):
         share = self.epoch / o.epochs
         deviation = o.deviation[0] + share * (o.deviation[1] - o.deviation[0])
         drawn = self.models.draw(self.rng, n)
-        noise = Noise.draw(self.rng, self.task, (o.horizon, n), (deviation, o.randomisation.noise))
+        noise = Noise.draw(self.rng, self.task, (o.horizon, n), deviation, o.randomisation)
         roll = roll_policy_batch(
             self.policy, self.x, o.horizon, drawn=drawn, noise=noise, slopes=True,
             kappa_grad=o.kappa_grad, restart=self.restart,
@@ -188,8 +198,9 @@ class _Shac(Training):
         self._count(roll)
         after, by_value = self.values(self.target, roll.after.reshape(o.horizon * n, -1), slopes=True)
         after, by_value = after.reshape(o.horizon, n), by_value.reshape(o.horizon, n, -1)
-        length, share_clipped = self._improve(roll, by_value, o.rate * (1.0 - share))
-        self._fit(roll, self._returns(roll, after))
+        total = DiscountedSum(roll, after, o.gamma)
+        length, share_clipped = self._improve(total, by_value, o.rate * (1.0 - share))
+        self._fit(roll, total.traced(o.trace))
         self.statistics.add(roll.observations.reshape(o.horizon * n, -1))
         self.x = roll.x[-1].copy()
         self.epoch += 1
@@ -207,34 +218,17 @@ class _Shac(Training):
             self.running[cut] = 0.0
         self.finished = self.finished[-self.options.environments :]
 
-    def _improve(self, roll: PolicyRollout, by_value: Floats, rate: float) -> tuple[float, float]:
+    def _improve(self, total: DiscountedSum, by_value: Floats, rate: float) -> tuple[float, float]:
         """Step of the policy: (length of the gradient, share of clipped costates)."""
         o = self.options
-        weights, ends = np.zeros_like(roll.rewards), np.zeros_like(by_value)
-        discount = np.ones(o.environments)
-        for t in range(o.horizon):
-            weights[t] = discount
-            last = roll.cut[t] | (t == o.horizon - 1)
-            going = last & ~roll.terminated[t] & ~roll.unsolved[t]
-            ends[t, going] = (o.gamma * discount)[going, None] * by_value[t, going]
-            discount = np.where(roll.cut[t], 1.0, o.gamma * discount)
-        found = roll.gradient(weights, ends, o.costate)
+        weights, ends = total.weights(by_value)
+        found = total.roll.gradient(weights, ends, o.costate, o.saturation)
         gradient, length = clipped(-found.weights / weights.size, o.norm)
         if np.isfinite(length):
             self.actor_adam.step(self.policy.weights, gradient, rate)
         else:
             self.infinite += 1
         return length, found.clipped / weights.size
-
-    def _returns(self, roll: PolicyRollout, after: Floats) -> Floats:
-        """TD(lambda) returns (T, n) from the values of the states after the steps."""
-        o = self.options
-        out, later = np.zeros_like(after), after[-1]
-        for t in range(o.horizon - 1, -1, -1):
-            later = np.where(roll.cut[t], after[t], (1.0 - o.trace) * after[t] + o.trace * later)
-            later = np.where(roll.terminated[t], 0.0, later)
-            out[t] = later = roll.rewards[t] + o.gamma * later
-        return out
 
     def _fit(self, roll: PolicyRollout, returns: Floats) -> None:
         """Steps of the critic towards the returns of solved steps, then of its target network."""
@@ -284,7 +278,7 @@ def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options:
         task: what to learn.
         seed: of all random numbers; the same seed gives the same policy, to the last bit, on any number of cores.
         resume: a run to go on with, of the same task, seed and options: epochs that are done are not done again.
-        **options: fields of `ShacOptions`.
+        **options: fields of `ShacOptions`; by default those of `task.settings`.
 
     Returns:
         Learned, with the best of the evaluated policies.
@@ -293,4 +287,4 @@ def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options:
         TypeError: for an argument of the wrong kind.
         ValueError: for a value out of range, or a run that does not fit.
     """
-    return learn(_Shac, ShacOptions, task, seed, resume, options)
+    return learn(_Shac, ShacOptions, task, seed, resume, {**getattr(task, "settings", {}), **options})

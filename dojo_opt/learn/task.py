@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -84,6 +84,38 @@ def _reward_loop(reward: Callable[..., Any]) -> Any:
     return evaluate
 
 
+def _judge_loop(observation: Any, reward: Any, terminated: Any) -> Any:
+    @users_loop
+    def evaluate(x, a, after, work, out):  # type: ignore[no-untyped-def]
+        """(r(x, a, x'), whether the episode ends in x'), and out = o(x')."""
+        nx, m = x.shape[0], a.shape[0]
+        work[0, :nx], work[1, :m], work[2, :nx] = x, a, after
+        value = reward(work[0, :nx], work[1, :m], work[2, :nx])
+        over = terminated(work[2, :nx])
+        observation(work[2, :nx], out)
+        return value, over
+
+    return evaluate
+
+
+def _survival_loop(probability: Callable[..., Any]) -> Any:
+    @users_loop
+    def evaluate(layout, xs, work, values, slopes):  # type: ignore[no-untyped-def]
+        """values[i] = s(x_i), slopes[i] = ds/dx by central differences on the manifold."""
+        nx = xs.shape[1]
+        for row in range(xs.shape[0]):
+            work[0, :nx] = xs[row]
+            values[row] = probability(work[0, :nx])
+            for i in range(layout.shape[0]):
+                step = _STEP * max(1.0, abs(xs[row, layout[i]])) if layout[i] >= 0 else _STEP
+                displace(layout, xs[row], i, step, work[0, :nx])
+                ahead = probability(work[0, :nx])
+                displace(layout, xs[row], i, -step, work[0, :nx])
+                slopes[row, i] = (ahead - probability(work[0, :nx])) / (2.0 * step)
+
+    return evaluate
+
+
 def _end_loop(terminated: Callable[..., Any]) -> Any:
     @users_loop
     def evaluate(xs, out):  # type: ignore[no-untyped-def]
@@ -97,11 +129,11 @@ def _end_loop(terminated: Callable[..., Any]) -> Any:
 _loops: OrderedDict[Any, Any] = OrderedDict()  # by fingerprints, the most recently used last
 
 
-def _loop(make: Callable[[Any], Any], function: Callable[..., Any]) -> Any:
-    """The loop around a function; functions that compile to the same code share it."""
-    key = make, fingerprint(function)
+def _loop(make: Callable[..., Any], *functions: Callable[..., Any]) -> Any:
+    """The loop around functions; those that compile to the same code share it."""
+    key = make, tuple(fingerprint(function) for function in functions)
     if key not in _loops:
-        _loops[key] = make(kernel(function))
+        _loops[key] = make(*(kernel(function) for function in functions))
         if len(_loops) > _KEPT:
             _loops.popitem(last=False)
     _loops.move_to_end(key)
@@ -113,7 +145,8 @@ class Task:
     """What a policy observes, what it is rewarded for, and when an episode ends. Actions are in [-1, 1].
 
     The functions are compiled, as by `dojo.kernel`, and differentiated by central differences on the manifold of
-    states; they must not write into their arguments other than `out`.
+    states; they must not write into their arguments other than `out`. With a command, such as a velocity to keep, the
+    state x of the task is that of the simulator, followed by the command: x[sim.nx:].
 
     Attributes:
         sim: simulator.
@@ -128,6 +161,13 @@ class Task:
         survival: reward of every step that does not end the episode, beside `reward` (default 0).
         steps: actions after which an episode is cut off (default 1000).
         name: its name (default "task").
+        survival_probability: function of x with a smooth probability, from 0 to 1, that the episode goes on there: near
+            1 in safe states, small where `terminated` says that it ends. Where an episode ends is not differentiable:
+            `shac` learns in its place that what follows x counts times this probability (default None: 1 or 0).
+        commands: number of entries of a command (default 0).
+        command: function of a generator that draws a command (commands,) (default None).
+        hold: actions after which a command is drawn anew (default None: never; random search does not, either).
+        settings: options of `shac` that suit the task; those of a call come first (default: none).
     """
 
     sim: Simulator
@@ -142,6 +182,11 @@ class Task:
     survival: float = 0.0
     steps: int = 1000
     name: str = "task"
+    survival_probability: Callable[..., Any] | None = None
+    commands: int = 0
+    command: Callable[[np.random.Generator], Floats] | None = None
+    hold: int | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     __repr__ = brief_repr
 
@@ -153,6 +198,14 @@ class Task:
         for name in ("observation", "reward", "start", "terminated"):
             if not callable(getattr(self, name)):
                 raise TypeError(f"Task({name}=...): expected a function, got {getattr(self, name)!r}")
+        for name in ("survival_probability", "command"):
+            if not (getattr(self, name) is None or callable(getattr(self, name))):
+                raise TypeError(f"Task({name}=...): expected a function or None, got {getattr(self, name)!r}")
+        checks.whole_number("Task(commands=...)", self.commands, 0)
+        if (self.command is None) != (self.commands == 0):
+            raise ValueError("Task(commands=..., command=...): expected both or none")
+        if self.hold is not None:
+            checks.whole_number("Task(hold=...)", self.hold)
         for name in ("low", "high"):
             object.__setattr__(self, name, checks.array(f"Task({name}=...)", getattr(self, name), (self.sim.nu,)))
         if not np.all(self.low < self.high):
@@ -166,6 +219,11 @@ class Task:
     def _rebuild(cls, **given: Any) -> Task:
         """From the data of `__reduce__`."""
         return cls(**given)
+
+    @property
+    def nx(self) -> int:
+        """Size of a state: that of the simulator and of a command."""
+        return self.sim.nx + self.commands
 
     @property
     def knot_time(self) -> float:
@@ -189,8 +247,17 @@ class Task:
         return _loop(_end_loop, self.terminated)
 
     @cached_property
+    def _judge_loop(self) -> Any:
+        return _loop(_judge_loop, self.observation, self.reward, self.terminated)
+
+    @cached_property
+    def _survival_loop(self) -> Any:
+        assert self.survival_probability is not None
+        return _loop(_survival_loop, self.survival_probability)
+
+    @cached_property
     def _work(self) -> Floats:
-        return np.zeros((3, max(self.sim.nx, self.sim.nu, self.observations)))
+        return np.zeros((3, max(self.nx, self.sim.nu, self.observations)))
 
     def inputs(self, actions: Floats) -> Floats:
         """(..., nu) inputs of actions in [-1, 1] [N, N m].
@@ -255,6 +322,49 @@ class Task:
         self._end_loop(xs, out)
         return out
 
+    def judge(self, x: Floats, action: Floats, after: Floats) -> tuple[Floats, float, bool]:
+        """What follows from one action: (observation (no,), reward, whether the episode ends).
+
+        Args:
+            x: (nx,) state.
+            action: (nu,) in [-1, 1].
+            after: (nx,) state after the action.
+
+        Returns:
+            The observation after it, the reward with that of survival, and whether the episode ends.
+        """
+        observation = np.zeros(self.observations)
+        reward, over = self._judge_loop(x, action, after, self._work, observation)
+        return observation, float(reward) + (0.0 if over else self.survival), bool(over)
+
+    def survives(self, xs: Floats, ends: Flags) -> tuple[Floats, Floats]:
+        """(probabilities (n,) that episodes go on, their derivatives (n, ndx)).
+
+        Args:
+            xs: (n, nx) states.
+            ends: (n,) whether episodes end there.
+
+        Returns:
+            (n,) numbers from 0 to 1, and (n, ndx) derivatives: zero without `survival_probability`.
+        """
+        values: Floats = 1.0 - ends.astype(np.float64)
+        slopes = np.zeros((len(xs), self.sim.ndx))
+        if self.survival_probability is not None:
+            self._survival_loop(self._layout, xs, self._work.copy(), values, slopes)
+        return values, slopes
+
+    def first(self, rng: np.random.Generator) -> Floats:
+        """A first state, with a command where there is one.
+
+        Args:
+            rng: generator.
+
+        Returns:
+            (nx,) state.
+        """
+        x = checks.array("Task(start=...)", self.start(rng), (self.sim.nx,))
+        return x if self.command is None else np.concatenate([x, self._command(rng)])
+
     def starts(self, rngs: Any) -> Floats:
         """First states (n, nx), each from its own generator.
 
@@ -264,4 +374,21 @@ class Task:
         Returns:
             (n, nx) states.
         """
-        return np.array([checks.array("Task(start=...)", self.start(rng), (self.sim.nx,)) for rng in rngs])
+        return np.array([self.first(rng) for rng in rngs])
+
+    def _command(self, rng: np.random.Generator) -> Floats:
+        """A new command (commands,)."""
+        assert self.command is not None
+        return checks.array("Task(command=...)", self.command(rng), (self.commands,))
+
+    def redraw(self, xs: Floats, ages: Any, rngs: Any) -> None:
+        """Draw the commands of states anew where their episodes have lasted a multiple of `hold` actions.
+
+        Args:
+            xs: (n, nx) states, written in place.
+            ages: (n,) actions since the episodes began.
+            rngs: generators, one for each state.
+        """
+        if self.hold is not None and self.command is not None:
+            for i in np.flatnonzero((ages > 0) & (ages % self.hold == 0)):
+                xs[i, self.sim.nx :] = self._command(rngs[i])

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.randomisation import Drawn
 from dojo_opt.learn.task import Task
 from sim.mechanism.checks import whole_number
 from solvers.status import Status
@@ -47,7 +48,8 @@ class VectorEnvironment(VectorEnv if gymnasium else object):  # type: ignore[mis
         self.single_action_space = box(-1.0, 1.0, (task.sim.nu,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self.x, self._age = np.zeros((num_envs, task.sim.nx)), np.zeros(num_envs, dtype=np.int64)
+        self._model = Drawn.of(task)
+        self.x, self._age = np.zeros((num_envs, task.nx)), np.zeros(num_envs, dtype=np.int64)
         self._over = np.zeros(num_envs, dtype=np.bool_)
         self._generators = [np.random.default_rng() for _ in range(num_envs)]
         self.render_mode = None
@@ -74,7 +76,7 @@ class VectorEnvironment(VectorEnv if gymnasium else object):  # type: ignore[mis
     def _restart(self, mask: NDArray[np.bool_]) -> None:
         """First states where the mask says so."""
         for i in np.flatnonzero(mask):
-            self.x[i] = self.task.start(self._generators[i])
+            self.x[i] = self.task.first(self._generators[i])
         self._age[mask], self._over[mask] = 0, False
 
     def step(self, actions: Floats) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
@@ -87,12 +89,13 @@ class VectorEnvironment(VectorEnv if gymnasium else object):  # type: ignore[mis
         given = np.asarray(actions, dtype=np.float64).reshape(self.num_envs, task.sim.nu)
         rows = np.flatnonzero(~anew)
         before, acts = self.x[rows], given[rows]
-        found = task.sim.step_batch(before, task.inputs(np.clip(acts, -1.0, 1.0)), task.substeps)
+        found = self._model.step(before, task.inputs(np.clip(acts, -1.0, 1.0)))
         bad, ends = found.status != Status.SOLVED, task.ends(found.x)
         rewards, terminated = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=np.bool_)
         values = task.rewards(before, acts, found.x)[0] + task.survival * ~ends
         rewards[rows], terminated[rows] = np.where(bad, 0.0, values), ends | bad
         self.x[rows], self._age[rows] = found.x, self._age[rows] + 1
+        task.redraw(self.x, self._age, self._generators)
         truncated = self._age >= self._limit
         self._over = terminated | truncated
         observations = task.observe(self.x)[0]

@@ -6,17 +6,19 @@ from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import isfinite
+from threading import get_ident
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.integrators.batch import RowTables, linearize_rows, roll_rows
-from sim.integrators.rollout import BatchBuffers, Linearized
+from sim.integrators.rollout import BatchBuffers, Linearized, MotionBuffers
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
 from sim.model.pace import DEADLINE, pieces
-from sim.simulator.engine import DIVISIBLE, REPORT, Engine, finite_rows, refuse
+from sim.simulator.engine import DIVISIBLE, REPORT, Division, Engine, finite_rows, refuse
 from sim.simulator.link import link_gradient, link_step
 from sim.simulator.results import Result, ended
 from sim.simulator.state_space import StateSpace
@@ -47,18 +49,25 @@ class BatchStep(Result):
     __repr__ = brief_repr
 
 
+def _is_row(values: Any, size: int) -> bool:
+    """Whether it is an array (1, size) of finite floats, which needs no other check."""
+    fits = type(values) is np.ndarray and values.dtype == np.float64 and values.shape == (1, size)
+    return fits and isfinite(float(values.sum()))
+
+
 class RowModels:
     """Engines by values of parameters; those of the last rows are kept."""
 
     def __init__(self, simulator: Any) -> None:
         self._simulator = simulator
         self._kept: OrderedDict[bytes, Engine] = OrderedDict()
+        self._sizes: dict[str, int] = {}
 
     def of(self, call: str, parameters: Mapping[str, ArrayLike] | None, count: int) -> tuple[list[Engine], Integers]:
         """Distinct engines, and which of them each of `count` rows has."""
         if not parameters:
             return [self._simulator._engine], np.zeros(count, dtype=np.int64)
-        sizes = {name: len(self._simulator.parameters((name,)).values) for name in parameters}
+        sizes = {name: self._size(name) for name in parameters}
         columns = []
         for name, values in parameters.items():
             given = checks.floats(f"{call}: {name!r}", values)
@@ -69,7 +78,7 @@ class RowModels:
                 raise ValueError(
                     f"{call}: {name!r}: expected shape ({count}, {sizes[name]}), or one row of it, got {given.shape}"
                 ) from None
-        rows, index = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)
+        rows, index = _distinct(np.concatenate(columns, axis=1))
         bounds = np.cumsum([0, *sizes.values()])
         engines = []
         for row in rows:
@@ -81,7 +90,21 @@ class RowModels:
             engines.append(self._kept[key])
         while len(self._kept) > max(_KEPT, len(rows)):
             self._kept.popitem(last=False)
-        return engines, index.reshape(-1)
+        return engines, index
+
+    def _size(self, name: str) -> int:
+        """Number of components of a parameter."""
+        if name not in self._sizes:
+            self._sizes[name] = len(self._simulator.parameters((name,)).values)
+        return self._sizes[name]
+
+
+def _distinct(rows: Floats) -> tuple[Floats, Integers]:
+    """The different rows, and which of them each is; mostly all are alike, which a comparison tells sooner."""
+    if len(rows) and (rows == rows[0]).all():
+        return rows[:1], np.zeros(len(rows), dtype=np.int64)
+    found, index = np.unique(rows, axis=0, return_inverse=True)
+    return found, index.reshape(-1)
 
 
 @dataclass(frozen=True)
@@ -195,6 +218,44 @@ class RowBatch:
                 x_next[rows] = found[:, -1]
 
 
+class SingleRow:
+    """Knots of one row after another, in buffers of its own: its threads and arrays would take as long as its steps.
+
+    Args:
+        engine: of a simulator.
+        steps: per knot.
+    """
+
+    def __init__(self, engine: Engine, steps: int) -> None:
+        self._engine, self._steps = engine, steps
+        xs, us, reports = np.empty((steps + 1, engine.nx)), np.empty((steps, engine.nu)), np.empty((steps, REPORT))
+        self._motion = MotionBuffers(xs, us, engine.external(None), reports, *engine.unkept)
+        self._division = Division.none(steps)
+        self._none = np.zeros((0, engine.ndx, engine.ndx)), np.zeros((0, engine.ndx, engine.nu))
+
+    def step(self, states: Floats, inputs: Floats) -> BatchStep:
+        """The knot of a row.
+
+        Args:
+            states: (1, nx) finite state; what follows it, as a command, is left aside.
+            inputs: (1, nu) finite inputs [N, N m].
+
+        Returns:
+            BatchStep without derivatives.
+        """
+        xs, us, _, reports, *_ = self._motion
+        xs[0], us[:], reports[:] = states[0, : xs.shape[1]], inputs[0], 0.0
+        knot = self._engine.take_steps(self._engine.linked(link_step), self._motion, None, self._division)
+        last = reports[min(knot, self._steps - 1)]
+        status, iterations = last[:2].astype(np.int64)[:, None]
+        if knot == self._steps:
+            return BatchStep(xs[-1:].copy(), status, iterations, *self._none)
+        reason = MESSAGES[Status(int(status[0]))]
+        return BatchStep(
+            states[:, : xs.shape[1]], status, iterations, *self._none, f"Simulator.step_batch: row 0: {reason}"
+        )
+
+
 class RowStepping(StateSpace):
     """Steps of independent rows, for simulators."""
 
@@ -231,12 +292,20 @@ class RowStepping(StateSpace):
             ValueError: a value is out of range, or has the wrong shape.
         """
         call = "Simulator.step_batch"
-        inputs = self._arguments.inputs("step_batch", "U", U, ("n", self.nu))
+        quick = _is_row(X, self.nx) and _is_row(U, self.nu)
+        inputs: Any = U if quick else self._arguments.inputs("step_batch", "U", U, ("n", self.nu))
         count = len(inputs)
-        states = self._arguments.states(f"{call}(X)", checks.array(f"{call}(X)", X, (count, self.nx)))
+        given: Any = X if quick else checks.array(f"{call}(X)", X, (count, self.nx))
+        states = self._arguments.states(f"{call}(X)", given)
         steps = checks.whole_number(f"{call}(substeps=...)", substeps)
-        if count == 1 and kappa is None and not parameters and not derivatives and self.order == 2:
-            return ended(self._step_row(states, inputs, steps), throw)
+        if (
+            count == 1
+            and kappa is None
+            and not parameters
+            and not derivatives
+            and type(self._engine).roll is Engine.roll
+        ):
+            return ended(self.single_row(steps).step(states, inputs), throw)
         kappas = np.full(count, np.nan)
         if kappa is not None:
             if self.order > 2:
@@ -252,23 +321,35 @@ class RowStepping(StateSpace):
             found = replace(found, detail=f"{call}: row {i}: {MESSAGES[reason]}")
         return ended(found, throw)
 
-    def _step_row(self, states: Floats, inputs: Floats, steps: int) -> BatchStep:
-        """The knot of a single row: threads would take longer to wake up."""
-        us = np.empty((steps, self.nu))
-        us[:] = inputs[0]
-        rolled = self._engine.roll(states[0], us)
-        report = rolled.reports[min(rolled.knot, steps - 1)]
-        solved = rolled.knot == steps
-        status = np.array([Status.SOLVED if solved else report[0]], dtype=np.int64)
-        detail = "" if solved else f"Simulator.step_batch: row 0: {MESSAGES[Status(int(report[0]))]}"
-        x = rolled.xs[-1:] if solved else states
-        A, B = self._no_derivatives
-        return BatchStep(x, status, report[1:2].astype(np.int64), A, B, detail)
-
     @cached_property
-    def _no_derivatives(self) -> tuple[Floats, Floats]:
-        """A and B of no rows."""
-        return np.zeros((0, self.ndx, self.ndx)), np.zeros((0, self.ndx, self.nu))
+    def _single_rows(self) -> dict[tuple[int, int], SingleRow]:
+        """By threads and numbers of steps."""
+        return {}
+
+    def single_row(self, substeps: int = 1) -> SingleRow:
+        """What `step_batch` uses for a single row, without checks of arguments: for loops of many short calls.
+
+        Args:
+            substeps: time steps per knot.
+
+        Returns:
+            SingleRow of this thread, whose `step(X, U)` takes finite (1, nx) and (1, nu).
+
+        Raises:
+            ValueError: substeps is not a whole number above 0, or the steps have an accuracy or a higher order.
+        """
+        key = get_ident(), substeps
+        if key not in self._single_rows:
+            steps = checks.whole_number("Simulator.single_row(substeps)", substeps)
+            if not self.has_single_rows:
+                raise ValueError("Simulator.single_row: expected a simulator of order 2 without an accuracy")
+            self._single_rows[key] = SingleRow(self._engine, steps)
+        return self._single_rows[key]
+
+    @property
+    def has_single_rows(self) -> bool:
+        """Whether it has them: steps of order 2 without an accuracy."""
+        return type(self._engine).roll is Engine.roll
 
     @cached_property
     def _row_models(self) -> RowModels:

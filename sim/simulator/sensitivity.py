@@ -14,9 +14,11 @@ from sim.derivatives.parameters.parameter_jacobian import parameter_jacobian
 from sim.derivatives.parameters.parameters import ParameterPlan
 from sim.derivatives.parameters.terrain_parameters import height_gradients
 from sim.integrators.adjoint import Sweep, sweep
+from sim.integrators.parameter_roll import ParameterColumns, roll_columns
+from sim.integrators.rollout import MotionBuffers
 from sim.mechanism.mechanism import Mechanism
 from sim.model.pace import pieces
-from sim.simulator.engine import CONTACT, DIVISIBLE, REPORT, Divided, Division, Engine, Rolled
+from sim.simulator.engine import CONTACT, DIVISIBLE, REPORT, Divided, Division, Engine, Rolled, refuse
 from sim.simulator.link import link_heights, link_parameters
 from solvers.status import Status
 from solvers.types import Vector
@@ -145,16 +147,40 @@ def roll_parameters(
     xs, reports = np.zeros((n + 1, engine.nx)), np.zeros((n, REPORT))
     A, B = np.zeros((n, engine.ndx, engine.ndx)), np.zeros((n, engine.ndx, engine.nu))
     J = np.zeros((n, engine.ndx, request.plan.size))
-    xs[0], knot = x, n
-    for t, u in enumerate(us):
-        A[t], B[t], xs[t + 1], reports[t], J[t] = step_slopes(engine, request, (xs[t], u, wrenches[t : t + 1]), kappa)
-        if reports[t, 0] == Status.SOLVED and not np.isfinite(J[t]).all():
-            reports[t, 0] = Status.NOT_FINITE
-        if reports[t, 0] != Status.SOLVED:
-            knot = t
-            break
+    xs[0], knot = x, 0
+    quick = type(engine).roll is Engine.roll and not len(request.plan.heights)
+    while knot < n:
+        if quick:
+            motion = MotionBuffers(
+                xs[knot:], us[knot:], wrenches[knot:], reports[knot:], engine.unkept[0], A[knot:], B[knot:]
+            )
+            knot += _whole_steps(engine, request.plan, motion, J[knot:], kappa)
+        if knot < n:
+            if quick and int(reports[knot, 0]) not in DIVISIBLE:
+                break
+            step = xs[knot], us[knot], wrenches[knot : knot + 1]
+            found = step_slopes(engine, request, step, kappa, whole=not quick)
+            A[knot], B[knot], xs[knot + 1], reports[knot], J[knot] = found
+            if reports[knot, 0] == Status.SOLVED and not np.isfinite(J[knot]).all():
+                reports[knot, 0] = Status.NOT_FINITE
+            if reports[knot, 0] != Status.SOLVED:
+                break
+            knot += 1
     contacts = np.zeros((0, engine.sizes.ncontact, CONTACT))
     return Rolled(knot, xs, reports, contacts, A, B, Division.none(n)), J
+
+
+def _whole_steps(engine: Engine, plan: ParameterPlan, motion: MotionBuffers, J: Floats, kappa: float | None) -> int:
+    """The number of steps, from the first one on, that are solved as a whole, with their derivatives."""
+    steps, done = len(motion.us), 0
+    model, data = engine.tables(link_parameters)
+    columns = ParameterColumns(plan.terms, plan.weights, J, np.zeros((_TWISTS, 6)), np.zeros(engine.sizes.nbody))
+    settings = engine.settings.array(kappa)
+    for _ in pieces(settings, steps):
+        done = int(roll_columns(model, data, settings, motion, columns, done))
+        if done == steps or motion.reports[done, 0] != Status.SOLVED:
+            break
+    return refuse(motion.reports, done, motion.A[:done], motion.B[:done], J[:done])
 
 
 def _add_heights(mech: Mechanism, plan: ParameterPlan, coefficients: Floats, out: Floats) -> None:

@@ -13,7 +13,7 @@ gymnasium = pytest.importorskip("gymnasium")
 pytest.importorskip("mujoco")
 from gymnasium.vector import AutoresetMode  # noqa: E402
 
-NAMES = ("Pendulum", "Cartpole", "HalfCheetah", "Hopper", "Walker2d", "Ant", "Humanoid")
+NAMES = ("Pendulum", "Cartpole", "HalfCheetah", "Hopper", "Walker2d", "Ant", "Humanoid", "Quadruped")
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")  # that observations have no bounds; faults are assertions

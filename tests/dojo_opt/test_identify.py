@@ -102,3 +102,21 @@ def test_derivatives_of_differences_are_those_of_central_differences():
 def test_bad_arguments_are_named(change, message):
     with pytest.raises(ValueError, match=message):
         dojo.identify(_arm(), _motions(_arm(), np.random.default_rng(0), 0.0), ("damper",), **change)
+
+
+def test_a_quadruped_finds_payload_friction_and_damping_in_its_own_log():
+    plan = dojo.ilqr(dojo.problems.trot())
+    sim = dojo.problems.trot().sim
+    truth = {"mass:trunk": 7.5, "friction:*": 0.35, "damper:FL_thigh": 0.15}
+    rng = np.random.default_rng(0)
+    start = sim.integrate(plan.x[0], 0.01 * rng.standard_normal(sim.ndx))
+    motion = sim.with_parameters(truth).closed_loop(start, plan.u, plan.x, Ks=plan.K)
+    assert motion.success
+    noise = np.repeat((1e-3, 3e-3, 2e-3, 0.02, 0.03, 0.05), (3, 3, 12) * 2)  # [m, rad, rad, and their rates]
+    measured = sim.integrate(motion.x, noise * rng.standard_normal((len(motion.x), sim.ndx)))
+    found = dojo.identify(sim, [(measured, motion.u)], tuple(truth), noise=noise, window=10)
+    assert found.success and found.labels == tuple(truth)
+    values = np.array(list(truth.values()))
+    assert np.all(np.abs(found.start - values) > 0.1 * values)
+    np.testing.assert_array_less(np.abs(found.values - values), 4.0 * found.deviation)
+    np.testing.assert_array_less(found.deviation, 0.1 * values)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from dojo_opt.learn.discounted_sum import DiscountedSum
 from dojo_opt.learn.network import Network, perceptron
 from dojo_opt.learn.policy_rollout import Noise
 from dojo_opt.learn.randomisation import Models
@@ -62,7 +63,7 @@ def test_gradients_of_returns_are_those_of_central_differences(hidden, activatio
     task = _task(tolerance=1e-12)
     policy, rng = _policy(task, hidden, activation), np.random.default_rng(6)
     starts, weights = task.starts([rng] * 3), rng.uniform(0.5, 1.0, (6, 3))
-    noise = Noise.draw(rng, task, (6, 3), (0.1, 0.02))
+    noise = Noise.draw(rng, task, (6, 3), 0.1, dojo.learn.Randomisation(noise=0.02))
     seeds = rng.standard_normal((6, 3, task.sim.ndx))
 
     def value(states):
@@ -84,6 +85,43 @@ def test_gradients_of_returns_are_those_of_central_differences(hidden, activatio
             e[row, j] = 1e-5
             np.testing.assert_allclose(found.states[row, j], (value(starts + e) - value(starts - e)) / 2e-5, **CLOSE)
     assert found.clipped == 0
+
+
+def test_a_smooth_probability_of_survival_has_the_derivative_of_what_it_makes_less():
+    task = _task(tolerance=1e-12)
+
+    def survival_probability(x):
+        return 1.0 / (1.0 + np.exp((abs(x[1]) - 8.0) / 4.0))
+
+    mortal = replace(task, survival=5.0, survival_probability=survival_probability)
+    policy, starts, by_state = _policy(mortal), np.array([[0.25, -1.0], [0.8, 1.5]]), np.array([0.3, -0.2])
+
+    def total(slopes=False):
+        roll = dojo.learn.roll_policy_batch(policy, starts, 6, slopes=slopes)
+        after = 5.0 + roll.after @ by_state
+        return DiscountedSum(roll, after, 0.9)
+
+    found = total(slopes=True)
+    assert found.survival.min() < 0.9 and found.follows.min() > 0.0
+    gradient = found.roll.gradient(*found.weights(np.broadcast_to(by_state, (6, 2, 2)))).weights
+    for i in range(0, policy.network.count, 3):
+        kept, sides = policy.weights[i], []
+        for step in (1e-5, -1e-5):
+            policy.weights[i] = kept + step
+            sides.append(total().first().sum())
+        policy.weights[i] = kept
+        np.testing.assert_allclose(gradient[i], (sides[0] - sides[1]) / 2e-5, **CLOSE)
+    np.testing.assert_allclose(found.traced(1.0)[0], found.first())  # which the critic learns
+
+
+def test_saturated_outputs_cost_what_brings_them_back(task):
+    policy, starts = _policy(task), np.array([[0.25, -1.0], [0.8, 1.5]])
+    policy.weights[-1] = 4.0  # the bias of the output
+    roll = dojo.learn.roll_policy_batch(policy, starts, 1, slopes=True)
+    assert roll.outputs.min() > 1.5
+    nothing = np.zeros((1, 2))
+    pull = roll.gradient(nothing, saturation=0.1).weights[-1] - roll.gradient(nothing).weights[-1]
+    np.testing.assert_allclose(pull, -0.2 * (roll.outputs - 1.5).sum())
 
 
 def test_a_row_that_starts_anew_passes_no_gradient_back(task):

@@ -1,0 +1,89 @@
+"""PPO and SAC of Stable-Baselines3 on the same environments, as long as they are given, with its own settings.
+
+python benchmarks/learning_peers.py DIR HalfCheetah --algorithms ppo sac --seeds 0 --seconds 180
+
+Needs `pip install stable-baselines3`. A run is DIR/TASK_ALGORITHM_SEED.npz with `seconds` of processor time, `steps`
+and the mean `returns` of four episodes without noise; `benchmarks/learning.py DIR TASK --table` shows it beside the
+others. For one core, set NUMBA_NUM_THREADS=1 and OMP_NUM_THREADS=1. Published returns of these algorithms take
+a million steps and more: runs of minutes on one core show what minutes give, and not what the algorithms can do.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+import dojo_opt.learn  # noqa: F401 - registers the environments
+
+EPISODES, MARKS = 4, 5
+
+
+def assessed(model: Any, env: gymnasium.Env[Any, Any]) -> float:
+    """Mean return of a few episodes without noise."""
+    total = 0.0
+    for k in range(EPISODES):
+        observation, _ = env.reset(seed=1000 + k)
+        over = False
+        while not over:
+            action, _ = model.predict(observation, deterministic=True)
+            observation, reward, terminated, truncated, _ = env.step(action)
+            total += float(reward)
+            over = terminated or truncated
+    return total / EPISODES
+
+
+def run(folder: Path, name: str, algorithm: str, seed: int, seconds: float) -> None:
+    """One run, unless it is saved."""
+    import torch
+    from stable_baselines3 import PPO, SAC
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    path = folder / f"{name}_{algorithm}_{seed}.npz"
+    if path.exists():
+        return
+    torch.set_num_threads(1)
+    rows: list[tuple[float, int, float]] = []
+    judge = gymnasium.make(f"dojo/{name}-v0")
+
+    class Marks(BaseCallback):
+        """Evaluates at a few moments, and ends the run at the last of them."""
+
+        def _on_step(self) -> bool:
+            spent = time.process_time() - began
+            if spent >= (len(rows) + 1) * seconds / MARKS:
+                rows.append((spent, self.num_timesteps, assessed(self.model, judge)))
+                print(f"{name} {algorithm} seed {seed}: {rows[-1]}", flush=True)
+            return len(rows) < MARKS
+
+    env = gymnasium.make(f"dojo/{name}-v0")
+    model = {"ppo": PPO, "sac": SAC}[algorithm]("MlpPolicy", env, seed=seed, device="cpu")
+    env.reset(seed=seed)
+    env.step(np.zeros(env.action_space.shape or (), dtype=np.float32))  # compiled before the clock starts
+    began = time.process_time()
+    model.learn(total_timesteps=10**9, callback=Marks())
+    spent, steps, returns = np.array(rows).T
+    np.savez(path, seconds=spent, steps=steps, returns=returns)
+
+
+def main() -> None:
+    """Run and save."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("task")
+    parser.add_argument("--algorithms", nargs="+", choices=("ppo", "sac"), default=["ppo", "sac"])
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0])
+    parser.add_argument("--seconds", type=float, default=180.0, help="of processor time")
+    given = parser.parse_args()
+    given.folder.mkdir(parents=True, exist_ok=True)
+    for algorithm in given.algorithms:
+        for seed in given.seeds:
+            run(given.folder, given.task, algorithm, seed, given.seconds)
+
+
+if __name__ == "__main__":
+    main()
