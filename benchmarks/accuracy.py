@@ -1,4 +1,4 @@
-"""Error asked for against error got, and processor time, beside the best fixed order and step, and MuJoCo's RK4.
+"""Requested against achieved error, and processor time, compared with the best fixed order and step, and MuJoCo's RK4.
 
     python benchmarks/accuracy.py --match pendulum                  some of the motions
     python benchmarks/accuracy.py --figure accuracy.png             error against processor time
@@ -7,9 +7,9 @@ An error is the largest of a joint coordinate in the end [m, rad], over the seco
 solutions of balls and blocks; order 8 with small steps without contact; else order 2 at 10 us with the least kappa. The
 error of a reference is its difference from that with steps twice as long: accuracies below three times it are left out.
 
-Cost: processor time of the whole motion over that of the cheapest fixed order and step, or step of RK4, whose error is
-not larger; nan where none has it. Bounces of MuJoCo are not comparable. `told`: the estimated error over the one asked,
-from `errors` of the result: above 1, the motion says that it missed.
+Cost: processor time of the whole motion, relative to the cheapest fixed order and step, or step of RK4, with an error
+no larger; nan where there is none. Bounces of MuJoCo are not comparable. `told`: the estimated error of the result
+(`errors`) over the requested one: above 1, the motion reports a miss.
 """
 
 from __future__ import annotations
@@ -276,7 +276,7 @@ def draw(curves: dict[str, dict[str, Points]]) -> Any:
 
 
 def run(args: argparse.Namespace) -> Report:
-    """Every motion whose name contains `match`, at every accuracy."""
+    """Every motion with `match` in its name, at every accuracy."""
     report, lines, curves = Report("Accuracy on request", ""), [], {}
     for make in progress()([(f"motion {k}", m) for k, m in enumerate(motions(args.quick))], "motions"):
         motion = make()
@@ -313,7 +313,7 @@ def run(args: argparse.Namespace) -> Report:
 def main(argv: list[str] | None = None) -> int:
     """Print or write the report."""
     arguments = parser(__doc__)
-    arguments.add_argument("--match", default="", help="only motions whose name contains this")
+    arguments.add_argument("--match", default="", help="only motions with this in their name")
     arguments.add_argument("--figure", metavar="FILE", help="draw error against processor time")
     return deliver("accuracy", run, arguments, argv)
 

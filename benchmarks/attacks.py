@@ -1,4 +1,4 @@
-"""Random mechanisms in random states: what a step, a motion and a derivative must never do, counted.
+"""Random mechanisms in random states: count the failures of steps, motions and derivatives.
 
     python benchmarks/attacks.py                 2000 steps, 10,000 motions, 300 derivatives
     python benchmarks/attacks.py --quick         40, 60 and 10
@@ -64,7 +64,7 @@ def momentum_error(sim: dojo.Simulator, x: Vector, result: Any) -> float:
 
 
 def judge_step(sim: dojo.Simulator, x: Vector) -> str:
-    """What one step did: the name of its status, or of what it must not do."""
+    """Outcome of one step: the name of its status, or of its failure."""
     try:
         result = sim.step(x)
     except Exception as error:  # whatever it is, it is counted

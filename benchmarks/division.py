@@ -103,7 +103,7 @@ def _files() -> list[tuple[str, Callable[[], Motion]]]:
 
 
 def motions() -> list[tuple[str, Callable[[], Motion]]]:
-    """Names, and what sets them up."""
+    """Names and functions that set up the motions."""
     chains = ((5, 10.0, 100.0), (10, 10.0, 100.0), (50, 2.5, 10.0), (100, 1.0, 5.0))
     return [
         *(
@@ -120,15 +120,15 @@ def motions() -> list[tuple[str, Callable[[], Motion]]]:
 
 def clocked(sim: dojo.Simulator, x: Vector, us: Vector) -> tuple[dojo.Trajectory, float]:
     """(motion, processor time of a step [us])."""
-    sim.rollout(x, us)  # compiles what it divides with
+    sim.rollout(x, us)  # compile the division too
     begin = time.process_time()
     motion = sim.rollout(x, us)
     return motion, 1e6 * (time.process_time() - begin) / max(motion.knot, 1)
 
 
 def run(args: argparse.Namespace) -> Report:
-    """Every motion whose name contains `match`."""
-    warnings.simplefilter("ignore")  # what files of robots say
+    """Every motion with `match` in its name."""
+    warnings.simplefilter("ignore")  # warnings about robots' files
     report = Report("Steps that are divided", "")
     chosen = [(name, (name, build)) for name, build in motions() if args.match in name]
     lines, refused = [], 0
@@ -162,7 +162,7 @@ def run(args: argparse.Namespace) -> Report:
 def main(argv: list[str] | None = None) -> int:
     """Print or write the report."""
     arguments = parser(__doc__)
-    arguments.add_argument("--match", default="", help="only motions whose name contains this")
+    arguments.add_argument("--match", default="", help="only motions with this in their name")
     return deliver("division", run, arguments, argv)
 
 

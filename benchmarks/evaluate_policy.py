@@ -41,7 +41,7 @@ def load(path: str) -> Callable[[Floats], Floats]:
 
 
 def returns(task: str, act: Callable[[Floats], Floats], episodes: int, finer: int) -> Floats:
-    """(episodes,) returns, with time steps that are so many times shorter."""
+    """(episodes,) returns, with time steps shorter by this factor."""
     env = gymnasium.make(task, **OPTIONS.get(task, {}))
     inner = env.unwrapped
     low, high = env.action_space.low, env.action_space.high

@@ -34,7 +34,7 @@ class _Worker:
         self._process: subprocess.Popen[bytes] | None = None
 
     def ask(self, request: Any) -> Any:
-        """What the process answers.   ProcessEnded: it ended instead."""
+        """The process's answer.   ProcessEnded: it ended instead."""
         if self._process is None:
             environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
             command, pipe = [sys.executable, "-c", _PROGRAM], subprocess.PIPE
@@ -79,7 +79,7 @@ atexit.register(_worker.stop)
 
 
 def apart(simulate: Simulate) -> Simulate:
-    """A `simulate` that runs in the process of the engines; what it raises is raised here.
+    """A `simulate` that runs in the process of the engines; its exceptions are raised here.
 
     The engine has to be picklable.   ProcessEnded: it took the process with it.
     """
@@ -97,7 +97,7 @@ def apart(simulate: Simulate) -> Simulate:
 
 
 def serve() -> None:
-    """Answer requests from standard input until it is closed; what libraries print goes to standard error."""
+    """Answer requests from standard input until it is closed; output of libraries goes to standard error."""
     global _serving
     _serving = True
     answers = os.fdopen(os.dup(1), "wb")

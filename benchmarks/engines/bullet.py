@@ -33,10 +33,10 @@ _LOST = 1e8  # [m/s, rad/s] faster than this, the simulation has blown up
 
 @dataclass(frozen=True)
 class Bullet:
-    """50 solver iterations, friction cones, no damping but that of the mechanism."""
+    """50 solver iterations, friction cones, no damping but the mechanism's own."""
 
     iterations: int = 50
-    rounds: int = 1  # a run shorter than a second is clocked so many times
+    rounds: int = 1  # times that a run shorter than a second is clocked
     name: str = "PyBullet"
 
     @ended

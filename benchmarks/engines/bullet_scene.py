@@ -1,8 +1,8 @@
 """The same mechanism for PyBullet: URDF text from the flat arrays of a Model, one file per tree.
 
 Link frames are at the joint points with our axes, inertial frames at the centres of mass along the principal axes.
-Bullet's own damping and its cap on joint speeds are switched off. Friction of a contact is that of its body; Bullet
-multiplies it with that of the plane, which is 1.
+Bullet's own damping and its cap on joint speeds are switched off. A contact has the friction of its body; Bullet
+multiplies it by the friction of the plane, which is 1.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class World:
 
 
 def check(model: Model) -> None:
-    """ValueError: what this engine does not represent."""
+    """ValueError: the model has a feature that this engine does not represent."""
     if len(model.coupling_body) + len(model.gear_dof):
         raise ValueError("PyBullet: collisions between bodies and closed loops and gears are not represented")
     if model.contact_terrain.any() or model.contact_restitution.any():

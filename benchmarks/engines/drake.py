@@ -31,7 +31,7 @@ class Drake:
     """
 
     approximation: str
-    rounds: int = 1  # a run shorter than a second is clocked so many times
+    rounds: int = 1  # times that a run shorter than a second is clocked
 
     @property
     def name(self) -> str:

@@ -28,7 +28,7 @@ class DrakePlant:
     plant: Any
     bodies: list[Any]
     free: list[bool]  # whether the body floats, without a joint of Drake's
-    joints: list[list[Any]] = field(default_factory=list)  # those of our joint i, translations first
+    joints: list[list[Any]] = field(default_factory=list)  # for our joint i, translations first
     actuated: list[int] = field(default_factory=list)  # inputs with an actuator
 
 

@@ -17,7 +17,7 @@ Simulate = TypeVar("Simulate", bound=Callable[..., Any])
 
 
 def ended(simulate: Simulate) -> Simulate:
-    """A `simulate` whose exceptions are runs that end at their start: a cell of a table, not the end of a report.
+    """A `simulate` that turns an exception into a run that ends at its start: a table gets a cell, a report goes on.
 
     So are runs that took the process of the engine with them (apart.py).
 

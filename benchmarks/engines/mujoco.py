@@ -32,9 +32,9 @@ class MuJoCo:
 
     integrator: str
     options: Mapping[str, Any] = field(default_factory=dict)
-    rounds: int = 3  # a run shorter than a second is clocked so many times
+    rounds: int = 3  # times that a run shorter than a second is clocked
     contacts: Mapping[str, Sequence[float]] = field(default_factory=dict)
-    label: str = ""  # names what is not default
+    label: str = ""  # names the settings that differ from the defaults
 
     @property
     def name(self) -> str:

@@ -1,12 +1,12 @@
 """The plain way to plan through contact with MuJoCo: derivatives by `mjd_transitionFD`, iLQR in NumPy.
 
-What a competent user writes in a day, as a yardstick for the time of an iteration. It solves the same `Problem`: the
-same mechanism (mujoco_scene.py), the same knots with as many time steps as MuJoCo needs, and the very same objective,
-whose expansion is compiled here, in its favour. Dynamics and their one-sided differences are MuJoCo's C; backward pass
-and line search are NumPy. Multiple shooting with the gaps of FDDP, regularised Q_uu, augmented Lagrangian.
+A competent user could write this in a day: a yardstick for the time of an iteration. It solves the same `Problem`: the
+same mechanism (mujoco_scene.py), the same knots with as many time steps as MuJoCo needs, and the very same objective.
+The expansion of the objective is compiled here, in its favour. Dynamics and their one-sided differences are MuJoCo's C;
+backward pass and line search are NumPy. Multiple shooting with FDDP's gaps, regularised Q_uu, augmented Lagrangian.
 
-What it does not do: soften contact on the way (it is as soft as MuJoCo's default solimp and solref make it, or switches
-on smoothly with `MujocoSettings.smooth`), and control limits in the backward pass: inputs are clipped in the rollouts.
+It does not soften contact on the way: contact is as soft as MuJoCo's default solimp and solref make it, or switches
+on smoothly with `MujocoSettings.smooth`. Its backward pass knows no control limits: rollouts clip the inputs.
 
 Tassa, Mansard, Todorov 2014 (backward pass); Mastalli et al. 2020, "Crocoddyl" (gaps and their line search).
 """
@@ -41,7 +41,7 @@ class MujocoSettings(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """Where the solver ended, and what it took."""
+    """The solver's result and its cost."""
 
     x: Matrix  # (T + 1, nq + nv)
     u: Matrix  # (T, nu)
@@ -75,7 +75,7 @@ class MujocoIlqr:
         self._limits = problem.control_limits or (-np.inf, np.inf)
 
     def solve(self, *, max_iterations: int = 200, violation: float = 1e-3, tolerance: float = 1e-3) -> Solution:
-        """Plan from the guess of the problem; tolerances as those of `Options`."""
+        """Plan from the guess of the problem; tolerances as in `Options`."""
         with quiet():
             return self._solve(max_iterations, violation, tolerance)
 
@@ -89,7 +89,7 @@ class MujocoIlqr:
         message = "" if np.isfinite(merit) else "the rollout of the guess is lost"
         while not message:
             start, before = time.process_time(), merit
-            if alpha > 0.0:  # else the last derivatives are still those of (xs, us)
+            if alpha > 0.0:  # else the last derivatives are still valid at (xs, us)
                 A, B, gaps = self._linearize(xs, us)
             objective.expand(xs, us)
             gains = self._backward(A, B, gaps, mu)

@@ -1,4 +1,4 @@
-"""Motions of MuJoCo that examples draw beside ours; each takes our simulator of the same mechanism."""
+"""Motions of MuJoCo that examples draw next to ours; each takes our simulator of the same mechanism."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ def features() -> list[tuple[str, Mechanism]]:
 
 
 def absent() -> list[tuple[str, Mechanism, Mechanism]]:
-    """(what, a mechanism that never had the feature, one that mentions it and does not have it)."""
+    """(feature, a mechanism that never had it, one that mentions it and does not have it)."""
     plain = pendulum()
     tip = with_contacts(plain, [Contact("link_0", (0.0, 0.0, -0.5), law="impact", friction=0.0)])
     none = {"spring": 0.0, "damper": 0.0, "limits": (-np.inf, np.inf)}

@@ -1,4 +1,4 @@
-"""One plan: what it costs, how true it is, and how its cost and violation fell with processor time."""
+"""One plan: its cost, its fidelity, and the history of cost and violation against processor time."""
 
 from __future__ import annotations
 

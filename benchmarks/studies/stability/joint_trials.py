@@ -1,4 +1,4 @@
-"""Trials of joints: springs to 1e8, dampers to 1e6, jammed limits, poses at the edge of what a joint can do."""
+"""Trials of joints: springs to 1e8, dampers to 1e6, jammed limits, poses at the edge of a joint's range."""
 
 from __future__ import annotations
 

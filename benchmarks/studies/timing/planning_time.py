@@ -1,7 +1,7 @@
-"""Rows of report `timing` about planning: iterations of iLQR, ticks of MPC, and what peers take for the same gait.
+"""Rows of report `timing` about planning: iterations of iLQR, ticks of MPC, and the times of peers for the same gait.
 
-An iteration's time is that of a whole solve divided by its iterations, the rejected ones and the change from one
-smoothing to the next included. Peers solve in the same rounds, to the ends of their own stopping rules.
+An iteration's time is the time of a whole solve divided by its iterations. It includes rejected iterations and the
+changes from one smoothing to the next. Peers solve in the same rounds, each until its own stopping rule ends it.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def _missing(package: str) -> str:
 
 
 def _mujoco(problem: Problem) -> tuple[Callable[[], Any], int, float, str]:
-    """Solve by MuJoCo's finite differences and NumPy; iterations; cost; what it is."""
+    """Solve by MuJoCo's finite differences and NumPy; iterations; cost; a description."""
     solver = MujocoIlqr(problem)
     solution = solver.solve()
     if max(solution.violation, solution.gap) > 1e-3:
@@ -108,7 +108,7 @@ def _mujoco(problem: Problem) -> tuple[Callable[[], Any], int, float, str]:
 
 
 def _crocoddyl(problem: Problem) -> tuple[Callable[[], Any], int, float, str]:
-    """Solve by FDDP with the contact sequence given; iterations; cost; what it is."""
+    """Solve by FDDP with the contact sequence given; iterations; cost; a description."""
     trot = CrocoddylTrot(problem)
     iterations = trot.solve()
     if not trot.solver.isFeasible:

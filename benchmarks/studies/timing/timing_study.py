@@ -1,11 +1,11 @@
-"""Report `timing`: microseconds per step and gradient, per link of a chain, per planner iteration; beside peers.
+"""Report `timing`: microseconds per step and gradient, per link of a chain, per planner iteration; with peers.
 
 One core, processor time, whole horizons per call so that no Python is inside the clock. Every case runs once per
 round; times are medians over the rounds, ratios medians of the ratios taken round by round.
 
-A gradient's time is that of `linearize_trajectory` per knot minus that of a step: a linearised knot solves its step,
-at the same kappa, and then differentiates it. All knots are the state in which the scene stands still, so that the next
-knot, where a step starts to look, tells it no more than its own velocity does, and iterations are those of the rollout.
+A gradient's time is the time of `linearize_trajectory` per knot minus the time of a step: a linearised knot solves its
+step, at the same kappa, and then differentiates it. At all knots the scene stands still. A step's initial guess is the
+next knot, which then holds no more information than the current velocity: iterations equal those of the rollout.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ class Bars(NamedTuple):
 
     step: float | None = None  # [us]
     gradient: float | None = None  # [us]
-    over_step: float | None = None  # at most so many steps of MuJoCo
-    under_jacobian: float | None = None  # at least so many gradients in one Jacobian of MuJoCo
+    over_step: float | None = None  # most steps of MuJoCo in the time of one of ours
+    under_jacobian: float | None = None  # least gradients in the time of one Jacobian of MuJoCo
 
 
 @dataclass(frozen=True)
