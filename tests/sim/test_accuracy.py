@@ -1,4 +1,4 @@
-"""Steps of a given accuracy: asked against got, impacts at their times, derivatives, durations, and what is refused."""
+"""Steps of a given accuracy: requested against achieved, times of impacts, derivatives, durations, and refusals."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ G = 9.81
 
 
 def engine(sim: dojo.Simulator) -> AdaptiveEngine:
-    """That of a simulator with an accuracy."""
+    """The engine of a simulator with an accuracy."""
     assert isinstance(sim._engine, AdaptiveEngine)
     return sim._engine
 
@@ -146,7 +146,7 @@ def test_derivatives_keep_the_division(name: str, height: float, steps: int) -> 
 
 
 def test_orders_agree_on_dampers() -> None:
-    """A falling hopper with dampers: sub-steps of order 2 come to those of order 8, four times closer at half the length."""
+    """A falling hopper with dampers: substeps of order 2 approach order 8, four times closer at half the length."""
     sim = dojo.Simulator(models.hopper(), accuracy=1e-3)
     x = sim.start(np.r_[0.0, 6.0, 0.0, 0.3, 0.4, 0.2], 0.5 * np.random.default_rng(1).normal(size=sim.nv))
     count, ends = 8, []

@@ -105,8 +105,8 @@ def test_the_angle_that_lifts_most_is_found(rng: np.random.Generator) -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_reach_bounds_what_a_chain_can_do(seed: int) -> None:
-    """Random arms: no pose has a gap above that of a contact called sunk, and idle ones keep theirs."""
+def test_reach_bounds_the_motion_of_a_chain(seed: int) -> None:
+    """Random arms: contacts called sunk never have a larger gap in any pose, and idle ones keep theirs."""
     rng = np.random.default_rng(seed)
     kinds = ("fixed", "revolute", "revolute", "spherical", "orbital", "prismatic", "planar", "screw")
     up = np.array([0.0, 0.0, 1.0])

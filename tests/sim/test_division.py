@@ -1,4 +1,4 @@
-"""Division of steps: what cannot be solved as a whole is solved in parts, and everything follows."""
+"""Division of steps: a step that cannot be solved as a whole is solved in parts, and all results follow."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def links(count: int, length: float = 2.0, mass: float = 2.0) -> dojo.Mechanism:
 
 
 def engine(sim: dojo.Simulator) -> DividingEngine:
-    """That of a simulator which divides steps."""
+    """The engine of a simulator that divides steps."""
     assert isinstance(sim._engine, DividingEngine)
     return sim._engine
 
 
 def forced(sim: dojo.Simulator, x: Floats, u: Floats, parts: int) -> Floats:
-    """The state after a step in so many parts."""
+    """The state after a step in this number of parts."""
     found = engine(sim).in_parts(parts, x, (u, engine(sim).no_wrenches))
     assert found is not None and found.share == 1.0
     return np.asarray(found.x)
@@ -110,7 +110,7 @@ def test_momentum_is_handed_on_exactly() -> None:
 
 @pytest.mark.parametrize(("name", "steps"), [("quadruped", 0), ("quadruped", 60), ("hopper", 60), ("fourbar", 3)])
 def test_derivatives_of_a_divided_step(name: str, steps: int) -> None:
-    """The products of those of its parts and of the conversions, against central differences that keep the division."""
+    """Products of the derivatives of parts and conversions, against central differences that keep the division."""
     sim, x, u = moving(name, 0.01, steps)
     if name == "fourbar":
         x = sim.start(sim.neutral()[: sim.nq], np.ones(sim.nv))

@@ -8,7 +8,7 @@ import pytest
 import dojo_opt as dojo
 
 
-def test_each_degree_of_freedom_has_the_name_of_what_it_moves() -> None:
+def test_names_of_degrees_of_freedom() -> None:
     assert dojo.models.raiberthopper().dof_names == (*(f"body {a}" for a in ("x", "y", "z", "rx", "ry", "rz")), "leg")
     assert dojo.models.cartpole().dof_names == ("cart", "pole")
     body = dojo.Body("b", 1.0, (1, 1, 1))

@@ -15,7 +15,7 @@ from support.scenes import KINDS, block, chain, free_body, order, pendulum, rand
 
 @local_kernel
 def joints_work(model_at, data_at, h, v):
-    """What the last step of this thread left."""
+    """Work of the constraints in the last step of this thread."""
     return constraint_work(model_view(model_at), data_view(data_at), h, v)
 
 
@@ -105,7 +105,7 @@ def test_energy_on_arrival_is_that_of_the_simulator(kind, damper, rng):
 @pytest.mark.parametrize(
     "action", [{}, {"spring": 40.0}, {"armature": 0.3}, {"spring": 20.0, "armature": 0.3}], ids=str
 )
-def test_what_acts_on_a_chain_gives_what_it_gains(action, rng):
+def test_a_chain_gains_the_work_done_on_it(action, rng):
     """Gravity, springs, rotors and torques: the balance is of third order in a step."""
     errors = []
     for h in (0.02, 0.01, 0.005):
@@ -122,7 +122,7 @@ def test_what_acts_on_a_chain_gives_what_it_gains(action, rng):
     assert np.all(order(errors) > 2.5), (errors, order(errors))
 
 
-def test_work_of_inputs_is_what_bodies_gain():
+def test_work_of_inputs_equals_the_energy_gain_of_bodies():
     """A free body under forces and torques in its own and in world axes."""
     body = dojo.Body("b", 2.0, inertia=(0.3, 0.2, 0.4))
     push = [dojo.Input(body="b", force=(1.0, 2.0, 0.5), torque=(0.3, -0.1, 0.2), frame=f) for f in ("world", "body")]
@@ -186,7 +186,7 @@ def test_no_accepted_step_of_a_passive_fall_gains_energy(attacks, capsys):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [583, 663, 752])
 def test_a_step_ends_where_the_next_one_can_begin(attacks, seed):
-    """With joints of two rotations, whose columns change with their angles: momenta of such ends were those of others."""
+    """Columns of joints with two rotations change with their angles: such ends used to get the momenta of others."""
     assert attacks.step_case(seed) in ("SOLVED", "ANGULAR_STEP", "ENERGY_STEP")
 
 

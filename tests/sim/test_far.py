@@ -1,4 +1,4 @@
-"""Far contacts: the same step as when everything is near, and only what is far is left out.
+"""Far contacts: the same step as when everything is near, and only far contacts are omitted.
 
 The reference is the same simulator at a tolerance so small that no contact is far: the rule looks at the tolerance.
 """
@@ -110,9 +110,8 @@ def test_a_fall_from_far_to_near():
     counts = [far(sim) for t in range(0, 61, 5) if sim.rollout(x, us[: t + 1]).success]
     assert counts[0] == 8 and counts[-1] == 0
     path, expected = sim.rollout(x, us), exact.rollout(x, us)
-    flight = int(
-        np.argmax(expected.contacts.gap.min(axis=1) < 1e-2)
-    )  # what follows an impact depends on its last digit
+    # the motion after an impact depends on the last digit
+    flight = int(np.argmax(expected.contacts.gap.min(axis=1) < 1e-2))
     assert flight > 10
     np.testing.assert_allclose(path.x[:flight], expected.x[:flight], rtol=0, atol=1e-5)
     np.testing.assert_allclose(path.contacts.gap, [gaps(sim, x) for x in path.x[1:]], rtol=0, atol=1e-9)
@@ -133,7 +132,7 @@ def test_far_contacts_push_by_the_law_of_the_central_path():
     assert push.sum() > 100 * TOLERANCE * steps / 50, "nothing to be seen"
 
 
-def test_arms_of_far_impulses_turn_with_a_body_whose_law_still_holds():
+def test_arms_of_far_impulses_turn_with_the_body():
     """Angular momentum changes by the moment of the impulses where they act, of contacts far to one side of a body."""
     kappa, steps = 1e-6, 40
     points = [(1.0, 0.1 * y, 0.1 * z) for y in range(5) for z in range(4)]
@@ -188,7 +187,7 @@ def test_mobility_bounds_the_velocity_per_impulse(rng):
     assert largest <= model.cluster[0, 5] <= 4.0 * largest
 
 
-def test_names_and_distances_of_what_is_left_out():
+def test_names_and_distances_of_omitted_contacts():
     mech = dataclasses.replace(
         block(), contacts=[*block().contacts, dojo.Contact("block", height=-50.0, name="wall", normal=(1.0, 0.0, 0.0))]
     )

@@ -1,4 +1,4 @@
-"""Closing joints that act: what they do is what the same joint does in the tree, with the loop cut elsewhere."""
+"""Closing joints that act have the same effect as in the tree, with the loop cut elsewhere."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def test_what_is_redundant_is_said() -> None:
 
 
 def test_a_loop_that_contradicts_the_tree_is_refused() -> None:
-    """The end of the rocker on a second pin on the ground, beside its first."""
+    """The end of the rocker on a second pin on the ground, next to its first."""
     mech = fourbar("pin")
     rods = [Joint("spherical", None, "rocker", "rod", (1.0, 0.0, 0.2), (-ROCKER / 2, 0, 0), close=True)]
     with pytest.raises(

@@ -87,7 +87,7 @@ def test_free_flight_is_that_of_mujoco(file: str) -> None:
 @needs_gym
 @pytest.mark.parametrize("file", FILES)
 def test_damped_and_driven_flight_is_that_of_mujoco(file: str) -> None:
-    """Dampers and held inputs act at first order: what remains after extrapolation is of second order."""
+    """Dampers and held inputs act at first order: the error that remains after extrapolation is of second order."""
     mech = unhindered(quietly(ASSETS / file), dampers=True)
     model = mujoco.MjModel.from_xml_path(str(ASSETS / file))
     q, v, control = start(mech, 2)
@@ -183,7 +183,7 @@ SERVOS = """<mujoco><worldbody><body><joint name="j" axis="0 1 0"/><geom size="0
 
 
 def test_actuators_that_are_servos_are_read_as_servos() -> None:
-    """The force of all of them is that of MuJoCo, for the same controls at the same state."""
+    """Their total force equals MuJoCo's, for the same controls at the same state."""
     with pytest.warns(MjcfWarning, match="other"):
         mech = load_mjcf(SERVOS)
     assert [part.servo for part in mech.inputs] == ["position", "velocity", "position", None]

@@ -1,4 +1,4 @@
-"""load_mjcf: what rows of joints become, what is left out, and what is refused."""
+"""load_mjcf: conversion of rows of joints, omitted elements, and refusals."""
 
 from __future__ import annotations
 

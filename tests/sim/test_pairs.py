@@ -58,8 +58,8 @@ def test_collisions_conserve_momentum_and_do_not_overlap(a: str, b: str) -> None
     ],
 )
 def test_corners_that_slide_over_edges(a: str, b: str, seeds: list[int]) -> None:
-    """Motions (benchmarks/collisions.py) whose steps have no solution, or one that gains energy, when the elements in
-    contact follow the iterates.
+    """Motions (benchmarks/collisions.py) with steps that have no solution, or one that gains energy, when the elements
+    in contact follow the iterates.
     """
     sim = dojo.Simulator(two(SHAPES[a], SHAPES[b]), time_step=0.01, kappa=1e-6)
     for seed in seeds:

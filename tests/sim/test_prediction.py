@@ -1,4 +1,4 @@
-"""Where a motion that goes on starts its step: the Delassus matrix, and what the prediction saves."""
+"""Initial guess of a step within a motion: the Delassus matrix, and the iterations that the prediction saves."""
 
 import numpy as np
 import pytest

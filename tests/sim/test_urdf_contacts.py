@@ -182,7 +182,7 @@ def trolley(folder: Path) -> dojo.UrdfMechanism:
 
 
 def test_wheels_roll_without_loss(tmp_path: Path) -> None:
-    """At 1.2 m/s for 2 s: as far as it would go on round wheels, at the same height, without slip."""
+    """At 1.2 m/s for 2 s: the same distance as on round wheels, at the same height, without slip."""
     mech = trolley(tmp_path)
     assert len(mech.contacts) == 8
     sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-8)

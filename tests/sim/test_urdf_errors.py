@@ -1,4 +1,4 @@
-"""A URDF file that cannot be read is refused with the file, the line, the element, and what is wrong with it."""
+"""A URDF file that cannot be read is refused; the message has the file, the line, the element and the error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a plan of the quadruped has to be: converged, upright, within its limits, and not only at its own time step."""
+"""Requirements of a quadruped's plan: converged, upright, within its limits, and not only at its own time step."""
 
 import numpy as np
 
