@@ -1,4 +1,4 @@
-"""What the screen shows of an object: what it is and how large, not all its numbers."""
+"""The `repr` of an object shows its type and size, not all its numbers."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def objects():
 
 
 @pytest.mark.slow
-def test_texts_are_short_and_say_what_it_is(objects):
+def test_texts_are_short_and_name_the_type(objects):
     for thing in objects:
         text = repr(thing)
         assert len(text) <= LETTERS, (type(thing), len(text))

@@ -29,7 +29,7 @@ def speeds():
     return {"speed": {"rows": rows, "tables": [table], "details": {"raw": [1.0, 2.0]}, "machine": {"numba": "0.68.1"}}}
 
 
-def test_the_pages_say_what_was_measured(figures, studies):
+def test_the_pages_quote_the_measured_numbers(figures, studies):
     pages = {path.relative_to(figures.ROOT).as_posix() for path in (figures.ROOT / "docs").glob("*.md")}
     assert pages <= set(figures.PAGES)
     for page in figures.PAGES:

@@ -1,4 +1,4 @@
-"""Shipped code: found by what it was compiled from, wherever the package is; believed only as it was shipped."""
+"""Shipped code: found by its source, wherever the package is; trusted only if it is unchanged."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Package:
         self.folder, self.file = root / "solvers" / "shipped", root / "solvers" / "shipped" / f"{TARGET}{SUFFIX}"
 
     def index(self) -> dict[str, Any]:
-        """What the file says that it holds."""
+        """The index in the file."""
         data = self.file.read_bytes()
         return dict(json.loads(data[HEAD : HEAD + int.from_bytes(data[HEAD - 8 : HEAD], "little")]))
 
@@ -169,7 +169,7 @@ def test_another_version_of_numba_is_named(package: Package) -> None:
 
 
 def test_a_rewritten_index_is_read(package: Package) -> None:
-    """What the test above relies on."""
+    """The test above relies on this."""
     package.rewrite(package.index())
     assert package.call()[1] == 0
 

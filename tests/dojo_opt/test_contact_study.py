@@ -1,4 +1,4 @@
-"""The contact study: what it measures has the right size, and its bars can be missed."""
+"""The contact study: its values have the right size, and its bars can be missed."""
 
 from __future__ import annotations
 

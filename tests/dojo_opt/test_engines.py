@@ -80,7 +80,7 @@ def test_inputs_are_held_or_given_step_by_step() -> None:
         assert np.abs(once.position - swing(engine).position).max() > 1e-3
 
 
-def test_a_run_that_is_lost_says_so_and_keeps_what_was_good() -> None:
+def test_a_lost_run_says_so_and_keeps_its_good_samples() -> None:
     mech = dojo.models.npendulum(2)
     args = {"time_step": 0.1, "q": [1.0, 0.0], "duration": 1.0, "samples": 10}
     ours = Ours(divide=False).simulate(mech, v=[400.0, 0.0], **args)
@@ -134,7 +134,7 @@ def test_an_engine_that_kills_its_process_is_a_cell_and_the_report_goes_on(monke
 
 def test_nothing_is_written_where_the_user_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    test_a_run_that_is_lost_says_so_and_keeps_what_was_good()
+    test_a_lost_run_says_so_and_keeps_its_good_samples()
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,4 +1,4 @@
-"""Falls and figures of robots whose base moves in a plane, and of those without a base that can fall."""
+"""Falls and figures of robots with a planar base, and of robots without a base that can fall."""
 
 from __future__ import annotations
 

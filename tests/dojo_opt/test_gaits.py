@@ -28,7 +28,7 @@ def gait(request, sim):
     return getattr(gaits, request.param)(sim, **PERIODIC[request.param])
 
 
-def test_every_row_is_a_state_whose_velocity_led_to_it(sim, gait):
+def test_every_row_is_a_state_reached_with_its_velocity(sim, gait):
     h, nq = sim.time_step, sim.nq
     following = gait.x[1:].copy()
     back = sim.integrate(

@@ -1,4 +1,4 @@
-"""The study `gradients`: its references are right, and its numbers say what they claim."""
+"""The study `gradients`: its references are right, and its numbers match their names."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_differences_of_a_linear_step_are_its_matrices():
 
 
 def test_ways_to_a_jacobian_agree():
-    """A sliding block without MuJoCo: what is called exact is, and differences have the errors of their order."""
+    """A sliding block without MuJoCo: exact Jacobians are exact, and differences have the errors of their order."""
     scene = peer_steps.scenes()[0]
     points, notes = one_step.measure(scene, 1)
     assert notes == []
@@ -74,7 +74,7 @@ def test_chained_jacobians_are_the_derivative_of_the_motion_and_coulombs(motion)
 
 
 def test_engines_are_differenced_from_their_own_rest():
-    """Our own engine: its rest is 25 cm up, and the derivative that of the chain."""
+    """Our own engine: it rests 25 cm up, and the derivative equals the chained one."""
     motion = sliding.motions()[-1]
     found = sliding.differenced(Ours(kappa=1e-8), motion, 0.02, 1e-5)
     assert found.value == pytest.approx(sliding.chained(motion, 0.02, 1e-8).value, abs=1e-3)

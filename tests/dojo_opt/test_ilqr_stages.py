@@ -97,7 +97,7 @@ def test_a_good_guess_of_states_skips_the_smooth_stages():
 
 
 class Lost(Pendulum):
-    """Its rollouts fail, the first so many of them."""
+    """A pendulum: its first `lost` rollouts fail."""
 
     lost = 14
 

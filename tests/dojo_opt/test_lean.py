@@ -1,4 +1,4 @@
-"""The report `lean`: its scenes differ by what they say, and it counts what is there."""
+"""The report `lean`: its scenes differ by the features in their names, and it counts existing features."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def test_trials_pass(name: str) -> None:
     assert verdict.passed, (verdict, run.message)
 
 
-def test_a_rule_is_missed_by_what_breaks_it() -> None:
+def test_rules_fail_when_the_physics_is_wrong() -> None:
     """A damped spring loses its amplitude, a softer kappa holds the load too high, a coarse tolerance loses momentum."""
     spring = replace(joints.spring(1e2, 1e-2), mechanism=joints.slider(spring=1e2, damper=1.0))
     assert not spring.judge(ours(spring), ours=True).passed
@@ -84,7 +84,7 @@ def test_a_chain_beyond_the_limit_of_the_time_step_says_so() -> None:
     assert [ours(trial).message == "" for trial in found] == [False, True]
 
 
-def test_trials_of_a_robot_and_what_they_advise(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_trials_of_a_robot_and_their_advice(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "installed", list)
     mechanism = dojo.models.raiberthopper()
     report = StabilityStudy(quick=True, mechanism=mechanism).run(Progress())

@@ -1,4 +1,4 @@
-"""Costs and constraints in task space: values beside Kinematics and the simulator, derivatives beside differences."""
+"""Costs and constraints in task space: values against Kinematics and the simulator, derivatives against differences."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ T = 3
 
 
 def expansion_error(sim, term, xs, us):
-    """Largest error of the gradient of a term beside central differences of its value, relative to the gradient."""
+    """Largest error of the gradient of a term against central differences of its value, relative to the gradient."""
     n = sim.ndx
     g, H = np.zeros((T + 1, n + sim.nu)), np.zeros((T + 1, n + sim.nu, n + sim.nu))
     term.expand(xs, us, g, H)

@@ -1,4 +1,4 @@
-"""Lanes: what they load, keep and store is what the rows hold; six rows of them as wrenches."""
+"""Lanes load, keep and store the values of the rows; six rows of lanes as wrenches."""
 
 import numpy as np
 
@@ -22,7 +22,7 @@ def _rows(S, P):
 
 
 def both(kernel, *arguments):
-    """What it makes of the arguments compiled, and as it is written."""
+    """The arguments after the compiled kernel; the Python function has to leave the same values."""
     copies = [[a.copy() if isinstance(a, np.ndarray) else a for a in arguments] for _ in range(2)]
     kernel(*copies[0])
     kernel.py_func(*copies[1])

@@ -1,4 +1,4 @@
-"""The two pipelines of the compiler, and what other users of Numba in the process see of them: nothing."""
+"""The two pipelines of the compiler are invisible to other users of Numba in the process."""
 
 from __future__ import annotations
 
