@@ -54,7 +54,7 @@ def outside_cones(mech: dojo.Mechanism, contacts: Any) -> float:
 
 
 def momentum_error(sim: dojo.Simulator, x: Vector, result: Any) -> float:
-    """Linear momentum that gravity and the impulses of the ground do not explain, over all there is."""
+    """Linear momentum that gravity and the impulses of the ground do not explain, over the total."""
     mass = sum(b.mass for b in sim.mechanism.bodies)
     before, after = sim.momentum(x)[0], sim.momentum(result.x)[0]
     ground = result.contacts.impulse[: len(sim.mechanism.contacts)].sum(axis=0)
@@ -129,7 +129,7 @@ def derivative_case(seed: int) -> float | None:
 
 
 def attack(args: argparse.Namespace) -> Report:
-    """All sections."""
+    """Run all sections."""
     sizes = {"steps": 2000, "motions": 10_000, "derivatives": 300}
     if args.quick:
         sizes = {"steps": 40, "motions": 60, "derivatives": 10}
@@ -196,7 +196,7 @@ def derivatives(report: Report, seeds: range) -> None:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Print or write the report; exit status 1 if anything happened that must not."""
+    """Print or write the report; the exit status is 1 after any failure."""
     arguments = parser(__doc__)
     arguments.add_argument("--only", choices=("steps", "motions", "derivatives"), help="one section")
     arguments.add_argument("--first", type=int, default=0, help="first seed")

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).resolve().parents[1]))  # run as a program, it finds the package that it is part of
+sys.path.append(str(Path(__file__).resolve().parents[1]))  # to find its own package when run as a program
 
 from dojo_opt.report.command import add_arguments, report  # noqa: E402
 from dojo_opt.report.study import Studies  # noqa: E402

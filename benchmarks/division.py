@@ -1,11 +1,11 @@
-"""Motions that a fixed time step could not follow: refused as a whole, and with their steps divided.
+"""Motions that a fixed time step cannot follow: refused with whole steps, solved with divided steps.
 
     pip install --no-deps "example-robot-data>=6" && pip install pybullet        for robots from files
     python benchmarks/division.py            --match chain for some of them
 
-Every motion runs twice: with divide=False, up to the first refused step, and as it is by default. The table says how
-many steps were divided, into how many parts at most, how many handed on only a share of the momentum of the bodies
-against each other, and the processor time of a step in both runs.
+Every motion runs twice: with divide=False, up to the first refused step, and with the default. The table has the number
+of divided steps, the largest number of parts, the number of steps that passed on only a share of the relative momentum
+of bodies, and the processor time of a step in both runs.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def dropped(file: Path, time_step: float, seconds: float) -> Motion:
 
 
 def _files() -> list[tuple[str, Callable[[], Motion]]]:
-    """Robots from files that ended early before."""
+    """Robots from files; their motions used to end early."""
     found: list[tuple[str, Callable[[], Motion]]] = []
     for file in package_files():
         if file.name in ("laikago_toes.urdf", "g1_29dof_with_hand_rev_1_0.urdf"):

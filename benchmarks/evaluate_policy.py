@@ -2,7 +2,7 @@
 
 python benchmarks/evaluate_policy.py HalfCheetah-v5 policy.npz ...      [--episodes 8] [--finer 5] [--output FILE]
 
-Two columns: the task as it is, and with `--finer` shorter time steps at the same control rate.
+Two columns: the original task, and with `--finer` shorter time steps at the same control rate.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@
 
 Every robot falls from its neutral state, at rest and with two random velocities (normal, 1 m/s and 1 rad/s per degree
 of freedom), for time steps of 5, 10 and 20 ms and at three kappa, the default among them. Random states, as in
-robustness.py, do not find the jammed landings that a motion leads to by itself.
+robustness.py, do not find the jammed landings that occur in motions.
 """
 
 from __future__ import annotations

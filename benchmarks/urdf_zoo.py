@@ -5,7 +5,7 @@
     python benchmarks/urdf_zoo.py --match a1
     python benchmarks/urdf_zoo.py my_robot.urdf        files of your own instead
 
-Each file is loaded as it is, on a floating base; when that is refused, with a fixed base, then with repaired inertias,
+Each file is loaded unchanged, on a floating base; when that is refused, with a fixed base, then with repaired inertias,
 then with both. Nothing drives the joints. A robot on a fixed base is put so high that its lowest contact starts 1 cm
 above the ground. `fine` means: every step was solved, no contact was deeper in the ground than 1e-6 m, and the energy
 never exceeded its initial value by more than 1 % of the largest kinetic energy and 3 kappa / h per contact, the energy

@@ -71,7 +71,7 @@ ARRAYS = ("Floats", "Vector", "Matrix", "Stack", "ArrayLike", "NDArray")
 
 
 def test_no_class_with_arrays_prints_them_all():
-    """Of all public classes: one that has fields for arrays does not leave its text to the dataclass."""
+    """Every public class with array fields defines its own text instead of the dataclass's."""
     seen = 0
     for package in ("dojo_opt", "sim"):
         root = importlib.import_module(package)

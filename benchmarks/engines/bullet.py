@@ -79,7 +79,7 @@ class Bullet:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Bullet prints from compiled code, onto the stream where a report in JSON goes: closed meanwhile."""
+    """Discard standard output meanwhile: Bullet prints to it from compiled code, and a report in JSON goes there."""
     sys.stdout.flush()
     kept = os.dup(1)
     try:
@@ -93,7 +93,7 @@ def quiet() -> Iterator[None]:
 
 
 def engines() -> list[Bullet]:
-    """One."""
+    """The single variant of PyBullet."""
     return [Bullet()]
 
 

@@ -32,7 +32,7 @@ class World:
     links: list[tuple[int, int]] = field(default_factory=list)
 
     def close(self) -> None:
-        """Give the client back."""
+        """Release the client."""
         self.bullet.disconnect(self.client)
 
 
@@ -126,7 +126,7 @@ def _urdf(model: Model, members: list[int], free: bool) -> str:
 
 
 def _bounds(model: Model, dof: int) -> tuple[float, float]:
-    """Limits of a coordinate; crossed where there are none, which Bullet takes for none."""
+    """Limits of a coordinate; without limits, lower above upper, which Bullet takes as unlimited."""
     mine = np.flatnonzero(model.limit_dof == dof)
     if not len(mine):
         return 1.0, -1.0
@@ -136,7 +136,7 @@ def _bounds(model: Model, dof: int) -> tuple[float, float]:
 
 
 def _angles(turn: Rotation) -> Floats:
-    """Roll, pitch, yaw of URDF; at a pitch of 90 degrees one of many."""
+    """Roll, pitch, yaw of URDF; at a pitch of 90 degrees one of many solutions."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         return np.asarray(turn.as_euler("xyz"))
@@ -192,7 +192,7 @@ def _joint(model: Model, body: int, on_free_base: bool) -> str:
 
 
 def _unlock(world: World, model: Model) -> None:
-    """Joints are born with a motor that brakes them: off."""
+    """Switch off the motors that brake every new joint."""
     bullet, here = world.bullet, {"physicsClientId": world.client}
     for body, (multibody, link) in enumerate(world.links):
         if link < 0:

@@ -63,7 +63,7 @@ class CrocoddylTrot:
         self.solver = crocoddyl.SolverFDDP(self._problem)
 
     def solve(self, max_iterations: int = 100) -> int:
-        """Plan from the reference; iterations that it took."""
+        """Plan from the reference, and return the number of iterations."""
         us = [u[: model.nu] for u, model in zip(self.us, self._problem.runningModels, strict=True)]
         self.solver.solve(self.xs, us, max_iterations, False)
         return min(int(self.solver.iter) + 1, max_iterations)

@@ -35,7 +35,7 @@ class Drake:
 
     @property
     def name(self) -> str:
-        """As it stands in a table."""
+        """Name in tables."""
         return f"Drake {self.approximation.lower() or 'RK3'}"
 
     @ended
@@ -67,13 +67,13 @@ class Drake:
 
 
 def engines() -> list[Drake]:
-    """All of them."""
+    """All approximations and the continuous plant."""
     return [*(Drake(approximation) for approximation in APPROXIMATIONS), Drake("")]
 
 
 @dataclass(frozen=True)
 class _Travel:
-    """A plant, and how it is stepped."""
+    """A plant, and the function that steps it."""
 
     sim: Simulator
     scene: DrakePlant

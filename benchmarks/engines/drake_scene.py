@@ -35,7 +35,7 @@ class DrakePlant:
 def load(model: Model, time_step: float, approximation: str = "") -> DrakePlant:
     """The plant; without an approximation it is continuous.
 
-    ValueError: a spring of a ball joint, or limits in a continuous plant, which Drake has not.
+    ValueError: a spring of a ball joint, or limits in a continuous plant, which Drake lacks.
     """
     from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, DiscreteContactApproximation
     from pydrake.systems.framework import DiagramBuilder

@@ -67,7 +67,7 @@ class MujocoIlqr:
         self.substeps = int(np.ceil(problem.knot_time / settings.step - 1e-9))
         self.time_step = problem.knot_time / self.substeps
         self._model = mujoco_scene.load(problem.sim.model, self.time_step, integrator="Euler")
-        self._model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # a blown-up trial has to look it
+        self._model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # keep diverged trials
         if settings.smooth:
             self._model.pair_solimp[:, 0] = 0.0
         self._data = mujoco.MjData(self._model)
@@ -135,9 +135,9 @@ class MujocoIlqr:
     def _search(
         self, merit: float, xs: Matrix, us: Matrix, gaps: Matrix, K: Any, k: Matrix, promise: tuple[float, float]
     ) -> tuple[float, float, Matrix, Matrix]:
-        """(step size, merit, xs, us) of the first of 1, 1/2, 1/4, ... that brings enough; 0 and the old ones if none.
+        """(step size, merit, xs, us) of the first of 1, 1/2, 1/4, ... with enough decrease; 0 and the old ones if none.
 
-        Closing gaps may cost: while the model promises an increase, one up to ASCENT times that is allowed.
+        Closing gaps may cost: when the model predicts an increase, one up to ASCENT times as large is allowed.
         """
         for alpha in 0.5 ** np.arange(HALVINGS):
             x_new, u_new = self._rollout(xs, us, gaps, K, k, alpha)
@@ -148,7 +148,7 @@ class MujocoIlqr:
         return 0.0, merit, xs, us
 
     def _set(self, x: Vector, u: Vector) -> None:
-        """The state without any memory of the one before."""
+        """The state, without memory of the previous one."""
         self._data.qpos[:], self._data.qvel[:] = x[: self._model.nq], x[self._model.nq :]
         self._data.ctrl[:] = u
         self._data.qacc_warmstart[:] = 0.0

@@ -94,7 +94,7 @@ def test_a_lost_run_says_so_and_keeps_its_good_samples() -> None:
 
 
 def test_an_engine_that_raises_is_a_run_that_ends_at_its_start() -> None:
-    """And one that cannot represent a mechanism still says so."""
+    """An engine that cannot represent a mechanism still says so."""
 
     class Breaking:
         name = "breaking"

@@ -45,7 +45,7 @@ def test_hopping_reference_is_consistent():
 
 @pytest.mark.parametrize("perturbation", [{}, {"friction": 0.25}], ids=["nothing", "half the friction"])
 def test_hopper_keeps_to_all_that_is_tracked(perturbation):
-    """Height included, which the distance along the ground leaves out: to 20 mm."""
+    """With height, which the distance along the ground does not include: to 20 mm."""
     mpc = dojo.tasks.hopper_mpc(velocity=(0.2, 0.0), height=0.25)
     loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, **perturbation), 4.0)
     each = loop.by_coordinate()

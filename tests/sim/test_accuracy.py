@@ -212,7 +212,7 @@ def test_contacts_refuse_an_accuracy_that_they_do_not_have() -> None:
 
 
 def test_estimated_errors_are_told() -> None:
-    """In flight each step has the error that is allowed; where contacts cannot have it, the message says so."""
+    """In flight each step meets the allowed error; where contacts cannot meet it, the message says so."""
     pendulum = dojo.Simulator(models.npendulum(2), time_step=0.1, accuracy=1e-5)
     swing = pendulum.rollout(np.array([1.0, 0.5, 0.0, 0.0]), steps=10, throw=True)
     assert np.all(swing.errors > 0.0) and swing.errors.max() <= 1.0

@@ -47,7 +47,7 @@ def forced(sim: dojo.Simulator, x: Floats, u: Floats, parts: int) -> Floats:
 
 
 def moving(name: str, time_step: float, steps: int = 0) -> tuple[dojo.Simulator, Floats, Floats]:
-    """A simulator, a random state or the one that it leads to, and a random input."""
+    """A simulator, a random state or a state reached from it, and a random input."""
     rng = np.random.default_rng(3)
     sim = dojo.Simulator(getattr(models, name)(), time_step=time_step, kappa=1e-4, tolerance=1e-12)
     x = sim.integrate(sim.neutral(), np.r_[0.05 * rng.normal(size=sim.nv), 0.5 * rng.normal(size=sim.nv)])

@@ -22,7 +22,7 @@ EXACT = 1e-13
 
 
 def far(sim):
-    """How many contacts the last step of this thread left out of the interior point."""
+    """Number of contacts that the last step of this thread omitted from the interior-point problem."""
     return int(sim._engine.far().sum())
 
 

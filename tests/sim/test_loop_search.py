@@ -61,7 +61,7 @@ def test_a_closing_joint_with_a_coordinate_of_its_own() -> None:
 
 
 def test_a_parallelogram() -> None:
-    """Flat and closed it stays as it is; with its cranks opposite it has to move, and on either branch it is closed."""
+    """Flat and closed it stays unchanged; with opposite cranks it has to move, and on either branch it is closed."""
     mech = plain_fourbar(0.5, 1.0, 0.5, 1.0)
     np.testing.assert_array_equal(at(mech, (0.0, 0.0, 0.0)).neutral(), np.zeros(6))
     sim = at(mech, (np.pi, 0.0, 0.0))

@@ -112,7 +112,7 @@ def balls(count: int, spacing: float) -> Mechanism:
 
 @pytest.mark.parametrize("kappa", [1e-6, 1e-4])
 def test_far_pairs_are_the_same_as_near_ones(kappa: float) -> None:
-    """The law of a far pair is evaluated, not left out; momentum is kept, and derivatives have all pairs."""
+    """The law of a far pair is evaluated, not omitted; momentum is kept, and derivatives include all pairs."""
     sim, other = (dojo.Simulator(balls(4, 0.7), time_step=0.01, kappa=kappa, tolerance=1e-11) for _ in range(2))
     other._engine.model.pair_far[:, 3] = np.inf  # nothing is far for bodies without inertia
     x = sim.neutral()

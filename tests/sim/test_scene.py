@@ -91,7 +91,7 @@ def test_an_obstacle_stops_shapes_that_touch_the_ground():
 
 
 def test_files_can_be_put_together(tmp_path):
-    """A robot from a URDF file twice, each on terrain of its own."""
+    """A robot from a URDF file twice, each on its own terrain."""
     path = tmp_path / "pod.urdf"
     path.write_text(
         '<robot name="pod"><link name="base"><inertial><mass value="1"/>'

@@ -1,4 +1,4 @@
-"""Steps of independent rows: each as if it were alone, with derivatives, parameters and smoothing of its own."""
+"""Steps of independent rows: each as if alone, with its own derivatives, parameters and smoothing."""
 
 from __future__ import annotations
 

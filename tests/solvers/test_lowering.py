@@ -59,7 +59,7 @@ def _mixed(n, x, counts, out):
 
 @kernel
 def _compared(x, y, out):
-    """Whatever is compared with NaN is false, but for `!=`."""
+    """Every comparison with NaN is false, except `!=`."""
     out[0] = 1.0 * (x < y) + 2.0 * (x <= y) + 4.0 * (x > y) + 8.0 * (x >= y)
     out[1] = 1.0 * (x == y) + 2.0 * (x != y)
     out[2] = x / y

@@ -1,4 +1,4 @@
-"""Signs of life for whoever waits for a compilation: late, short, and only to a terminal or a notebook."""
+"""Progress messages during compilation: late, short, and only to a terminal or a notebook."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Terminal(io.StringIO):
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """A clock to be set, and nothing said so far."""
+    """A settable clock, and no messages so far."""
     now = [0.0]
     monkeypatch.setattr(notice, "_CLOCK", notice._Clock())
     monkeypatch.setattr(notice.time, "perf_counter", lambda: now[0])

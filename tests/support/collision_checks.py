@@ -37,7 +37,7 @@ def bar(name: str, measure: str) -> float:
 
 
 def chosen(case: Case, R: Floats, r: Floats) -> list[tuple[int, int]]:
-    """The contact points that there are at a pose, and the elements of the shapes that make each."""
+    """The existing contact points at a pose, each with its elements of the shapes."""
     pose = np.ascontiguousarray(R).ravel(), np.ascontiguousarray(r)
     number, out = features(case), np.empty(OUT)
     if case.kind in CYLINDERS:

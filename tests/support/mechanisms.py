@@ -1,4 +1,4 @@
-"""Mechanisms and states that hide nothing: skewed axes, offsets everywhere, every joint kind."""
+"""General mechanisms and states: skewed axes, offsets everywhere, every joint kind."""
 
 from __future__ import annotations
 

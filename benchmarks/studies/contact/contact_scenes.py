@@ -97,7 +97,7 @@ def ramp(time_step: float) -> Scene:
 
 
 def ramp_displacement() -> float:
-    """Where the pushed cube is after its second [m]: it starts when 20 t = mu m g, then a = 20 t - mu g."""
+    """Position of the pushed cube after one second [m]: it starts when 20 t = mu m g, then a = 20 t - mu g."""
     begin = 0.4 * G / 20.0
     return 20.0 * (1.0 - begin) ** 3 / 6.0
 

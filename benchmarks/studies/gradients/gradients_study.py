@@ -23,7 +23,7 @@ from sim.mechanism.mechanism import Mechanism
 from solvers.compiler import threads
 
 KAPPAS = (1e-6, 1e-8, 1e-10)  # of whole motions
-JUDGED = 1e-8  # the one that is held against the bars
+JUDGED = 1e-8  # the bars apply to this kappa
 TIME_STEPS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2)  # [s]
 BARRED = (1e-3, 1e-2)
 EPS = (1e-5, 1e-2)  # of differenced motions: the usual choice, and a wide one that averages

@@ -23,7 +23,7 @@ from dojo_opt.report.gradients.one_step import (
 )
 from sim.simulator.simulator import Simulator
 
-INTEGRATOR = "discrete"  # of MuJoCo: the one that holds the scenes
+INTEGRATOR = "discrete"  # MuJoCo's only integrator that holds the scenes
 _CALLS = 10  # Jacobians of Drake's per clocked call
 AUTODIFF = "AutoDiffXd, by the state alone"
 MUJOCO_FORWARD, MUJOCO_CENTRED = "mjd_transitionFD, one-sided", "mjd_transitionFD, centred"

@@ -46,7 +46,7 @@ def along(mechanism: Mechanism, count: int, *, friction: float, distance: float 
 
 
 def features() -> list[tuple[str, Mechanism]]:
-    """The pendulum, each with everything of the one before and one feature more; many contacts come last, twice."""
+    """Pendulums, each with the features of the previous one and one more; many contacts come last, twice."""
     plain = pendulum()
     limit = with_joints(plain, limits=(-1.0, 1.0))
     spring = with_joints(limit, spring=2.0)

@@ -1,7 +1,7 @@
 """The study `lean`: the terms that a scene omits, and the time that this saves.
 
 A pendulum gets limits, a spring, a contact, friction, and a hundred contacts more, inactive and active. All run on one
-core, in interleaved rounds; the kernels of a scene are compiled in a process of its own.
+core, in interleaved rounds; a separate process compiles the kernels of each scene.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def _absent(report: Report, rounds: int) -> None:
 
 
 def _distance(report: Report, rounds: int) -> None:
-    """A step with the wall at many distances, at several kappa; and from where on its contacts are far."""
+    """A step with the wall at many distances, at several kappa; and the distance beyond which its contacts are far."""
     cone = dict(features())["+ cone"]
     grid = [(kappa, distance) for kappa in KAPPAS for distance in DISTANCES]
     scenes = [
@@ -146,7 +146,7 @@ def _processes(report: Report, progress: Progress, *, cold: bool) -> None:
     )
     report.details["processes"] = {"cold": cold, **runs}
     if not cold:
-        report.notes.append("quick: nothing is compiled in a process of its own, so no kernels are counted")
+        report.notes.append("quick: no kernels are counted, since nothing is compiled in a separate process")
         return
     plain, full = runs.values()
     unwanted = [name for name in plain["kernels"] if name.startswith(CONTACT_KERNELS)]

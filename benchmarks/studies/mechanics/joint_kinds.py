@@ -34,11 +34,11 @@ BARS = {
 }
 SPRING, DAMPER, INERTIA = 20.0, 5.0, 0.4
 PITCH = {"screw": 1.5}  # [m/rev]
-STOP = 0.3  # [m, rad] either side; a cone has twice that
+STOP = 0.3  # [m, rad] on either side; twice this for a cone
 
 
 def check(kind: str) -> dict[str, float | None]:
-    """All of them; None where a kind has no coordinate for it."""
+    """All measures; None where a kind has no coordinate for one."""
     measures: dict[str, Callable[[str], float]] = {
         "momentum": momentum,
         "energy": energy,

@@ -40,8 +40,8 @@ print(json.dumps({"import": imported, "first": first, "again": second, "success"
 
 @dataclass(frozen=True)
 class CompileTimeStudy:
-    """One cold start, then warm ones (1 quick, otherwise the median of 5), each in its own process; with the code that
-    came with an installation as many, again with an empty cache.
+    """One cold start, then warm ones (1 quick, otherwise the median of 5), each in its own process; then as many with
+    shipped code and again an empty cache.
     """
 
     quick: bool = False

@@ -21,7 +21,7 @@ from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report.clock import interleave
 from dojo_opt.report.result import Cell, Report, Row, Table
 
-CROCODDYL, PIN = "3.2.1", "4.0.0"  # wheels that fit one another: with others crocoddyl ends the process
+CROCODDYL, PIN = "3.2.1", "4.0.0"  # compatible wheels: with other versions crocoddyl ends the process
 
 
 def add_planning(report: Report, *, quick: bool) -> None:
@@ -84,7 +84,7 @@ def _trot(report: Report, rounds: int) -> None:
 
 
 def _missing(package: str) -> str:
-    """Why a peer is left out, empty when it is not."""
+    """The reason for omitting a peer; empty when it takes part."""
     if package == "mujoco":
         return "" if find_spec("mujoco") is not None else "trot: without MuJoCo"
     if find_spec("crocoddyl") is None:

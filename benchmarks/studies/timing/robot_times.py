@@ -45,7 +45,7 @@ class TimedRobot(NamedTuple):
 
 
 def robots() -> list[TimedRobot]:
-    """The four of Table V; the quadrotor is another one (Pelican, not X2), like Dojo's model."""
+    """The four robots of Table V; the quadrotor is a Pelican, like Dojo's model, not an X2."""
     hinges = np.array([40.0, 40.0, 40.0, *[40.0, 40.0, 120.0, 80.0, 20.0, 10.0, 10.0, 10.0] * 2])  # gym's, ankles 20
     panda = np.array([87.0] * 4 + [12.0] * 3 + [70.0] * 2)
     hover = 1.04 * 9.81 / 4
