@@ -310,7 +310,7 @@ print(json.dumps(compiled_signatures()))
     assert [name for name in kernels if name.startswith(foreign)] == []
 
 
-def test_what_few_scenes_have_is_compiled_by_them_only() -> None:
+def test_rare_features_are_compiled_only_by_their_scenes() -> None:
     program = """
 import numpy as np, dojo_opt as dojo
 from sim.dynamics.joints.ball_spring import spring_impulse

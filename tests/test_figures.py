@@ -97,7 +97,7 @@ def test_tables_are_written_between_their_marks(figures, speeds):
         figures.fill("page", "no table", quotes, speeds)
 
 
-def test_what_is_taken_has_six_digits_and_nothing_bulky(figures, tmp_path, monkeypatch):
+def test_taken_reports_have_six_digits_and_nothing_bulky(figures, tmp_path, monkeypatch):
     monkeypatch.setattr(figures, "MEASURED", tmp_path / "measured")
     study = {"details": {"settings": [1] * 9, "plans": [{"cost": 1.23456789}] * 30}, "rows": []}
     (tmp_path / "report.json").write_text(json.dumps({"studies": {"planning": study}}))

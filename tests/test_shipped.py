@@ -153,7 +153,7 @@ def test_an_edited_source_is_compiled(package: Package) -> None:
     ],
     ids=lambda given: next(iter(given), None) if isinstance(given, dict) else None,
 )
-def test_what_was_not_shipped_is_compiled(package: Package, environment: dict[str, str], why: str) -> None:
+def test_kernels_that_were_not_shipped_are_compiled(package: Package, environment: dict[str, str], why: str) -> None:
     found, told = package.compiles(**environment)
     assert why in found and told == []
 
@@ -225,7 +225,7 @@ def test_code_that_others_can_write_is_refused(package: Package, part: str, whos
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes of POSIX")
-def test_the_group_may_write_where_it_is_that_of_its_owner_alone(package: Package) -> None:
+def test_the_group_may_write_if_the_owner_is_its_only_member(package: Package) -> None:
     import grp
 
     package.file.chmod(0o664)

@@ -174,6 +174,6 @@ def test_advice_follows_from_the_trials() -> None:
     assert "has no contacts" in flier[0] and "--contacts LINK" in flier[1]
 
 
-def test_what_the_reference_does_not_know_is_named() -> None:
+def test_features_unknown_to_the_reference_are_named() -> None:
     assert smooth_scene.not_in_reference(dojo.models.fourbar()).startswith("loop (")
     assert smooth_scene.not_in_reference(dojo.models.quadruped()) == ""

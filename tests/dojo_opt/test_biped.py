@@ -81,7 +81,7 @@ def test_wrong_steps_are_named(atlas):
         dojo.gaits.step(atlas, length=1.0)
 
 
-def test_tracking_gains_are_those_of_the_regulator():
+def test_tracking_gains_agree_with_the_regulator():
     """Far from the end they solve the algebraic Riccati equation."""
     sim = dojo.Simulator(dojo.models.cartpole(), time_step=0.05, tolerance=1e-12)
     up = np.array([0.0, np.pi, 0.0, 0.0])

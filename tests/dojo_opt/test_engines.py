@@ -59,7 +59,7 @@ def test_velocity_is_the_derivative_of_position(engine: PhysicsEngine) -> None:
     np.testing.assert_allclose(run.velocity[1:-1, :, :3], rate, atol=2e-4)
 
 
-def test_energy_of_a_run_is_that_of_the_simulator() -> None:
+def test_energy_of_a_run_agrees_with_the_simulator() -> None:
     mech = dojo.models.quadruped(spring=5.0, limits=False)
     sim = dojo.Simulator(mech, time_step=0.01)
     rng = np.random.default_rng(2)

@@ -76,7 +76,7 @@ def test_time_goes_on_in_a_controller():
     mpc(0.0, np.zeros(2))
 
 
-def test_what_cannot_be_shown_is_refused():
+def test_impossible_figures_are_refused():
     with pytest.raises(TypeError, match="expected a Trajectory, a Plan or a ClosedLoop to show, got a ndarray"):
         dojo.plots.trajectory(np.zeros(3))
 

@@ -23,7 +23,7 @@ def bent(sim, rng):
     return sim.integrate(sim.neutral(), dx)
 
 
-def test_positions_are_those_of_the_contacts(sim, rng):
+def test_positions_agree_with_the_contacts(sim, rng):
     x = bent(sim, rng)
     step = sim.step(x)
     feet = Feet(sim)

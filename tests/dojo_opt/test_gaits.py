@@ -141,6 +141,6 @@ def test_torques_move_the_reference_as_it_moves(sim):
         ("stand", {"duration": 0.0}, r"gaits.stand\(duration=...\)"),
     ],
 )
-def test_what_cannot_be_is_said(sim, name, settings, message):
+def test_impossible_gaits_are_refused(sim, name, settings, message):
     with pytest.raises(ValueError, match=message):
         getattr(gaits, name)(sim, **settings)

@@ -143,7 +143,7 @@ def test_drake_touches_down_with_the_slope_of_its_own_curve():
     assert curve.gradient[2] == 0.0 and curve.velocity[2] == pytest.approx(-1.0 - 9.81 * touchdown.H)
 
 
-def test_what_drake_cannot_be_told_is_refused():
+def test_scenes_that_drake_cannot_represent_are_refused():
     pytest.importorskip("pydrake")
     from benchmarks.studies.gradients.drake_step import DrakeStep
 
@@ -163,7 +163,7 @@ def test_touch_down_is_half_way_at_the_touch_and_bounded_by_hard_contact():
         assert -1.0 < gradient[0] < -0.5 < gradient[2] < 0.0
 
 
-def test_bias_is_that_of_the_central_path():
+def test_bias_agrees_with_the_central_path():
     """First order in kappa; a resting contact has b / (1 + b), b = kappa / (m g^2 h^3)."""
     for regime in smoothing.regimes():
         small, large = smoothing.bias(regime, (1e-8, 1e-7))
@@ -184,7 +184,7 @@ def test_a_contact_is_felt_from_where_the_formula_says():
         assert smoothing.gradient_at(kappa, smoothing.reach(kappa)) == pytest.approx(smoothing.FELT, rel=1e-6)
 
 
-def test_relative_error_is_that_of_the_whole_matrix():
+def test_relative_error_refers_to_the_whole_matrix():
     assert relative_error(np.diag([3.0, 1.0]), np.diag([3.0, 0.0])) == pytest.approx(1.0 / 3.0)
 
 

@@ -23,7 +23,7 @@ ENDLESS: dict[str, Any] = {"tolerance": 1e-12, "violation": 1e-14}
 
 @pytest.mark.slow
 @pytest.mark.parametrize("after", [0.02, 0.1, 0.2, 0.5, 1.0])
-def test_a_plan_that_ctrl_c_ends_is_the_one_of_its_last_iteration(after: float) -> None:
+def test_a_plan_ended_by_ctrl_c_is_its_last_iterate(after: float) -> None:
     dojo.ilqr(dojo.problems.trot(), max_iterations=2)
     plan = heard(lambda: dojo.ilqr(TROT, **ENDLESS), after)
     if plan is None:  # while the first iterate was made

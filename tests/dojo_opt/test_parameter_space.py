@@ -101,7 +101,7 @@ def test_the_space_starts_where_the_simulator_is() -> None:
     assert space.labels[-10:] == tuple(f"block.{label}" for label in inertia_coordinates.LABELS)
 
 
-def test_what_is_common_to_all_ends_with_the_least_of_them() -> None:
+def test_a_common_shift_is_bounded_by_the_least_parameter() -> None:
     mech = dojo.models.npendulum(3)
     sim = dojo.Simulator(mech).with_parameters({"damper": [0.1, 0.2, 0.6]})
     space = dojo.ParameterSpace(sim, ("damper:*", "mass:*"))
@@ -160,6 +160,6 @@ def test_a_fit_of_a_body_stays_among_bodies() -> None:
         ((), ("leg",), None, "no parameter 'mass:leg'"),
     ],
 )
-def test_what_is_refused(names, bodies, bounds, message) -> None:
+def test_refusals(names, bodies, bounds, message) -> None:
     with pytest.raises(ValueError, match=message):
         dojo.ParameterSpace(block(), names, bodies, bounds)

@@ -21,7 +21,7 @@ from dojo_opt.report import Progress
 needs_mujoco = pytest.mark.skipif(find_spec("mujoco") is None, reason="needs MuJoCo")
 
 
-def test_a_plan_that_lives_on_soft_contact_is_found_out():
+def test_a_plan_that_exploits_soft_contact_is_detected():
     """At kappa 1e-2 the ground pulls a block up that it does not touch: the plan counts as solved, and does not hold."""
     problem = dojo.problems.block("up")
     soft = measure.ours(problem, stages=(Stage(1e-2, 1e-2),))

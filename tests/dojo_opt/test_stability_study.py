@@ -65,7 +65,7 @@ def test_rules_fail_when_the_physics_is_wrong() -> None:
     assert not spin.judge(ours(spin), ours=True).passed
 
 
-def test_what_can_be_represented_is_no_refusal_and_a_stop_is_no_pass() -> None:
+def test_a_representable_step_is_not_refused_and_a_stop_does_not_pass() -> None:
     gentle = bodies.spin((0.1, 0.2, 0.3), (0.0, 1.0, 0.0), 1e-2, refusal="half a turn")
     verdict = gentle.judge(ours(gentle), ours=True)
     assert not verdict.passed and verdict.text == "not refused" and np.isnan(verdict.value)

@@ -80,7 +80,7 @@ def test_gradients_agree_with_differences(walker, name):
     assert expansion_error(sim, bound(spec, sim, xs), xs, us) <= tolerance
 
 
-def test_places_and_velocities_are_those_of_kinematics(walker):
+def test_positions_and_velocities_agree_with_kinematics(walker):
     sim, xs, us = walker
     kin = dojo.Kinematics(sim)
     at, R = kin.pose(FOOT, xs[:, : sim.nq])
@@ -102,7 +102,7 @@ def test_places_and_velocities_are_those_of_kinematics(walker):
     )
 
 
-def test_forces_and_slips_are_those_of_the_rollout(walker):
+def test_forces_and_slips_agree_with_the_rollout(walker):
     sim, xs, us = walker
     contacts = sim.rollout(xs[0], us, throw=True).contacts
     force = bound(cost.ContactForce(), sim, xs)

@@ -180,7 +180,7 @@ def test_sweeps_closed_loops_and_batches_follow(swing: tuple[dojo.Simulator, doj
     assert np.array_equal(pickle.loads(pickle.dumps(sim)).rollout(motion.x[0], motion.u).x, motion.x)
 
 
-def test_states_at_any_time_are_those_of_the_motion(swing: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
+def test_states_at_any_time_agree_with_the_motion(swing: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
     sim, motion = swing
     times = np.array([0.0, 0.013, 0.05, 0.111, 0.5])
     fine = sim.replace(time_step=0.001, accuracy=1e-9).rollout(motion.x[0], np.repeat(motion.u, 50, axis=0))
@@ -190,7 +190,7 @@ def test_states_at_any_time_are_those_of_the_motion(swing: tuple[dojo.Simulator,
         motion.at([0.6])
 
 
-def test_what_cannot_be_is_refused() -> None:
+def test_impossible_accuracies_are_refused() -> None:
     mech = models.npendulum(2)
     for settings, match in (({"accuracy": 0.0}, "accuracy"), ({"accuracy": 1e-20}, "at least")):
         with pytest.raises(ValueError, match=match):

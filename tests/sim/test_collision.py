@@ -116,7 +116,7 @@ def least_squares_distance(kind: Pair, sizes: Array, R: Array, r: Array) -> floa
 
 
 @pytest.mark.parametrize("kind", CORE, ids=NAMES.get)
-def test_least_distance_is_that_of_bounded_least_squares(kind: Pair, rng: np.random.Generator) -> None:
+def test_least_distance_agrees_with_bounded_least_squares(kind: Pair, rng: np.random.Generator) -> None:
     """Outside of the cores, also with faces and edges that are almost parallel."""
     checked = 0
     for trial in range(150):
@@ -143,7 +143,7 @@ MUJOCO = {
 
 
 @pytest.mark.parametrize("kind", [p for p in SIMPLE if p != Pair.STRING], ids=NAMES.get)
-def test_distance_and_normal_are_those_of_mujoco(kind: Pair, rng: np.random.Generator) -> None:
+def test_distance_and_normal_agree_with_mujoco(kind: Pair, rng: np.random.Generator) -> None:
     mujoco = pytest.importorskip("mujoco")
     a, b = shapes(kind)
 

@@ -84,7 +84,7 @@ def drop(shape, obstacle, pose, force=(0.0, 0.0), seconds=1.0):
     ids=["cylinder stands", "cylinder lies", "box", "capsule"],
 )
 @pytest.mark.parametrize("obstacle", ["box", "cylinder"])
-def test_what_is_put_on_a_level_top_stays(shape, orientation, height, obstacle) -> None:
+def test_shapes_on_a_level_top_stay(shape, orientation, height, obstacle) -> None:
     """Pushed with .3 of its weight along its axis, below its friction; the forces of all points carry it."""
     if isinstance(shape, Box | Capsule) and obstacle == "box":
         pytest.skip("no cylinder")

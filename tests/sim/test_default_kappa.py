@@ -70,7 +70,7 @@ def test_parameters_change_at_the_same_kappa() -> None:
 @pytest.mark.parametrize(
     ("height", "speed"), [(0.0, 0.0), (0.0, 3.0), (0.2, 1.0)], ids=["rolling", "sliding", "flying"]
 )
-def test_derivatives_are_those_of_the_step(height: float, speed: float) -> None:
+def test_derivatives_agree_with_the_step(height: float, speed: float) -> None:
     """Central differences of the solver at its default kappa."""
     sim = dojo.Simulator(dojo.models.sphere(), time_step=0.02, tolerance=1e-12)
     x, u = sim.neutral(), np.array([0.1, -0.2, 0.1])

@@ -76,7 +76,7 @@ def test_a_refused_step_is_divided(whip: tuple[dojo.Simulator, Floats]) -> None:
     assert np.array_equal(motion.x, sim.rollout(x, steps=20).x)  # a division is deterministic
 
 
-def test_a_motion_without_division_is_that_of_a_simulator_that_refuses() -> None:
+def test_a_motion_without_division_agrees_with_a_simulator_that_refuses() -> None:
     sim, x, _ = moving("quadruped", 0.01)
     motion = sim.rollout(x, steps=40, throw=True)
     assert motion.substeps.max() == 1
@@ -251,7 +251,7 @@ def test_higher_orders_divide_their_steps_of_order_two(order: int) -> None:
     assert motion.success, motion.message
 
 
-def test_what_division_cannot_solve_keeps_its_reason() -> None:
+def test_steps_that_division_cannot_solve_keep_their_reason() -> None:
     sim = dojo.Simulator(models.quadruped(), time_step=0.01, max_iterations=1)
     result = sim.step(sim.neutral())
     assert result.status == dojo.Status.MAX_ITERATIONS

@@ -23,7 +23,7 @@ def test_names_of_degrees_of_freedom() -> None:
         assert mech.dof_names == names
 
 
-def test_the_name_of_a_plane_is_that_of_the_direction_it_moves_in() -> None:
+def test_directions_in_a_plane_have_the_names_of_their_axes() -> None:
     body = dojo.Body("b", 1.0, (1, 1, 1))
     mech = dojo.Mechanism([body], [dojo.Joint("planar_axis", None, "b", axis=(0, 1, 0))])
     sim = dojo.Simulator(mech, time_step=0.01)

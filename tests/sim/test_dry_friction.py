@@ -60,7 +60,7 @@ def test_energy_never_grows_and_the_arm_comes_to_rest(arm):
 
 
 @pytest.mark.parametrize("state", [(0.4, -0.3, 0.0, 0.0), (0.4, -0.3, 0.02, -0.01), (0.9, 0.5, 3.0, -2.0)])
-def test_derivatives_are_those_of_differences(arm, state):
+def test_derivatives_agree_with_differences(arm, state):
     """Of states and inputs, and by the time step; sticking, nearly sticking and sliding."""
     x, u = np.array(state), np.array([0.3, -0.2])
     linear = arm.linearize(x, u)
@@ -76,7 +76,7 @@ def test_derivatives_are_those_of_differences(arm, state):
 
 
 @pytest.mark.parametrize("state", [(0.4, -0.3, 0.0, 0.0), (0.9, 0.5, 3.0, -2.0)])
-def test_derivatives_by_parameters_are_those_of_differences(arm, state):
+def test_derivatives_by_parameters_agree_with_differences(arm, state):
     case = (arm, np.array(state), np.array([0.3, -0.2]))
     assert max(error(case, kind) for kind in ("time_step", "mass", "damper")) < 1e-5
 
@@ -90,7 +90,7 @@ def test_a_robot_with_dry_joints_lands(quadruped):
     assert motion.x[-1, 2] > 0.8 * x[2] and np.abs(motion.x[-1, quadruped.nq :]).max() < 0.01
 
 
-def test_what_cannot_have_it_is_refused():
+def test_joints_without_dry_friction_refuse_it():
     with pytest.raises(ValueError, match=">= 0"):
         dojo.Joint("revolute", None, "b", friction=-1.0)
     with pytest.raises(ValueError, match="quaternion"):

@@ -50,7 +50,7 @@ def mean_motion(sim, x, after):
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "spherical", "orbital"])
-def test_work_of_constraints_is_that_of_the_reactions(kind, rng):
+def test_work_of_constraints_agrees_with_the_reactions(kind, rng):
     """Force times relative velocity where it acts, and torque times relative angular velocity, joint by joint."""
     mech = chain(kind, 3)
     sim = dojo.Simulator(mech, time_step=0.1, tolerance=1e-12)
@@ -87,7 +87,7 @@ def test_a_body_without_joints_tumbles_without_it():
 
 @pytest.mark.parametrize("damper", [0.0, 0.5])
 @pytest.mark.parametrize("kind", KINDS)
-def test_energy_on_arrival_is_that_of_the_simulator(kind, damper, rng):
+def test_energy_on_arrival_agrees_with_the_simulator(kind, damper, rng):
     """Before the step and after it, without leaving the step: another kernel computes `kinetic_energy`.
 
     After the step, axes of ball joints are those before it carried along: their dampers differ, as inertias do.
@@ -165,7 +165,7 @@ def driven(case):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_what_gains_by_right_is_accepted(case):
+def test_rightful_gains_are_accepted(case):
     sim, x, u = driven(case)
     r = sim.step(x, u)
     assert r.success, r.message

@@ -87,7 +87,7 @@ def test_at_a_large_kappa_a_contact_is_felt_from_a_distance():
 
 
 @pytest.mark.parametrize("height", [4.0, 12.0])
-def test_what_comes_near_within_the_step_is_solved_for(height):
+def test_contacts_that_come_near_within_the_step_are_solved_for(height):
     """Shot at the ground with 2 km/s, far and at rest before: balance and contact law hold at the solution."""
     push = dojo.Input(body="ball", force=(0.0, 0.0, 1.0))
     mech = dataclasses.replace(ball(radius=0.1, friction=0.5), inputs=[push])

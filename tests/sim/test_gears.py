@@ -93,7 +93,7 @@ def test_derivatives(name: str) -> None:
     check_step(sim, x, u)
 
 
-def test_what_is_wrong_with_a_gear_is_said() -> None:
+def test_wrong_gears_are_refused() -> None:
     mech = robot()
     for gear, message in (
         (Gear("left", "arm"), "joint of gear 'left': 'arm' is not one of"),

@@ -157,7 +157,7 @@ def test_features_of_order_two_alone_and_too_fast_dynamics_are_refused(mechanism
         dojo.Simulator(mechanism, time_step=0.01, order=4)
 
 
-def test_what_order_two_alone_has_and_unknown_orders_are_refused() -> None:
+def test_methods_of_order_two_alone_and_unknown_orders_are_refused() -> None:
     sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01, order=4)
     x = sim.neutral()
     for call in (lambda: sim.maximal_jacobian(x), lambda: sim.minimal_jacobian(sim.maximal(x))):

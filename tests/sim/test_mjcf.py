@@ -72,7 +72,7 @@ def difference(mech: MjcfMechanism, a: np.ndarray, b: np.ndarray) -> float:
 
 @needs_gym
 @pytest.mark.parametrize("file", FILES)
-def test_free_flight_is_that_of_mujoco(file: str) -> None:
+def test_free_flight_agrees_with_mujoco(file: str) -> None:
     """1e-6 at h = 1e-4 over 0.1 s, of second order: bodies, joints, armature, springs, gravity."""
     mech = unhindered(quietly(ASSETS / file), dampers=False)
     model = mujoco.MjModel.from_xml_path(str(ASSETS / file))
@@ -86,7 +86,7 @@ def test_free_flight_is_that_of_mujoco(file: str) -> None:
 
 @needs_gym
 @pytest.mark.parametrize("file", FILES)
-def test_damped_and_driven_flight_is_that_of_mujoco(file: str) -> None:
+def test_damped_and_driven_flight_agrees_with_mujoco(file: str) -> None:
     """Dampers and held inputs act at first order: the error that remains after extrapolation is of second order."""
     mech = unhindered(quietly(ASSETS / file), dampers=True)
     model = mujoco.MjModel.from_xml_path(str(ASSETS / file))
@@ -197,7 +197,7 @@ def test_actuators_that_are_servos_are_read_as_servos() -> None:
     np.testing.assert_allclose(forces, data.actuator_force[:3] * model.actuator_gear[:3, 0], atol=1e-12)
 
 
-def test_poses_are_those_of_mujoco() -> None:
+def test_poses_agree_with_mujoco() -> None:
     mech = quietly(CHAIN)
     model = mujoco.MjModel.from_xml_string(CHAIN)
     data = mujoco.MjData(model)

@@ -115,7 +115,7 @@ def test_energy_is_bounded_over_1e5_steps(lengths: tuple[float, float, float, fl
     assert abs(energies[-1].mean() - energies[0].mean()) < 0.01 * kinetic
 
 
-def test_what_time_steps_cannot_follow_is_said() -> None:
+def test_motions_too_fast_for_the_time_step_are_refused() -> None:
     """A rod of the delta robot swings past half a turn: it has to spin by more than a turn in a step, or less gains."""
     mech = dojo.models.delta()
     free = replace(mech, joints=[replace(j, limits=None, armature=0.0) for j in mech.joints])

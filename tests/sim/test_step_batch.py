@@ -35,7 +35,7 @@ def test_a_row_is_the_rollout_of_its_state_whatever_its_neighbours(sim):
         np.testing.assert_array_equal(sim.step_batch(X, U, substeps=3, derivatives=True).B, found.B)
 
 
-def test_derivatives_are_those_of_central_differences(sim):
+def test_derivatives_agree_with_central_differences(sim):
     X, U = _rows(sim)
     X, U, kappa, eps = X[:2], U[:2], np.array([1e-3, 3e-4]), 1e-5
     found = sim.step_batch(X, U, 2, True, kappa)

@@ -14,7 +14,7 @@ from support.scenes import ball, block, chain, order, run
 # -- heights -----------------------------------------------------------------------------------------------------------
 
 
-def test_a_function_is_met_and_its_normal_is_that_of_the_spline(rng):
+def test_a_function_is_met_and_its_normal_agrees_with_the_spline(rng):
     x, y = rng.uniform(-1.9, 1.9, (2, 200))
     np.testing.assert_allclose(WAVES.height(x, y), waves(x, y), atol=2e-6)
     e = 1e-5

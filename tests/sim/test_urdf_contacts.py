@@ -139,7 +139,7 @@ def test_contact_names_never_collide(tmp_path: Path) -> None:
     assert mech.contact_names == ("foot_0", "foot_1", "foot_0_1")
 
 
-def test_what_cannot_touch_the_ground_is_said(tmp_path: Path) -> None:
+def test_shapes_that_cannot_touch_the_ground_are_reported(tmp_path: Path) -> None:
     with pytest.warns(dojo.UrdfWarning, match="nothing of the robot makes contact with the ground"):
         one(tmp_path, collision(MESH))
     path = biped(tmp_path)

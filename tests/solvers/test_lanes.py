@@ -41,7 +41,7 @@ def test_arithmetic(rng):
     np.testing.assert_array_equal(out[2, [0, *range(1 + LANES, 2 * LANES)]], A[2, [0, *range(1 + LANES, 2 * LANES)]])
 
 
-def test_what_is_not_kept_may_be_anything():
+def test_masked_lanes_may_hold_anything():
     A = np.full((4, 2 * LANES), np.nan)
     A[1, 0] = 3.0
     out = A.copy()
