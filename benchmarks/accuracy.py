@@ -1,15 +1,15 @@
-"""Error asked for against error got, and processor time, beside the best fixed order and step, and MuJoCo's RK4.
+"""Requested against achieved error, and processor time, compared with the best fixed order and step, and MuJoCo's RK4.
 
     python benchmarks/accuracy.py --match pendulum                  some of the motions
     python benchmarks/accuracy.py --figure accuracy.png             error against processor time
 
-An error is the largest of a joint coordinate in the end [m, rad], over the seconds of the motion. References: exact
+An error is the largest final error of a joint coordinate [m, rad], over the seconds of the motion. References: exact
 solutions of balls and blocks; order 8 with small steps without contact; else order 2 at 10 us with the least kappa. The
-error of a reference is its difference from that with steps twice as long: accuracies below three times it are left out.
+error of a reference is its difference from a run with steps twice as long: accuracies below three times it are omitted.
 
-Cost: processor time of the whole motion over that of the cheapest fixed order and step, or step of RK4, whose error is
-not larger; nan where none has it. Bounces of MuJoCo are not comparable. `told`: the estimated error over the one asked,
-from `errors` of the result: above 1, the motion says that it missed.
+Cost: processor time of the whole motion, relative to the cheapest fixed order and step, or step of RK4, with an error
+no larger; nan where there is none. Bounces of MuJoCo are not comparable. `told`: the estimated error of the result
+(`errors`) over the requested one: above 1, the motion reports a miss.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _LEAST = 1e-6  # accuracy with contacts
 
 
 class Motion(NamedTuple):
-    """A motion from a node, and where it should end."""
+    """A motion from a node, and its expected end."""
 
     name: str
     mechanism: dojo.Mechanism
@@ -92,8 +92,8 @@ def sliding() -> Motion:
 
 
 def rolling(height: float, speed: float, seconds: float) -> Motion:
-    """A ball of radius .1 m that falls from a height at a speed along x, loses mu w of it at the impact w, slides, and
-    rolls from where the point that touches is at rest.
+    """A ball of radius .1 m falls from a height with a speed along x, loses mu w of this speed at the impact w, slides,
+    and rolls as soon as the point in contact is at rest.
     """
     mu = 0.3
     fall, impact = np.sqrt(2.0 * height / _G), np.sqrt(2.0 * height * _G)
@@ -134,7 +134,7 @@ def _at(q: Vector, k: int, value: float) -> Vector:
 
 
 def motions(quick: bool) -> list[Callable[[], Motion]]:
-    """All of them."""
+    """All motions."""
     bend = 0.1 * np.random.default_rng(2).normal(size=12)
     found = [
         lambda: pendulum(1),
@@ -155,7 +155,7 @@ def motions(quick: bool) -> list[Callable[[], Motion]]:
 
 
 def error(sim: dojo.Simulator, end: Vector | None, exact: Vector, seconds: float) -> float:
-    """Largest of a coordinate, over the seconds; infinite without an end."""
+    """Largest error of a coordinate, over the seconds; infinite if the motion has no end."""
     if end is None or not np.isfinite(end).all():
         return np.inf
     zero = np.zeros(sim.nv)
@@ -163,7 +163,7 @@ def error(sim: dojo.Simulator, end: Vector | None, exact: Vector, seconds: float
 
 
 def fixed(motion: Motion, exact: Vector, steps: tuple[float, ...]) -> Points:
-    """Of fixed orders and steps."""
+    """Points of fixed orders and steps."""
     out = []
     for order in (2, 4, 6, 8):
         for h in steps:
@@ -182,7 +182,7 @@ def fixed(motion: Motion, exact: Vector, steps: tuple[float, ...]) -> Points:
 
 
 def runge_kutta(motion: Motion, exact: Vector, steps: tuple[float, ...]) -> Points:
-    """Of MuJoCo's RK4, with its contacts as they come; nothing where it is not installed."""
+    """Points of MuJoCo's RK4, with its default contacts; empty if it is not installed."""
     try:
         import mujoco
     except ImportError:
@@ -219,14 +219,14 @@ def reference(motion: Motion) -> tuple[Vector, float]:
 
 
 def _asked(motion: Motion, unsure: float, quick: bool) -> tuple[float, ...]:
-    """The accuracies that there are, and that the reference of a motion can judge."""
+    """The accuracies that exist and that the reference of a motion can judge."""
     least = max(3.0 * unsure, 0.99 * _LEAST if motion.mechanism.contacts else 0.0)
     asked = tuple(a for a in _ASKED if a >= least) or _ASKED[:1]
     return asked[:4] if quick else asked
 
 
 def _best(points: Points, got: float) -> tuple[float, str]:
-    """The cheapest point that is as exact; nan without one."""
+    """The cheapest point of at least this accuracy; nan without one."""
     found = [(cost, what) for e, cost, what in points if e <= max(got, 1e-13)]
     return min(found) if found else (np.nan, "")
 
@@ -276,7 +276,7 @@ def draw(curves: dict[str, dict[str, Points]]) -> Any:
 
 
 def run(args: argparse.Namespace) -> Report:
-    """Every motion whose name contains `match`, at every accuracy."""
+    """Every motion with `match` in its name, at every accuracy."""
     report, lines, curves = Report("Accuracy on request", ""), [], {}
     for make in progress()([(f"motion {k}", m) for k, m in enumerate(motions(args.quick))], "motions"):
         motion = make()
@@ -313,7 +313,7 @@ def run(args: argparse.Namespace) -> Report:
 def main(argv: list[str] | None = None) -> int:
     """Print or write the report."""
     arguments = parser(__doc__)
-    arguments.add_argument("--match", default="", help="only motions whose name contains this")
+    arguments.add_argument("--match", default="", help="only motions with this in their name")
     arguments.add_argument("--figure", metavar="FILE", help="draw error against processor time")
     return deliver("accuracy", run, arguments, argv)
 

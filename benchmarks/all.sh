@@ -7,7 +7,7 @@
 #   benchmarks/all.sh DIR --quick    a check that it runs, with a report per study in a folder of its own
 #   python docs/figures.py --take DIR        puts the numbers into docs/measured and the pages
 #
-# What is not installed is left out. Ends with 1 when a study failed, or a benchmark missed a bar; the others still run.
+# Missing packages are skipped. Ends with 1 when a study failed, or a benchmark missed a bar; the others still run.
 set -uo pipefail
 
 out="$(mkdir -p "${1:?benchmarks/all.sh: where to? benchmarks/all.sh DIR [--quick]}" && cd "$1" && pwd)" || exit 2
@@ -19,7 +19,7 @@ cd "$out" || exit 2
 cores="$(nproc 2>/dev/null || echo 1)"
 rm -f ./*.missed
 
-measure() {  # NAME COMMAND...: what it prints goes to NAME.txt; of quick runs as many at once as there are cores
+measure() {  # NAME COMMAND...: write its output to NAME.txt; start as many quick runs at once as there are cores
     if [ -n "$quick" ]; then
         while [ "$(jobs -rp | wc -l)" -ge "$cores" ]; do wait -n || true; done
         timed "$@" &
@@ -35,7 +35,7 @@ timed() {
     printf '== %s: %d s\n' "$name" "$((SECONDS - begin))"
 }
 
-if [ -n "$quick" ]; then  # study by study; those whose bars do not depend on the clock are judged
+if [ -n "$quick" ]; then  # study by study; only bars that do not depend on the clock are judged
     for study in contact mechanics gradients stability; do
         measure "study_$study" "$python" "$here/benchmarks/compare.py" "$study" --quick --strict --out "$out/$study"
     done

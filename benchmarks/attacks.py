@@ -1,4 +1,4 @@
-"""Random mechanisms in random states: what a step, a motion and a derivative must never do, counted.
+"""Random mechanisms in random states: count the failures of steps, motions and derivatives.
 
     python benchmarks/attacks.py                 2000 steps, 10,000 motions, 300 derivatives
     python benchmarks/attacks.py --quick         40, 60 and 10
@@ -54,7 +54,7 @@ def outside_cones(mech: dojo.Mechanism, contacts: Any) -> float:
 
 
 def momentum_error(sim: dojo.Simulator, x: Vector, result: Any) -> float:
-    """Linear momentum that gravity and the impulses of the ground do not explain, over all there is."""
+    """Linear momentum that gravity and the impulses of the ground do not explain, over the total."""
     mass = sum(b.mass for b in sim.mechanism.bodies)
     before, after = sim.momentum(x)[0], sim.momentum(result.x)[0]
     ground = result.contacts.impulse[: len(sim.mechanism.contacts)].sum(axis=0)
@@ -64,7 +64,7 @@ def momentum_error(sim: dojo.Simulator, x: Vector, result: Any) -> float:
 
 
 def judge_step(sim: dojo.Simulator, x: Vector) -> str:
-    """What one step did: the name of its status, or of what it must not do."""
+    """Outcome of one step: the name of its status, or of its failure."""
     try:
         result = sim.step(x)
     except Exception as error:  # whatever it is, it is counted
@@ -129,7 +129,7 @@ def derivative_case(seed: int) -> float | None:
 
 
 def attack(args: argparse.Namespace) -> Report:
-    """All sections."""
+    """Run all sections."""
     sizes = {"steps": 2000, "motions": 10_000, "derivatives": 300}
     if args.quick:
         sizes = {"steps": 40, "motions": 60, "derivatives": 10}
@@ -196,7 +196,7 @@ def derivatives(report: Report, seeds: range) -> None:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Print or write the report; exit status 1 if anything happened that must not."""
+    """Print or write the report; the exit status is 1 after any failure."""
     arguments = parser(__doc__)
     arguments.add_argument("--only", choices=("steps", "motions", "derivatives"), help="one section")
     arguments.add_argument("--first", type=int, default=0, help="first seed")

@@ -1,6 +1,6 @@
 """Random collisions of two free bodies: how many motions are solved to the end, keep momentum, and gain no energy.
 
-    python benchmarks/collisions.py             60 motions per pair of shapes; then what far pairs cost
+    python benchmarks/collisions.py             60 motions per pair of shapes; then the cost of far pairs
     python benchmarks/collisions.py --motions 240
 
 Every motion: two bodies of 1 and 2 kg, a metre apart, turned and spinning at random, towards one another at 4 m/s,
@@ -62,7 +62,7 @@ def cost(pairs: list[tuple[str, str]], spacing: float, kappa: float) -> float:
 
 
 def far_pairs(kappas: tuple[float, ...]) -> Table:
-    """What pairs cost that may collide, by how far apart they are."""
+    """Cost of pairs that may collide, by their distance."""
     settings = [(kappa, spacing) for kappa in kappas for spacing in (0.4, 1.0, 3.0)]
     sets = [(BALLS[0], BALLS[1])], list(zip(BALLS[:-1], BALLS[1:], strict=True)), list(combinations(BALLS, 2))
     lines: list[list[Cell]] = []

@@ -1,7 +1,7 @@
-"""What the benchmarks share: their command line, and what becomes of the Report that each of them makes.
+"""Common code of the benchmarks: the command line, and the output of the Report that each of them makes.
 
 python benchmarks/NAME.py                print it, progress on stderr
-python benchmarks/NAME.py --out DIR      write DIR/NAME.json: what `benchmarks/compare.py` writes for one study
+python benchmarks/NAME.py --out DIR      write DIR/NAME.json, in the format of `benchmarks/compare.py` for one study
 python benchmarks/NAME.py --json         print that instead
 python benchmarks/NAME.py --quick        a check that it runs
 """
@@ -17,8 +17,8 @@ from pathlib import Path
 from dojo_opt.report.result import Report, Row
 from dojo_opt.report.study import Progress
 
-# the package of the other engines, and scenes that tests and benchmarks share; behind what is installed, so that an
-# installed dojo_opt is the one measured
+# the package of the other engines, and scenes that tests and benchmarks share; appended last, so that an installed
+# dojo_opt is the one measured
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 
@@ -35,7 +35,7 @@ def parser(description: str | None) -> argparse.ArgumentParser:
 
 
 def progress() -> Progress:
-    """What runs now, on stderr."""
+    """Progress of the run, on stderr."""
     return Progress(sys.stderr)
 
 
@@ -59,7 +59,7 @@ def deliver(
 
 
 def number(name: str, value: float, bar: float | None = None, *, unit: str = "", note: str = "") -> Row:
-    """A row whose bar, if any, is the most that the value may be."""
+    """A row; its bar, if any, is the largest value that passes."""
     return Row(name, value, unit, bar, note=note)
 
 
@@ -69,7 +69,7 @@ def _threads() -> list[str]:
 
 
 def _settings(given: Sequence[str]) -> list[str]:
-    """The arguments that decide what is measured, not where it goes."""
+    """The arguments of the measurement, without those of the output."""
     kept: list[str] = []
     words = iter(given)
     for word in words:

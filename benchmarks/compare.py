@@ -1,7 +1,7 @@
-"""Measure the toolkit on reference scenes, beside the engines that are installed, and write what it finds.
+"""Measure the toolkit and the installed engines on reference scenes, and write the results.
 
     python benchmarks/compare.py all --out DIR            every study
-    python benchmarks/compare.py accuracy ROBOT.urdf      a robot, as `dojo-opt report` does, beside other engines
+    python benchmarks/compare.py accuracy ROBOT.urdf      a robot, as `dojo-opt report` does, and in other engines too
 
 `pip install ".[bench,drake,bullet]"` adds MuJoCo, Drake and PyBullet; `".[crocoddyl]"` a planner.
 """
@@ -13,13 +13,13 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).resolve().parents[1]))  # run as a program, it finds the package that it is part of
+sys.path.append(str(Path(__file__).resolve().parents[1]))  # to find its own package when run as a program
 
 from dojo_opt.report.command import add_arguments, report  # noqa: E402
 from dojo_opt.report.study import Studies  # noqa: E402
 
 _ROOM = "benchmarks.studies"
-# name -> (what it measures, module, class); in the order of `all`
+# name -> (quantity measured, module, class); in the order of `all`
 STUDIES: Studies = {
     "accuracy": ("error against run time of motion without contact", f"{_ROOM}.accuracy", "AccuracyStudy"),
     "contact": ("sliding, sticking, impact and rest against analytic answers", f"{_ROOM}.contact", "ContactStudy"),

@@ -1,11 +1,11 @@
-"""Motions that a fixed time step could not follow: refused as a whole, and with their steps divided.
+"""Motions that a fixed time step cannot follow: refused with whole steps, solved with divided steps.
 
     pip install --no-deps "example-robot-data>=6" && pip install pybullet        for robots from files
     python benchmarks/division.py            --match chain for some of them
 
-Every motion runs twice: with divide=False, up to the first refused step, and as it is by default. The table says how
-many steps were divided, into how many parts at most, how many handed on only a share of the momentum of the bodies
-against each other, and the processor time of a step in both runs.
+Every motion runs twice: with divide=False, up to the first refused step, and with the default. The table has the number
+of divided steps, the largest number of parts, the number of steps that passed on only a share of the relative momentum
+of bodies, and the processor time of a step in both runs.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def dropped(file: Path, time_step: float, seconds: float) -> Motion:
 
 
 def _files() -> list[tuple[str, Callable[[], Motion]]]:
-    """Robots from files that ended early before."""
+    """Robots from files; their motions used to end early."""
     found: list[tuple[str, Callable[[], Motion]]] = []
     for file in package_files():
         if file.name in ("laikago_toes.urdf", "g1_29dof_with_hand_rev_1_0.urdf"):
@@ -103,7 +103,7 @@ def _files() -> list[tuple[str, Callable[[], Motion]]]:
 
 
 def motions() -> list[tuple[str, Callable[[], Motion]]]:
-    """Names, and what sets them up."""
+    """Names and functions that set up the motions."""
     chains = ((5, 10.0, 100.0), (10, 10.0, 100.0), (50, 2.5, 10.0), (100, 1.0, 5.0))
     return [
         *(
@@ -120,15 +120,15 @@ def motions() -> list[tuple[str, Callable[[], Motion]]]:
 
 def clocked(sim: dojo.Simulator, x: Vector, us: Vector) -> tuple[dojo.Trajectory, float]:
     """(motion, processor time of a step [us])."""
-    sim.rollout(x, us)  # compiles what it divides with
+    sim.rollout(x, us)  # compile the division too
     begin = time.process_time()
     motion = sim.rollout(x, us)
     return motion, 1e6 * (time.process_time() - begin) / max(motion.knot, 1)
 
 
 def run(args: argparse.Namespace) -> Report:
-    """Every motion whose name contains `match`."""
-    warnings.simplefilter("ignore")  # what files of robots say
+    """Every motion with `match` in its name."""
+    warnings.simplefilter("ignore")  # warnings about robots' files
     report = Report("Steps that are divided", "")
     chosen = [(name, (name, build)) for name, build in motions() if args.match in name]
     lines, refused = [], 0
@@ -162,7 +162,7 @@ def run(args: argparse.Namespace) -> Report:
 def main(argv: list[str] | None = None) -> int:
     """Print or write the report."""
     arguments = parser(__doc__)
-    arguments.add_argument("--match", default="", help="only motions whose name contains this")
+    arguments.add_argument("--match", default="", help="only motions with this in their name")
     return deliver("division", run, arguments, argv)
 
 

@@ -2,7 +2,7 @@
 
 python benchmarks/evaluate_policy.py HalfCheetah-v5 policy.npz ...      [--episodes 8] [--finer 5] [--output FILE]
 
-Two columns: the task as it is, and with `--finer` shorter time steps at the same control rate.
+Two columns: the original task, and with `--finer` shorter time steps at the same control rate.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def load(path: str) -> Callable[[Floats], Floats]:
 
 
 def returns(task: str, act: Callable[[Floats], Floats], episodes: int, finer: int) -> Floats:
-    """(episodes,) returns, with time steps that are so many times shorter."""
+    """(episodes,) returns, with time steps shorter by this factor."""
     env = gymnasium.make(task, **OPTIONS.get(task, {}))
     inner = env.unwrapped
     low, high = env.action_space.low, env.action_space.high

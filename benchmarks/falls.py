@@ -1,11 +1,11 @@
 """Let robots fall for a second, and count the motions in which a step was not solved.
 
-    pip install gymnasium mujoco        for gymnasium's robots, beside the models of the toolkit
+    pip install gymnasium mujoco        for gymnasium's robots, in addition to the models of the toolkit
     python benchmarks/falls.py          --match quadruped for some of them
 
 Every robot falls from its neutral state, at rest and with two random velocities (normal, 1 m/s and 1 rad/s per degree
 of freedom), for time steps of 5, 10 and 20 ms and at three kappa, the default among them. Random states, as in
-robustness.py, do not find the jammed landings that a motion leads to by itself.
+robustness.py, do not find the jammed landings that occur in motions.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ STARTS = 3
 
 
 def robots() -> Iterator[tuple[str, Callable[[], dojo.Mechanism]]]:
-    """Names, and what builds them."""
+    """Names and builders."""
     for name in MODELS:
         yield name, getattr(dojo.models, name)
     gym = find_spec("gymnasium")
@@ -44,7 +44,7 @@ def robots() -> Iterator[tuple[str, Callable[[], dojo.Mechanism]]]:
 
 
 def unsolved(mechanism: dojo.Mechanism, time_step: float, kappa: float | None) -> list[str]:
-    """What the motions that stopped say."""
+    """Messages of the motions that stopped early."""
     sim = dojo.Simulator(mechanism, time_step, kappa)
     messages = []
     for seed in range(STARTS):
@@ -57,8 +57,8 @@ def unsolved(mechanism: dojo.Mechanism, time_step: float, kappa: float | None) -
 
 
 def run(args: argparse.Namespace) -> Report:
-    """Every robot whose name contains `match`."""
-    warnings.simplefilter("ignore")  # what MuJoCo says about gymnasium's files
+    """Every robot with `match` in its name."""
+    warnings.simplefilter("ignore")  # MuJoCo's warnings about gymnasium's files
     report = Report("Falls of a second", "")
     time_steps = TIME_STEPS[-1:] if args.quick else TIME_STEPS
     chosen = [(name, (name, build)) for name, build in robots() if args.match in name][: 2 if args.quick else None]
@@ -85,7 +85,7 @@ def label(kappa: float | None) -> str:
 def main(argv: list[str] | None = None) -> int:
     """Print or write the report."""
     arguments = parser(__doc__)
-    arguments.add_argument("--match", default="", help="only robots whose name contains this")
+    arguments.add_argument("--match", default="", help="only robots with this in their name")
     return deliver("falls", run, arguments, argv)
 
 

@@ -1,11 +1,11 @@
-"""Mechanisms with closed loops over many steps: how far the loops open, what happens to energy, what a step costs.
+"""Mechanisms with closed loops over many steps: violation of the loops, error of the energy, time of a step.
 
     python benchmarks/loops.py [steps]        100,000 by default; in chunks, so that memory stays small
 
 gap        largest violation of any loop constraint, every tenth step [m, rad]
-energy     largest change against the energy at the first step, over the largest kinetic energy; of the models without
+energy     largest change from the energy at the first step, over the largest kinetic energy; for the models without
            their contacts, limits and dampers
-us         processor time per step [us] of those, and of the same mechanism with its loops cut, as a tree
+us         processor time per step [us] of these models, and of the same mechanism with its loops cut, as a tree
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from dojo_opt.report.result import Report, Table
 
 NAMES = ("fourbar", "fivebar", "minitaur_leg", "stewart", "delta")
 STEP, CHUNK = 0.005, 5000
-# what keeps the motion away from singular configurations, where loops part ways
+# settings that keep the motion away from singular configurations, where branches of the loop meet
 HELD = {
     "fivebar": {"spring": 20.0},
     "minitaur_leg": {"gravity": (0.0, 0.0, 0.0)},

@@ -2,18 +2,18 @@
 
     NUMBA_NUM_THREADS=1 python benchmarks/mpc.py [hopper] [quadruped] [monte_carlo] [terrain] [--runs N] [--seed N]
 
-hopper       six cases times six seeds, one iteration per 50 ms, plant at 1 kHz with kappa 1e-8; beside it the control
-             run whose ticks start from an open-loop rollout of the shifted inputs
+hopper       six cases times six seeds, one iteration per 50 ms, plant at 1 kHz with kappa 1e-8; and a control run:
+             its ticks start from an open-loop rollout of the shifted inputs
 quadruped    a trot at 0.2 m/s for 6 s, one iteration of 20 knots per 40 ms, plant at 2 ms with kappa 1e-8, case by case
 monte_carlo  the quadruped under all disturbances at once, drawn from a seed
-terrain      the same trot for 6 s over five grounds, of which the model knows the height, or takes it from the feet
-             that stand, or believes the ground level all the time. A run passes when the robot stays up, its root mean
-             square distance from the path is at most 0.08 m, and its trunk's mean height above the ground below it is
-             within 0.03 m of the one it starts with
+terrain      the same trot for 6 s over five grounds. The model knows the height of the ground, or estimates it from
+             the standing feet, or assumes level ground all the time. A run passes when the robot stays up, its root
+             mean square distance from the path is at most 0.08 m, and its trunk's mean height above the ground below
+             it is within 0.03 m of the initial one
 
-Distances from the path are root mean squares of a run in x, y and z, over terrain in x and y, of the runs that survive:
-their median and the worst. Ticks are timed by the clock and by the processor, which is what is left on a machine with
-other work; with NUMBA_NUM_THREADS=1 they are those of one core.
+Distances from the path are root mean squares of a run in x, y and z, over terrain in x and y. The table has the median
+and the worst of the runs that survive. Ticks are timed by the clock and by the processor, because the clock misleads on
+a machine with other work; with NUMBA_NUM_THREADS=1 processor times are times of one core.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ TERRAIN = {
 MODELS = ("knows", "learns", "blind")
 PATH = 0.08  # [m] off the path that a run over terrain may be
 PUSHED = 0.11  # [m] off the path, heights included, that a run may be after the hardest push
-PLACE = (0, 1, 2)  # coordinates of a base that are lengths: what a distance from the path is made of
-LEVEL = (0, 1)  # of them, those along level ground: over terrain, heights above it are said apart
+PLACE = (0, 1, 2)  # coordinates of a base that are lengths: a distance from the path is their norm
+LEVEL = (0, 1)  # of them, those along level ground: over terrain, heights above it are reported apart
 ABOVE = 0.03  # [m] that its mean height above the ground may change
 HEADER = (
     *("case", "survive", "of", "off the path [m]", "worst [m]", "tick [ms]", "99 % [ms]", "tick, cpu [ms]"),
@@ -207,7 +207,7 @@ def terrain(report: Report, duration: float) -> None:
 
 
 def run(args: argparse.Namespace) -> Report:
-    """What was asked for."""
+    """Measure the requested tables."""
     report = Report("Closed loops of MPC", "")
     if "hopper" in args.tables:
         hopper(report, 1 if args.quick else 6, 1.0 if args.quick else 4.0)

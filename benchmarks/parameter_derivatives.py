@@ -1,4 +1,4 @@
-"""What the derivatives by all parameters cost: a quadruped that stands, also `vjp`, per step of a rollout.
+"""Cost of the derivatives with respect to all parameters: a standing quadruped, also by `vjp`, per step of a rollout.
 
     python benchmarks/parameter_derivatives.py
 

@@ -24,7 +24,7 @@ SIZE = 0.3  # [m] of a body
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a random mechanism may have."""
+    """Features that a random mechanism may have."""
 
     bodies: int = 8  # at most
     kinds: tuple[str, ...] = KINDS

@@ -6,8 +6,8 @@
 Mechanisms: block (8 corners), hopper (2 balls), quadruped with 4 and with 12 contacts. Orientation uniform, joints
 uniform within their limits, linear, angular and joint speeds uniform up to 20 m/s and 20 rad/s; the lowest contact is
 0 to 0.3 m above the ground, for half of the states within 1 cm. Friction 0, 0.5, 1, 2; time step 5 to 50 ms; kappa
-1e-4 and 1e-8. Counted apart: states whose body turns by half a turn or more in one step, which cannot be represented,
-and those where every solution that was found gains energy, which only a shorter step goes on from.
+1e-4 and 1e-8. Two kinds of states are counted apart: those with a body that turns by half a turn or more in one step,
+which cannot be represented, and those where every solution found gains energy, so that only a shorter step goes on.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Cell:
     kappa: float
     states: int = 0
     refused: int = 0  # states that a step cannot represent
-    gaining: int = 0  # whose solutions gain energy
+    gaining: int = 0  # states with solutions that all gain energy
     iterations: list[int] = field(default_factory=list)  # of the solved steps
     misses: Counter[str] = field(default_factory=Counter)  # by Status
     unreported: int = 0  # solved by status, but not finite, below the ground, or with more energy than before
@@ -183,7 +183,7 @@ def study(states: int, mechanisms: list[str], seed: int) -> list[Cell]:
 
 
 def summary(cells: list[Cell]) -> Report:
-    """The sums as a table, what was missed as rows, the cells as details."""
+    """The sums as a table, the misses as rows, the cells as details."""
     report = Report("One step from random extreme states", "")
     whole = total(cells, "all")
     its = whole.iterations or [0]

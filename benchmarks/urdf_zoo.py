@@ -1,20 +1,20 @@
-"""Load every URDF file of two packages, let each robot stand or fall for two seconds, and count what happened.
+"""Load every URDF file of two packages, let each robot stand or fall for two seconds, and count the outcomes.
 
     pip install example-robot-data pybullet
     python benchmarks/urdf_zoo.py                      one line per file, and the counts
     python benchmarks/urdf_zoo.py --match a1
     python benchmarks/urdf_zoo.py my_robot.urdf        files of your own instead
 
-Each file is loaded as it is, on a floating base; when that is refused, with a fixed base, then with repaired inertias,
+Each file is loaded unchanged, on a floating base; when that is refused, with a fixed base, then with repaired inertias,
 then with both. Nothing drives the joints. A robot on a fixed base is put so high that its lowest contact starts 1 cm
 above the ground. `fine` means: every step was solved, no contact was deeper in the ground than 1e-6 m, and the energy
-never was higher than at the start by more than 1 % of the largest kinetic energy and 3 kappa / h per contact, which is
-what the smoothing of the contacts lifts a resting body by. The time step is 5 ms; a robot that does not do well with it
-is tried with 1 ms and 0.2 ms, and the line says so: legs that only touch with their feet fall through the ground and
-whip through their singular pose with 100 rad/s and more. The table shows the first reason of a refusal.
+never exceeded its initial value by more than 1 % of the largest kinetic energy and 3 kappa / h per contact, the energy
+by which smoothing of the contacts lifts a resting body. The time step is 5 ms. A robot that fails with it is tried with
+1 ms and 0.2 ms, and the line says so: legs that collide only at their feet fall through the ground and whip through
+their singular pose at 100 rad/s and more. The table shows the first reason of a refusal.
 
-PyBullet's thousand random objects are one mesh each. All are loaded; those with equal masses and inertias, which is
-all of them, are simulated once, and are one line of the table.
+PyBullet's thousand random objects are one mesh each. All are loaded. Objects with equal masses and inertias are
+simulated once and share a line of the table; here these are all of them.
 """
 
 from __future__ import annotations
@@ -46,17 +46,17 @@ STILL = ("no joint is free to move", "nothing that moves has a mass")  # reasons
 
 @dataclass
 class ZooOutcome:
-    """What became of one file."""
+    """Outcome of one file."""
 
     file: str
-    verdict: str  # fine, refused, or what is wrong
+    verdict: str  # fine, refused, or the failure
     how: str = ""  # other settings than the default ones
     reason: str = ""
     bodies: int = 0
     dofs: int = 0
     contacts: int = 0
     iterations: int = 0  # most of a step
-    growth: float = 0.0  # of energy, relative to what is allowed
+    growth: float = 0.0  # of energy, relative to the bound
     depth: float = 0.0  # [m] largest
     copies: int = 1
 
@@ -206,13 +206,13 @@ def summary(outcomes: list[ZooOutcome]) -> Report:
         row("can touch the ground", (o for o in outcomes if o.contacts)),
     ]
     lines = [line(o) for o in outcomes]
-    report.tables = [Table("Files", HEADER, lines, "growth of energy over what is allowed; depth in m")]
+    report.tables = [Table("Files", HEADER, lines, "growth of energy over its bound; depth in m")]
     report.details = {"files": [asdict(o) for o in outcomes]}
     return report
 
 
 def measure(args: argparse.Namespace) -> Report:
-    """All files whose path has `match` in it.  SystemExit: there are none."""
+    """All files with `match` in their path.  SystemExit: there are none."""
     paths = [p for p in args.files or package_files() if args.match in str(p)][: 20 if args.quick else None]
     if not paths:
         print(f"urdf_zoo: no files; pip install {' '.join(PACKAGES)}", file=sys.stderr)
@@ -223,7 +223,7 @@ def measure(args: argparse.Namespace) -> Report:
 def main(argv: list[str] | None = None) -> int:
     """Print or write the report; exit status 1 if a robot that was loaded did not do well."""
     arguments = parser(__doc__)
-    arguments.add_argument("files", nargs="*", type=Path, help="URDF files; default: those of the two packages")
+    arguments.add_argument("files", nargs="*", type=Path, help="URDF files; default: all files of the two packages")
     arguments.add_argument("--match", default="", help="only files with this in their path")
     return deliver("urdf_zoo", measure, arguments, argv)
 

@@ -17,7 +17,7 @@ import dojo_opt as dojo
 __all__ = ["FORKS", "LONG", "SMALL", "Heard", "Victim", "answer", "environment"]
 
 HOME = Path(dojo.__file__).resolve().parent.parent
-PATIENCE = 300.0  # [s]; what takes longer hangs
+PATIENCE = 300.0  # [s]; a longer call counts as hung
 
 LONG = {
     "ilqr": "dojo.ilqr(trot, tolerance=1e-12, violation=1e-14)",
@@ -85,12 +85,12 @@ class Heard(NamedTuple):
 
     call: str
     seconds: float  # until it was heard; NaN where it never was
-    kept: str  # what the exception carried
-    outcome: str  # "same": what was computed afterwards; "crashed", "hung"
+    kept: str  # the exception's result
+    outcome: str  # "same": the same result afterwards; "crashed", "hung"
 
 
 def environment(**more: str) -> dict[str, str]:
-    """That of a process which finds these packages."""
+    """Environment of a process that finds these packages."""
     return {**os.environ, "PYTHONPATH": str(HOME), **more}
 
 
@@ -105,7 +105,7 @@ class Victim:
         )
 
     def interrupt(self, after: float) -> Heard:
-        """Begin a call, and send SIGINT so many seconds later."""
+        """Begin a call, and send SIGINT `after` seconds later."""
         assert self.process.stdin is not None and self.process.stdout is not None
         try:
             self.process.stdin.write("go\n")
@@ -132,8 +132,13 @@ class Victim:
             self.process.kill()
 
 
+<<<<<<< HEAD
 def answer(program: str, cache: Path, **more: str) -> str:
     """What a process prints that has this cache, or what became of it."""
+=======
+def answer(program: str, cache: Path, timeout: float = PATIENCE) -> str:
+    """Output of a process with this cache, or its failure."""
+>>>>>>> english
     try:
         done = subprocess.run(
             [sys.executable, "-c", program],

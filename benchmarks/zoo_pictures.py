@@ -4,8 +4,8 @@
     python benchmarks/zoo_pictures.py --sheet zoo.png
     python benchmarks/zoo_pictures.py --match go --sheet go.png
 
-Files with the same bodies and masses are one robot. A headless Chromium draws every page, so that the pictures are what
-a user sees. The report lists the robots with the size of their page, and what became of files without a picture.
+Files with the same bodies and masses are one robot. A headless Chromium draws every page, so the pictures show the
+page as a user sees it. The report lists the robots with the size of their page, and explains each missing picture.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def _covered(image: Any) -> float:
 def main(argv: list[str] | None = None) -> int:
     """Print or write the report and the sheet; exit status 1 if a robot has no picture."""
     arguments = parser(__doc__)
-    arguments.add_argument("files", nargs="*", type=Path, help="URDF files; default: those of the two packages")
+    arguments.add_argument("files", nargs="*", type=Path, help="URDF files; default: all files of the two packages")
     arguments.add_argument("--match", default="", help="only files with this in their path")
     arguments.add_argument("--sheet", type=Path, metavar="FILE", help="write the contact sheet, a PNG")
     return deliver("zoo_pictures", measure, arguments, argv)

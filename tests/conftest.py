@@ -15,7 +15,7 @@ os.environ["PYTHONSAFEPATH"] = "1"  # nor do processes that tests start import t
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` chooses
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of the cases of a function marked `sweep(n)`, every n-th is among those of `-m "not slow"`."""
+    """Of the cases of a function marked `sweep(n)`, `-m "not slow"` takes every n-th."""
     seen: dict[str, int] = {}
     for item in items:
         sweep = item.get_closest_marker("sweep")

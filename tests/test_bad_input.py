@@ -139,7 +139,7 @@ def test_simulator(case):
 
 @pytest.mark.parametrize("mech", [free_body(), block(), chain("spherical", 1)])
 def test_half_a_turn_per_step_is_refused(mech):
-    """State whose body turns by pi or more in one step: a Status with its reason, or an error; never a number."""
+    """A body that turns by pi or more in one step: a Status with its reason, or an error; never a number."""
     sim = dojo.Simulator(mech, time_step=0.1, divide=False)
     x = np.array(sim.neutral())
     x[sim.nq + 3] = 32.0
@@ -152,7 +152,7 @@ def test_half_a_turn_per_step_is_refused(mech):
 
 
 def test_huge_numbers_do_not_become_nan():
-    """Overflow inside a step ends in a status; what is returned is finite."""
+    """Overflow inside a step ends in a status; the result is finite."""
     sim = dojo.Simulator(ball(), time_step=0.01)
     for scale in (1e10, 1e100, 1e300):
         for x, u in ((state(_9=-scale), np.zeros(6)), (state(), np.full(6, scale))):

@@ -1,4 +1,4 @@
-"""What the screen shows of an object: what it is and how large, not all its numbers."""
+"""The `repr` of an object shows its type and size, not all its numbers."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def objects():
 
 
 @pytest.mark.slow
-def test_texts_are_short_and_say_what_it_is(objects):
+def test_texts_are_short_and_name_the_type(objects):
     for thing in objects:
         text = repr(thing)
         assert len(text) <= LETTERS, (type(thing), len(text))
@@ -71,7 +71,7 @@ ARRAYS = ("Floats", "Vector", "Matrix", "Stack", "ArrayLike", "NDArray")
 
 
 def test_no_class_with_arrays_prints_them_all():
-    """Of all public classes: one that has fields for arrays does not leave its text to the dataclass."""
+    """Every public class with array fields defines its own text instead of the dataclass's."""
     seen = 0
     for package in ("dojo_opt", "sim"):
         root = importlib.import_module(package)

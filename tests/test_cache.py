@@ -80,9 +80,9 @@ def test_a_folder_that_cannot_be_written_is_no_error(tmp_path: Path) -> None:
     assert python(program, NUMBA_CACHE_DIR=str(blocked / "cache")).strip() == "None"
 
 
-# -- what is kept, and what of it is believed ---------------------------------------------------------------------------
+# -- files that are kept, and files that are trusted -------------------------------------------------------------------
 
-HITS = "print(one(1.0), sum(one.entry.stats.cache_hits.values()))"  # of a kernel, and how often it was loaded
+HITS = "print(one(1.0), sum(one.entry.stats.cache_hits.values()))"  # of a kernel, and the number of its loads
 COUNTED = f"""
 import warnings
 with warnings.catch_warnings(record=True) as told:
@@ -95,7 +95,7 @@ print([str(w.message) for w in told])
 
 
 class Filled:
-    """A folder of compiled code, and a program whose kernel is in it."""
+    """A folder of compiled code, and a program with its kernel in this folder."""
 
     def __init__(self, home: Path) -> None:
         self.home, self.base = home, home / "cache"
@@ -208,7 +208,7 @@ def test_a_filled_folder_that_is_read_only_is_read(filled: Filled) -> None:
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes of POSIX")
 @pytest.mark.parametrize("part", ["base", "root", "digest", "file"])
 @pytest.mark.parametrize("whose", ["group", "world", "another user"])
-def test_what_others_can_write_is_not_read(filled: Filled, part: str, whose: str) -> None:
+def test_files_that_others_can_write_are_not_read(filled: Filled, part: str, whose: str) -> None:
     marker = filled.home / "ran"
     written(filled.file, pickle.dumps(Evil(marker)))
     path = {"base": filled.base, "root": filled.digest.parent, "digest": filled.digest, "file": filled.file}[part]
@@ -227,7 +227,7 @@ def test_what_others_can_write_is_not_read(filled: Filled, part: str, whose: str
 
 
 def test_a_planted_file_runs_where_the_folder_is_believed(filled: Filled) -> None:
-    """What the tests above rely on: the planted file is one that would run."""
+    """The tests above rely on this: the planted file would run."""
     marker = filled.home / "ran"
     written(filled.file, pickle.dumps(Evil(marker)))
     assert filled.run() == ["2.0", "0"]
@@ -310,7 +310,7 @@ print(json.dumps(compiled_signatures()))
     assert [name for name in kernels if name.startswith(foreign)] == []
 
 
-def test_what_few_scenes_have_is_compiled_by_them_only() -> None:
+def test_rare_features_are_compiled_only_by_their_scenes() -> None:
     program = """
 import numpy as np, dojo_opt as dojo
 from sim.dynamics.joints.ball_spring import spring_impulse

@@ -1,4 +1,4 @@
-"""The command line: what it says, what it writes, and its exit status."""
+"""The command line: its messages, its files, and its exit status."""
 
 from __future__ import annotations
 
@@ -182,13 +182,13 @@ def test_show_prints_and_draws_a_model(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 @pytest.mark.parametrize("name", ["pendulum", "slider", "cartpole", "fourbar"])
-def test_show_lets_go_of_what_does_not_float(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_show_releases_a_robot_that_does_not_float(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["show", name, "--seconds", "0.02"]) == 0
     assert "released for 0.02 s" in capsys.readouterr().out
 
 
 @pytest.mark.filterwarnings("ignore::sim.io.urdf.report.UrdfWarning")
-def test_show_reads_a_file_and_says_what_is_not_represented(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_show_reads_a_file_and_names_unsupported_elements(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = branched(tmp_path)
     assert cli.main(["show", str(path), "--seconds", "0.05", "--drop", "0.2"]) == 0
     text = capsys.readouterr().out

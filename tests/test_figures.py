@@ -29,7 +29,7 @@ def speeds():
     return {"speed": {"rows": rows, "tables": [table], "details": {"raw": [1.0, 2.0]}, "machine": {"numba": "0.68.1"}}}
 
 
-def test_the_pages_say_what_was_measured(figures, studies):
+def test_the_pages_quote_the_measured_numbers(figures, studies):
     pages = {path.relative_to(figures.ROOT).as_posix() for path in (figures.ROOT / "docs").glob("*.md")}
     assert pages <= set(figures.PAGES)
     for page in figures.PAGES:
@@ -97,7 +97,7 @@ def test_tables_are_written_between_their_marks(figures, speeds):
         figures.fill("page", "no table", quotes, speeds)
 
 
-def test_what_is_taken_has_six_digits_and_nothing_bulky(figures, tmp_path, monkeypatch):
+def test_taken_reports_have_six_digits_and_nothing_bulky(figures, tmp_path, monkeypatch):
     monkeypatch.setattr(figures, "MEASURED", tmp_path / "measured")
     study = {"details": {"settings": [1] * 9, "plans": [{"cost": 1.23456789}] * 30}, "rows": []}
     (tmp_path / "report.json").write_text(json.dumps({"studies": {"planning": study}}))

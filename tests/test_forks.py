@@ -64,7 +64,7 @@ WAYS = {
         os._exit(os.waitstatus_to_exitcode(os.wait()[1]))
     found = expected if os.waitpid(child, 0)[1] == 0 else None
 """,
-    "a fork beside a running loop": """
+    "a fork during a running loop": """
     stop = threading.Event()
     def work():
         while not stop.is_set():

@@ -40,7 +40,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def test_import_loads_little_and_leaves_the_heavy_libraries_out() -> None:
-    """The time of an import is that of the modules that it loads; `benchmarks/compare.py compile` has the seconds."""
+    """The modules that an import loads determine its time; `benchmarks/compare.py compile` has the seconds."""
     count, loaded = json.loads(
         python(
             "import json, sys; n = len(sys.modules); import dojo_opt; n = len(sys.modules) - n; "
@@ -183,7 +183,7 @@ def test_examples_are_short() -> None:
 
 # -- docstrings --------------------------------------------------------------------------------------------------------
 
-# classes that users get from the public names, or whose fields are keywords of these
+# classes that users get from the public names, or with fields that are keywords of these
 REACHED = (
     *(Entry, Feet, MPCSettings, Motion, Policy, References, tick.Tick),
     *(monte_carlo.MonteCarlo, monte_carlo.MonteCarloRun),

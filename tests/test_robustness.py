@@ -21,7 +21,7 @@ def test_no_extreme_state_is_missed(robustness, name):
     assert np.median(whole.iterations) <= 6, robustness.line(whole, name)
 
 
-def test_a_benchmark_writes_what_a_study_writes(robustness, tmp_path, capsys):
+def test_benchmarks_and_studies_write_the_same_format(robustness, tmp_path, capsys):
     assert robustness.main(["--states", "64", "--mechanism", "block", "--out", str(tmp_path / "new")]) == 0
     assert "iterations, 99 %" in capsys.readouterr().out
     written = json.loads((tmp_path / "new/robustness.json").read_text())

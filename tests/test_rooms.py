@@ -21,7 +21,7 @@ def _module(file: Path) -> str:
 
 
 def _imports() -> dict[str, set[str]]:
-    """Modules by module, of every import: also those of TYPE_CHECKING and inside functions."""
+    """Modules by module, of every import: also under TYPE_CHECKING and inside functions."""
     modules = {_module(file) for file in FILES}
     out: dict[str, set[str]] = defaultdict(set)
     for file, tree in FILES.items():
@@ -104,7 +104,7 @@ def test_no_class_name_is_used_twice() -> None:
 
 
 def test_files_that_docstrings_name_exist() -> None:
-    """A name with folders is a path, in part at least; a bare name is that of some file."""
+    """A name with folders is a path, in part at least; a bare name is the name of some file."""
     paths = {file.relative_to(ROOT).as_posix() for file in FILES}
     paths |= {file.relative_to(ROOT).as_posix() for file in ROOT.glob("*/**/*.py")}
     wrong = []

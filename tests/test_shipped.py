@@ -1,4 +1,4 @@
-"""Shipped code: found by what it was compiled from, wherever the package is; believed only as it was shipped."""
+"""Shipped code: found by its source, wherever the package is; trusted only if it is unchanged."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Package:
         self.folder, self.file = root / "solvers" / "shipped", root / "solvers" / "shipped" / f"{TARGET}{SUFFIX}"
 
     def index(self) -> dict[str, Any]:
-        """What the file says that it holds."""
+        """The index in the file."""
         data = self.file.read_bytes()
         return dict(json.loads(data[HEAD : HEAD + int.from_bytes(data[HEAD - 8 : HEAD], "little")]))
 
@@ -153,7 +153,7 @@ def test_an_edited_source_is_compiled(package: Package) -> None:
     ],
     ids=lambda given: next(iter(given), None) if isinstance(given, dict) else None,
 )
-def test_what_was_not_shipped_is_compiled(package: Package, environment: dict[str, str], why: str) -> None:
+def test_kernels_that_were_not_shipped_are_compiled(package: Package, environment: dict[str, str], why: str) -> None:
     found, told = package.compiles(**environment)
     assert why in found and told == []
 
@@ -169,7 +169,7 @@ def test_another_version_of_numba_is_named(package: Package) -> None:
 
 
 def test_a_rewritten_index_is_read(package: Package) -> None:
-    """What the test above relies on."""
+    """The test above relies on this."""
     package.rewrite(package.index())
     assert package.call()[1] == 0
 
@@ -225,7 +225,7 @@ def test_code_that_others_can_write_is_refused(package: Package, part: str, whos
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes of POSIX")
-def test_the_group_may_write_where_it_is_that_of_its_owner_alone(package: Package) -> None:
+def test_the_group_may_write_if_the_owner_is_its_only_member(package: Package) -> None:
     import grp
 
     package.file.chmod(0o664)

@@ -79,7 +79,7 @@ def test_robots_of_the_wild_stand_or_fall(zoo, files):
 
 @pytest.mark.slow
 def test_robots_of_the_wild_are_mujocos(files, rng):
-    """Every file that both take as it is: poses of all links, masses, mass matrices."""
+    """Every file that both accept unchanged: poses of all links, masses, mass matrices."""
     pytest.importorskip("mujoco")
     compared = 0
     for path in files:

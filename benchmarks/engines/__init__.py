@@ -10,7 +10,7 @@ from dojo_opt.report.ours import Ours
 
 __all__ = ["PhysicsEngine", "Ours", "Run", "installed"]
 
-# package that has to be there -> module of this folder with `engines()`
+# required package -> module of this folder with `engines()`
 _PEERS = {"mujoco": "mujoco", "pydrake": "drake", "pybullet": "bullet"}
 
 

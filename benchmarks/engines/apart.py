@@ -1,4 +1,4 @@
-"""Apart: calls of engines that may end their process, as libraries in C do, in a process of their own.
+"""Apart: call engines that may end their process, as libraries in C do, in a separate process.
 
 One process serves all calls, so that its start and the loading of compiled code are paid once; it measures its own
 processor time. It is started by the first call, and again by the one after it has ended.
@@ -24,7 +24,7 @@ _PATIENCE = 10.0  # [s] for the process to end at exit
 
 
 class ProcessEnded(Exception):
-    """The process of an engine ended in the middle of a call; says by which signal."""
+    """The process of an engine ended during a call; the message has the signal."""
 
 
 class _Worker:
@@ -34,7 +34,7 @@ class _Worker:
         self._process: subprocess.Popen[bytes] | None = None
 
     def ask(self, request: Any) -> Any:
-        """What the process answers.   ProcessEnded: it ended instead."""
+        """The process's answer.   ProcessEnded: it ended instead."""
         if self._process is None:
             environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
             command, pipe = [sys.executable, "-c", _PROGRAM], subprocess.PIPE
@@ -49,10 +49,10 @@ class _Worker:
             raise
 
     def _end(self) -> str:
-        """Wait for a process that is ending, and say how it did."""
+        """Wait for a process that is ending, and describe its end."""
         process, self._process = self._process, None
         assert process is not None
-        with suppress(OSError):  # the rest of a request that nobody read
+        with suppress(OSError):  # the unread rest of a request
             process.communicate()
         code = process.returncode
         return f"ended with exit status {code}" if code >= 0 else f"ended by signal {-code} ({signal.strsignal(-code)})"
@@ -79,9 +79,9 @@ atexit.register(_worker.stop)
 
 
 def apart(simulate: Simulate) -> Simulate:
-    """A `simulate` that runs in the process of the engines; what it raises is raised here.
+    """A `simulate` that runs in the process of the engines; its exceptions are raised here.
 
-    The engine has to be picklable.   ProcessEnded: it took the process with it.
+    The engine has to be picklable.   ProcessEnded: it ended the process.
     """
 
     @wraps(simulate)
@@ -97,7 +97,7 @@ def apart(simulate: Simulate) -> Simulate:
 
 
 def serve() -> None:
-    """Answer requests from standard input until it is closed; what libraries print goes to standard error."""
+    """Answer requests from standard input until it is closed; output of libraries goes to standard error."""
     global _serving
     _serving = True
     answers = os.fdopen(os.dup(1), "wb")

@@ -33,10 +33,10 @@ _LOST = 1e8  # [m/s, rad/s] faster than this, the simulation has blown up
 
 @dataclass(frozen=True)
 class Bullet:
-    """50 solver iterations, friction cones, no damping but that of the mechanism."""
+    """50 solver iterations, friction cones, no damping but the mechanism's own."""
 
     iterations: int = 50
-    rounds: int = 1  # a run shorter than a second is clocked so many times
+    rounds: int = 1  # times that a run shorter than a second is clocked
     name: str = "PyBullet"
 
     @ended
@@ -79,7 +79,7 @@ class Bullet:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Bullet prints from compiled code, onto the stream where a report in JSON goes: closed meanwhile."""
+    """Discard standard output meanwhile: Bullet prints to it from compiled code, and a report in JSON goes there."""
     sys.stdout.flush()
     kept = os.dup(1)
     try:
@@ -93,7 +93,7 @@ def quiet() -> Iterator[None]:
 
 
 def engines() -> list[Bullet]:
-    """One."""
+    """The single variant of PyBullet."""
     return [Bullet()]
 
 

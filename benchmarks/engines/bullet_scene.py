@@ -1,8 +1,8 @@
 """The same mechanism for PyBullet: URDF text from the flat arrays of a Model, one file per tree.
 
 Link frames are at the joint points with our axes, inertial frames at the centres of mass along the principal axes.
-Bullet's own damping and its cap on joint speeds are switched off. Friction of a contact is that of its body; Bullet
-multiplies it with that of the plane, which is 1.
+Bullet's own damping and its cap on joint speeds are switched off. A contact has the friction of its body; Bullet
+multiplies it by the friction of the plane, which is 1.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ class World:
     links: list[tuple[int, int]] = field(default_factory=list)
 
     def close(self) -> None:
-        """Give the client back."""
+        """Release the client."""
         self.bullet.disconnect(self.client)
 
 
 def check(model: Model) -> None:
-    """ValueError: what this engine does not represent."""
+    """ValueError: the model has a feature that this engine does not represent."""
     if len(model.coupling_body) + len(model.gear_dof):
         raise ValueError("PyBullet: collisions between bodies and closed loops and gears are not represented")
     if model.contact_terrain.any() or model.contact_restitution.any():
@@ -126,7 +126,7 @@ def _urdf(model: Model, members: list[int], free: bool) -> str:
 
 
 def _bounds(model: Model, dof: int) -> tuple[float, float]:
-    """Limits of a coordinate; crossed where there are none, which Bullet takes for none."""
+    """Limits of a coordinate; without limits, lower above upper, which Bullet takes as unlimited."""
     mine = np.flatnonzero(model.limit_dof == dof)
     if not len(mine):
         return 1.0, -1.0
@@ -136,7 +136,7 @@ def _bounds(model: Model, dof: int) -> tuple[float, float]:
 
 
 def _angles(turn: Rotation) -> Floats:
-    """Roll, pitch, yaw of URDF; at a pitch of 90 degrees one of many."""
+    """Roll, pitch, yaw of URDF; at a pitch of 90 degrees one of many solutions."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         return np.asarray(turn.as_euler("xyz"))
@@ -192,7 +192,7 @@ def _joint(model: Model, body: int, on_free_base: bool) -> str:
 
 
 def _unlock(world: World, model: Model) -> None:
-    """Joints are born with a motor that brakes them: off."""
+    """Switch off the motors that brake every new joint."""
     bullet, here = world.bullet, {"physicsClientId": world.client}
     for body, (multibody, link) in enumerate(world.links):
         if link < 0:

@@ -1,10 +1,10 @@
 """A gait planned by crocoddyl (FDDP, C++), as a yardstick for an easier problem: it is told when each foot stands.
 
 The robot is built from the arrays of the same mechanism, and gets the knots, the cost, the reference and the guess of
-a problem of `dojo.problems.follow`. What is different, all of it easier: in every knot the feet that stand, and
-where, are given, as constraints on the acceleration; an explicit Euler step per knot; no torque limits, no stops and no
-damping of the joints (crocoddyl has none); friction and the pose at the end are penalties, so one solve is all. Nothing
-keeps a foot in the air out of the ground: in the trot of `dojo.problems` they dip into it by 7 mm.
+a problem of `dojo.problems.follow`. The differences all make the problem easier: the standing feet and their positions
+are given in every knot, as constraints on the acceleration; a knot is one explicit Euler step; joints have no torque
+limits, stops or damping (crocoddyl has none); friction and the final pose are penalties, so one solve is enough.
+Nothing keeps a foot in the air out of the ground: in the trot of `dojo.problems` feet dip into it by 7 mm.
 
 Mastalli et al. 2020, "Crocoddyl: An Efficient and Versatile Framework for Multi-Contact Optimal Control".
 """
@@ -63,7 +63,7 @@ class CrocoddylTrot:
         self.solver = crocoddyl.SolverFDDP(self._problem)
 
     def solve(self, max_iterations: int = 100) -> int:
-        """Plan from the reference; iterations that it took."""
+        """Plan from the reference, and return the number of iterations."""
         us = [u[: model.nu] for u, model in zip(self.us, self._problem.runningModels, strict=True)]
         self.solver.solve(self.xs, us, max_iterations, False)
         return min(int(self.solver.iter) + 1, max_iterations)
@@ -118,7 +118,7 @@ def pinocchio_model(model: Model) -> tuple[Any, list[int]]:
             axis = np.asarray(model.joint_axis[body])
             aligned = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)  # these are cheaper
             kind = aligned[int(axis.argmax())]() if axis.max() == 1.0 else pin.JointModelRevoluteUnaligned(axis)
-        name = f"joint{body}" if parent >= 0 else "root_joint"  # by this name crocoddyl knows what is not actuated
+        name = f"joint{body}" if parent >= 0 else "root_joint"  # crocoddyl takes the joint of this name as unactuated
         joints.append(robot.addJoint(joints[parent] if parent >= 0 else 0, kind, place, name))
         inertia = np.asarray(model.body_inertia[body]).reshape(3, 3)
         lever = -np.asarray(model.joint_child_point[body])

@@ -31,11 +31,11 @@ class Drake:
     """
 
     approximation: str
-    rounds: int = 1  # a run shorter than a second is clocked so many times
+    rounds: int = 1  # times that a run shorter than a second is clocked
 
     @property
     def name(self) -> str:
-        """As it stands in a table."""
+        """Name in tables."""
         return f"Drake {self.approximation.lower() or 'RK3'}"
 
     @ended
@@ -67,13 +67,13 @@ class Drake:
 
 
 def engines() -> list[Drake]:
-    """All of them."""
+    """All approximations and the continuous plant."""
     return [*(Drake(approximation) for approximation in APPROXIMATIONS), Drake("")]
 
 
 @dataclass(frozen=True)
 class _Travel:
-    """A plant, and how it is stepped."""
+    """A plant, and the function that steps it."""
 
     sim: Simulator
     scene: DrakePlant

@@ -28,14 +28,14 @@ class DrakePlant:
     plant: Any
     bodies: list[Any]
     free: list[bool]  # whether the body floats, without a joint of Drake's
-    joints: list[list[Any]] = field(default_factory=list)  # those of our joint i, translations first
+    joints: list[list[Any]] = field(default_factory=list)  # for our joint i, translations first
     actuated: list[int] = field(default_factory=list)  # inputs with an actuator
 
 
 def load(model: Model, time_step: float, approximation: str = "") -> DrakePlant:
     """The plant; without an approximation it is continuous.
 
-    ValueError: a spring of a ball joint, or limits in a continuous plant, which Drake has not.
+    ValueError: a spring of a ball joint, or limits in a continuous plant, which Drake lacks.
     """
     from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, DiscreteContactApproximation
     from pydrake.systems.framework import DiagramBuilder

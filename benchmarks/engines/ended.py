@@ -17,11 +17,11 @@ Simulate = TypeVar("Simulate", bound=Callable[..., Any])
 
 
 def ended(simulate: Simulate) -> Simulate:
-    """A `simulate` whose exceptions are runs that end at their start: a cell of a table, not the end of a report.
+    """A `simulate` that turns an exception into a run that ends at its start, so that the report goes on.
 
-    So are runs that took the process of the engine with them (apart.py).
+    A run that ended the process of the engine (apart.py) becomes such a run too.
 
-    ValueErrors pass: they say that a mechanism cannot be represented.
+    ValueErrors pass: they mean that a mechanism cannot be represented.
     """
 
     @wraps(simulate)

@@ -32,13 +32,13 @@ class MuJoCo:
 
     integrator: str
     options: Mapping[str, Any] = field(default_factory=dict)
-    rounds: int = 3  # a run shorter than a second is clocked so many times
+    rounds: int = 3  # times that a run shorter than a second is clocked
     contacts: Mapping[str, Sequence[float]] = field(default_factory=dict)
-    label: str = ""  # names what is not default
+    label: str = ""  # names the settings that differ from the defaults
 
     @property
     def name(self) -> str:
-        """As it stands in a table."""
+        """Name in tables."""
         return f"MuJoCo {self.integrator}" + (f", {self.label}" if self.label else "")
 
     @ended
@@ -61,7 +61,7 @@ class MuJoCo:
         u = held(mechanism, inputs, int(marks[-1]))
         sim = Simulator(mechanism, time_step=time_step)
         model = mujoco_scene.load(sim.model, time_step, integrator=self.integrator, **self.options)
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a scene that is lost is not started again
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a lost scene is not restarted
         for name, values in self.contacts.items():
             getattr(model, f"pair_{name}")[:] = values
         start = np.concatenate([np.asarray(q, dtype=np.float64), np.asarray(v, dtype=np.float64)])
@@ -91,7 +91,7 @@ def stiff() -> MuJoCo:
 def _steps(
     mujoco: Any, model: Any, data: Any, start: Floats, u: Floats, marks: NDArray[np.int64]
 ) -> tuple[Floats, int]:
-    """([q; v] at the marks, number of steps taken); stops at a sample that is not finite, and leaves it out."""
+    """([q; v] at the marks, number of steps taken); stops before the first sample that is not finite."""
     mujoco.mj_resetData(model, data)
     data.qpos[:], data.qvel[:], data.ctrl[:] = start[: model.nq], start[model.nq :], u[0]
     xs = np.empty((len(marks), len(start)))

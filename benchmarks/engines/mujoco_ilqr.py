@@ -1,12 +1,12 @@
 """The plain way to plan through contact with MuJoCo: derivatives by `mjd_transitionFD`, iLQR in NumPy.
 
-What a competent user writes in a day, as a yardstick for the time of an iteration. It solves the same `Problem`: the
-same mechanism (mujoco_scene.py), the same knots with as many time steps as MuJoCo needs, and the very same objective,
-whose expansion is compiled here, in its favour. Dynamics and their one-sided differences are MuJoCo's C; backward pass
-and line search are NumPy. Multiple shooting with the gaps of FDDP, regularised Q_uu, augmented Lagrangian.
+A competent user could write this in a day: a yardstick for the time of an iteration. It solves the same `Problem`: the
+same mechanism (mujoco_scene.py), the same knots with as many time steps as MuJoCo needs, and the very same objective.
+The expansion of the objective is compiled here, in its favour. Dynamics and their one-sided differences are MuJoCo's C;
+backward pass and line search are NumPy. Multiple shooting with FDDP's gaps, regularised Q_uu, augmented Lagrangian.
 
-What it does not do: soften contact on the way (it is as soft as MuJoCo's default solimp and solref make it, or switches
-on smoothly with `MujocoSettings.smooth`), and control limits in the backward pass: inputs are clipped in the rollouts.
+It does not soften contact on the way: contact is as soft as MuJoCo's default solimp and solref make it, or switches
+on smoothly with `MujocoSettings.smooth`. Its backward pass knows no control limits: rollouts clip the inputs.
 
 Tassa, Mansard, Todorov 2014 (backward pass); Mastalli et al. 2020, "Crocoddyl" (gaps and their line search).
 """
@@ -41,7 +41,7 @@ class MujocoSettings(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """Where the solver ended, and what it took."""
+    """The solver's result and its cost."""
 
     x: Matrix  # (T + 1, nq + nv)
     u: Matrix  # (T, nu)
@@ -67,7 +67,7 @@ class MujocoIlqr:
         self.substeps = int(np.ceil(problem.knot_time / settings.step - 1e-9))
         self.time_step = problem.knot_time / self.substeps
         self._model = mujoco_scene.load(problem.sim.model, self.time_step, integrator="Euler")
-        self._model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # a blown-up trial has to look it
+        self._model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # keep diverged trials
         if settings.smooth:
             self._model.pair_solimp[:, 0] = 0.0
         self._data = mujoco.MjData(self._model)
@@ -75,7 +75,7 @@ class MujocoIlqr:
         self._limits = problem.control_limits or (-np.inf, np.inf)
 
     def solve(self, *, max_iterations: int = 200, violation: float = 1e-3, tolerance: float = 1e-3) -> Solution:
-        """Plan from the guess of the problem; tolerances as those of `Options`."""
+        """Plan from the guess of the problem; tolerances as in `Options`."""
         with quiet():
             return self._solve(max_iterations, violation, tolerance)
 
@@ -89,7 +89,7 @@ class MujocoIlqr:
         message = "" if np.isfinite(merit) else "the rollout of the guess is lost"
         while not message:
             start, before = time.process_time(), merit
-            if alpha > 0.0:  # else the last derivatives are still those of (xs, us)
+            if alpha > 0.0:  # else the last derivatives are still valid at (xs, us)
                 A, B, gaps = self._linearize(xs, us)
             objective.expand(xs, us)
             gains = self._backward(A, B, gaps, mu)
@@ -135,9 +135,9 @@ class MujocoIlqr:
     def _search(
         self, merit: float, xs: Matrix, us: Matrix, gaps: Matrix, K: Any, k: Matrix, promise: tuple[float, float]
     ) -> tuple[float, float, Matrix, Matrix]:
-        """(step size, merit, xs, us) of the first of 1, 1/2, 1/4, ... that brings enough; 0 and the old ones if none.
+        """(step size, merit, xs, us) of the first of 1, 1/2, 1/4, ... with enough decrease; 0 and the old ones if none.
 
-        Closing gaps may cost: while the model promises an increase, one up to ASCENT times that is allowed.
+        Closing gaps may cost: when the model predicts an increase, one up to ASCENT times as large is allowed.
         """
         for alpha in 0.5 ** np.arange(HALVINGS):
             x_new, u_new = self._rollout(xs, us, gaps, K, k, alpha)
@@ -148,7 +148,7 @@ class MujocoIlqr:
         return 0.0, merit, xs, us
 
     def _set(self, x: Vector, u: Vector) -> None:
-        """The state without any memory of the one before."""
+        """The state, without memory of the previous one."""
         self._data.qpos[:], self._data.qvel[:] = x[: self._model.nq], x[self._model.nq :]
         self._data.ctrl[:] = u
         self._data.qacc_warmstart[:] = 0.0

@@ -1,4 +1,4 @@
-"""Motions of MuJoCo that examples draw beside ours; each takes our simulator of the same mechanism."""
+"""Motions of MuJoCo that examples draw next to ours; each takes our simulator of the same mechanism."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.engines.mujoco_warnings import quiet
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
-_REST = 200  # steps in which a body comes to rest on the ground
+_REST = 200  # steps until a body rests on the ground
 
 
 def slide(sim: Simulator, cone: str, velocity: Floats, steps: int) -> Floats:

@@ -27,7 +27,7 @@ _GAP = 6
 class MujocoPlant(Plant):
     """A robot in MuJoCo's world: measured and commanded as a `dojo.Plant` is, but moved by MuJoCo.
 
-    Bodies, joints and actuators are those of the simulator's mechanism; contacts are MuJoCo's own, with its default
+    Bodies, joints and actuators come from the simulator's mechanism; contacts are MuJoCo's own, with its default
     solref and solimp, between the shapes of the mechanism's contacts and collisions and nothing else. The contacts of
     the record have gaps, negative where bodies overlap, and no impulses.
 

@@ -4,10 +4,10 @@ MuJoCo's body frames are put at our centres of mass with the axes of the joint f
 have the same layout and, but for the convention of v (mean over the last interval, not at the node), the same meaning.
 Contacts become spheres paired with the plane of their half-space, and with nothing else.
 
-What MuJoCo cannot say is refused: a spring of a quaternion joint with a rest other than zero, orbital joints, cones.
-With `hinges=True` an orbital joint becomes two hinges one after the other, which has as many coordinates and moves as
-it does near zero: to be timed beside, not to be compared with.
-What it says otherwise: contacts and limits are soft there; a point contact is a sphere of a tenth of a millimetre.
+Features that MuJoCo cannot express are refused: quaternion joints with springs whose rest is not zero, orbital joints,
+cones. With `hinges=True` an orbital joint becomes two hinges in series. They have as many coordinates and move alike
+near zero: good for comparing run times, not motions.
+Contacts and limits are soft in MuJoCo; a point contact becomes a sphere of a tenth of a millimetre.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def _rotate(quat: Vector, vector: Vector) -> Vector:
 
 
 def _frame_quat(rows: Vector) -> Vector:
-    """Quaternion that turns the z axis into rows[0]: what a MuJoCo plane needs of its half-space."""
+    """Quaternion that turns the z axis into rows[0]: the pose of a MuJoCo plane for its half-space."""
     normal = rows[0]
     quat = np.array([1.0 + normal[2], -normal[1], normal[0], 0.0])
     return np.array([0.0, 1.0, 0.0, 0.0]) if quat[0] < 1e-9 else quat / np.linalg.norm(quat)
@@ -123,7 +123,7 @@ def _body(model: Model, body: int, hinges: bool) -> list[str]:
 
 
 def is_free(model: Model, body: int) -> bool:
-    """Whether joint `body` is what MuJoCo calls a free joint: q is the pose of the body itself in the world."""
+    """Whether joint `body` is a free joint in MuJoCo's terms: q is the pose of the body itself in the world."""
     at_origin = not np.any(model.joint_parent_point[body]) and not np.any(model.joint_child_point[body])
     straight = np.array_equal(model.joint_trans_axes[body], np.eye(3).ravel()) and model.joint_offset[body, 0] == 1.0
     floating = model.joint_ntrans[body] == 3 and model.joint_nrot[body] == 3

@@ -1,4 +1,4 @@
-"""MuJoCo's warnings, which it would write to a file where the user stands."""
+"""MuJoCo's warnings, which it would write to a file in the current folder."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Warnings of simulations that blow up are dropped: whoever runs them looks at their states."""
+    """Drop warnings of simulations that blow up: callers check the states."""
     import mujoco
 
     before = mujoco.get_mju_user_warning()

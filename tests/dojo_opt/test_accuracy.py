@@ -58,7 +58,7 @@ def test_every_order_converges_to_the_reference(make) -> None:
         assert max(errors[1]["momentum"], errors[1]["angular"], errors[2]["angular"]) < 1e-12
 
 
-def test_errors_below_what_rounding_makes_of_the_start_count_as_equal() -> None:
+def test_errors_below_the_effect_of_rounding_count_as_equal() -> None:
     floors = curves.floors(scenes.free_body(10.0))
     assert 1e-11 < floors["attitude"] < 1e-8 and floors["angular"] < 1e-11
     ours, peer = {"dojo-opt": points((1e-3, 2e-10))}, {"MuJoCo RK4": points((2e-3, 1e-11))}
@@ -66,7 +66,7 @@ def test_errors_below_what_rounding_makes_of_the_start_count_as_equal() -> None:
     assert curves.ratios(ours | peer, "MuJoCo RK4", "position", floors["attitude"])[0.01] == 1.0
 
 
-def test_scenes_are_those_of_the_peer_figures() -> None:
+def test_scenes_match_the_peer_figures() -> None:
     assert scenes.tree(1.0).exact().energy[0] == pytest.approx(15.84)
     chain = scenes.chain(5)
     assert sum(body.mass for body in chain.mechanism.bodies) == pytest.approx(2.0)
@@ -157,7 +157,7 @@ def trial(h: float, kappa: float, error: float, message: str = "") -> robot.Sett
     return robot.SettingTrial(h, kappa, 1e-8, error, 0.05, message)
 
 
-def test_advice_is_what_the_trials_say() -> None:
+def test_advice_follows_from_the_trials() -> None:
     fine, rough = trial(1e-3, 1e-6, 8e-4), trial(2e-2, 1e-4, 6e-3)
     assert "time_step=0.001, kappa=1e-06): 0.8 mm off" in advice.recommendation(fine, 1e-3, 1e-5)
     assert "meets the target, 1 mm. The best one is" in advice.recommendation(rough, 1e-3, 1e-5)
@@ -174,6 +174,6 @@ def test_advice_is_what_the_trials_say() -> None:
     assert "has no contacts" in flier[0] and "--contacts LINK" in flier[1]
 
 
-def test_what_the_reference_does_not_know_is_named() -> None:
+def test_features_unknown_to_the_reference_are_named() -> None:
     assert smooth_scene.not_in_reference(dojo.models.fourbar()).startswith("loop (")
     assert smooth_scene.not_in_reference(dojo.models.quadruped()) == ""

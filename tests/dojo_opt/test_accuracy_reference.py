@@ -14,7 +14,7 @@ from sim.mechanism.pack import pack
 from support.mechanisms import chain_with, random_state
 
 
-def test_a_pendulum_in_absolute_angles_is_that_of_the_tree() -> None:
+def test_a_pendulum_in_absolute_angles_agrees_with_the_tree() -> None:
     model = pack(dojo.models.npendulum(3, length=0.7, mass=0.4))
     q, v, times = np.array([1.0, -0.5, 0.3]), np.array([0.2, 1.0, -2.0]), np.linspace(0.0, 0.5, 3)
     for a, b in zip(pendulum(model, q, v, times), TreeReference(model).run(q, v, times), strict=True):
@@ -22,7 +22,7 @@ def test_a_pendulum_in_absolute_angles_is_that_of_the_tree() -> None:
 
 
 @pytest.mark.parametrize("kind", ["floating", "spherical", "cylindrical_free", "planar_axis", "revolute"])
-def test_accelerations_are_those_of_mujoco(kind: str) -> None:
+def test_accelerations_agree_with_mujoco(kind: str) -> None:
     mujoco = pytest.importorskip("mujoco")
     mech = chain_with(kind, False)
     # MuJoCo's ball spring pulls with k angle, ours with 2 k sin(angle / 2)
@@ -39,7 +39,7 @@ def test_accelerations_are_those_of_mujoco(kind: str) -> None:
 
 
 @pytest.mark.parametrize("base", ["floating", "screw"])
-def test_accelerations_of_screws_are_those_of_pinocchio(base: str) -> None:
+def test_accelerations_of_screws_agree_with_pinocchio(base: str) -> None:
     """In its coordinates: a quaternion with its scalar last, and velocities of the base in its own axes."""
     pin = pytest.importorskip("pinocchio")
     mech = replace(chain_with("screw", False), contacts=())
@@ -72,7 +72,7 @@ def test_accelerations_of_screws_are_those_of_pinocchio(base: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["spherical", "screw"])
-def test_springs_and_dampers_are_those_of_the_simulator(kind: str) -> None:
+def test_springs_and_dampers_agree_with_the_simulator(kind: str) -> None:
     mech = chain_with(kind, True)
     mech = dojo.Mechanism(mech.bodies, [replace(j, damper=0.05) for j in mech.joints])
     q, v = random_state(np.random.default_rng(3), mech)

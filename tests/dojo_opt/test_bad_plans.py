@@ -1,4 +1,4 @@
-"""What planner, plant and Monte Carlo are given is checked at the border: the message names the call and the culprit."""
+"""Planner, plant and Monte Carlo check their arguments at the interface: messages name the call and the culprit."""
 
 import numpy as np
 import pytest
@@ -138,7 +138,7 @@ def test_one_push_needs_no_list():
     assert dojo.Perturbation(pushes=push).pushes == (push,)
 
 
-def test_a_problem_says_what_it_is_about():
+def test_a_problem_has_a_short_repr():
     assert repr(HOP) == "Problem(raiberthopper, 20 knots of 0.05 s, Tracking, Effort, Goal)"
 
 
@@ -199,7 +199,7 @@ def test_complex_numbers_are_refused(call):
         call()
 
 
-def test_a_horizon_that_fits_no_memory_is_refused_with_what_it_takes():
+def test_a_horizon_that_exceeds_memory_is_refused_with_its_size():
     with pytest.raises(ValueError, match=r"Problem\(horizon=...\): .* GiB of memory, and this machine has"):
         dojo.Problem(HOPPER, AT, 10**9)
     with pytest.raises(ValueError, match=r"GiB of memory"):

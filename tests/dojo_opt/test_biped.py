@@ -49,7 +49,7 @@ def test_reference_step_is_in_balance(atlas):
 
 @pytest.mark.slow
 def test_steps_in_a_row(atlas):
-    """Left, right past it, left beside it: in balance, at rest between them, and with velocities of its own path."""
+    """Left, right past it, left next to it: in balance, at rest between steps, and with velocities of its own path."""
     gait = None
     for foot, length in (("l_foot", 0.15), ("r_foot", 0.3), ("l_foot", 0.15)):
         gait = dojo.gaits.step(atlas, swinging=foot, length=length, lower=0.06, after=gait)
@@ -81,7 +81,7 @@ def test_wrong_steps_are_named(atlas):
         dojo.gaits.step(atlas, length=1.0)
 
 
-def test_tracking_gains_are_those_of_the_regulator():
+def test_tracking_gains_agree_with_the_regulator():
     """Far from the end they solve the algebraic Riccati equation."""
     sim = dojo.Simulator(dojo.models.cartpole(), time_step=0.05, tolerance=1e-12)
     up = np.array([0.0, np.pi, 0.0, 0.0])
@@ -98,7 +98,7 @@ def test_tracking_gains_are_those_of_the_regulator():
 
 @pytest.mark.slow
 def test_the_example_step_holds_at_a_fifth_of_the_time_step(atlas):
-    """A shorter version of examples/atlas_step.py, under the plan's own gains and under those of its costs alone."""
+    """A shorter version of examples/atlas_step.py, under the plan's own gains and under gains from its costs alone."""
     gait = dojo.gaits.step(atlas, length=0.1)
     torques = gait.torques()
     weight = np.concatenate([np.full(3, 30.0), np.full(3, 10.0), np.full(30, 0.2), np.full(6, 0.01), np.full(30, 1e-3)])

@@ -1,4 +1,4 @@
-"""Bridges: gradients by what a framework holds are central differences, batches are their rows, errors keep their text."""
+"""Bridges: gradients by a framework's tensors equal central differences, batches equal rows, errors keep their text."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def test_jax_large_batches_come_back(jax: Any) -> None:
     assert float(total(x)) == pytest.approx(np.sum(expected**2))
 
 
-def test_jax_says_what_is_wrong(jax: Any) -> None:
+def test_jax_names_the_error(jax: Any) -> None:
     step, rollout = dojo.bridges.to_jax(PENDULUM)
     with pytest.raises(ValueError, match=r"to_jax: argument us: expected shape \(T, 1\), got \(1,\)"):
         rollout(np.zeros(2), np.zeros(1))
@@ -168,7 +168,7 @@ def test_torch_has_gradients_with_leading_axes() -> None:
     assert step(torch.tensor(x0), torch.tensor(us[:, 0])).shape == (4, HOPPER.nx)
 
 
-def test_torch_agrees_with_its_own_differences_and_says_what_is_wrong() -> None:
+def test_torch_agrees_with_its_own_differences_and_names_the_error() -> None:
     torch = pytest.importorskip("torch")
     step, rollout = dojo.bridges.to_torch(PENDULUM)
     x, us = torch.tensor([0.4, -1.0]).double(), torch.full((2, 4, 1), 0.3).double()

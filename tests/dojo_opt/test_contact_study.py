@@ -1,4 +1,4 @@
-"""The contact study: what it measures has the right size, and its bars can be missed."""
+"""The contact study: its values have the right size, and its bars can be missed."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ def test_an_engine_that_stops_is_not_a_number() -> None:
     assert np.isnan(measure.creep(Ours(kappa=1e-10, tolerance=1e-30, rounds=1), 1e-2, 0.1)["drift"])
 
 
-def test_balls_that_give_everything_back_keep_their_energy() -> None:
+def test_elastic_balls_keep_their_energy() -> None:
     assert simbenchmark.bouncing(1e-2, 2, 3.0) < 1e-8
 
 
-def test_a_ball_that_hits_a_robot_hands_its_momentum_over() -> None:
+def test_a_ball_that_hits_a_robot_transfers_its_momentum() -> None:
     assert simbenchmark.momentum(1e-2, 0.5) < 1e-11
 
 

@@ -35,7 +35,7 @@ def test_constant_cycle_has_the_stationary_gains():
     np.testing.assert_allclose(K, np.tile(expected, (4, 1, 1)), atol=1e-7)
 
 
-def test_gains_hold_up_what_an_unstable_cycle_lets_fall():
+def test_gains_stabilize_an_unstable_cycle():
     rng = np.random.default_rng(1)
     T, n = 5, 3
     A, B = 2.0 * rng.normal(size=(T, n, n)), rng.normal(size=(T, n, 2))

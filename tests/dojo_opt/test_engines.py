@@ -59,7 +59,7 @@ def test_velocity_is_the_derivative_of_position(engine: PhysicsEngine) -> None:
     np.testing.assert_allclose(run.velocity[1:-1, :, :3], rate, atol=2e-4)
 
 
-def test_energy_of_a_run_is_that_of_the_simulator() -> None:
+def test_energy_of_a_run_agrees_with_the_simulator() -> None:
     mech = dojo.models.quadruped(spring=5.0, limits=False)
     sim = dojo.Simulator(mech, time_step=0.01)
     rng = np.random.default_rng(2)
@@ -80,7 +80,7 @@ def test_inputs_are_held_or_given_step_by_step() -> None:
         assert np.abs(once.position - swing(engine).position).max() > 1e-3
 
 
-def test_a_run_that_is_lost_says_so_and_keeps_what_was_good() -> None:
+def test_a_lost_run_says_so_and_keeps_its_good_samples() -> None:
     mech = dojo.models.npendulum(2)
     args = {"time_step": 0.1, "q": [1.0, 0.0], "duration": 1.0, "samples": 10}
     ours = Ours(divide=False).simulate(mech, v=[400.0, 0.0], **args)
@@ -94,7 +94,7 @@ def test_a_run_that_is_lost_says_so_and_keeps_what_was_good() -> None:
 
 
 def test_an_engine_that_raises_is_a_run_that_ends_at_its_start() -> None:
-    """And one that cannot represent a mechanism still says so."""
+    """An engine that cannot represent a mechanism still says so."""
 
     class Breaking:
         name = "breaking"
@@ -134,7 +134,7 @@ def test_an_engine_that_kills_its_process_is_a_cell_and_the_report_goes_on(monke
 
 def test_nothing_is_written_where_the_user_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    test_a_run_that_is_lost_says_so_and_keeps_what_was_good()
+    test_a_lost_run_says_so_and_keeps_its_good_samples()
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,4 +1,4 @@
-"""Falls and figures of robots whose base moves in a plane, and of those without a base that can fall."""
+"""Falls and figures of robots with a planar base, and of robots without a base that can fall."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_time_goes_on_in_a_controller():
     mpc(0.0, np.zeros(2))
 
 
-def test_what_cannot_be_shown_is_refused():
+def test_impossible_figures_are_refused():
     with pytest.raises(TypeError, match="expected a Trajectory, a Plan or a ClosedLoop to show, got a ndarray"):
         dojo.plots.trajectory(np.zeros(3))
 

@@ -23,7 +23,7 @@ def bent(sim, rng):
     return sim.integrate(sim.neutral(), dx)
 
 
-def test_positions_are_those_of_the_contacts(sim, rng):
+def test_positions_agree_with_the_contacts(sim, rng):
     x = bent(sim, rng)
     step = sim.step(x)
     feet = Feet(sim)
@@ -61,7 +61,7 @@ def test_inverse_kinematics_reaches(sim, rng):
     assert np.all(placed[:, 9:19:3] < -1.0)  # knees stay bent to their side
 
 
-def test_inverse_kinematics_names_what_it_cannot_reach(sim):
+def test_inverse_kinematics_names_the_foot_out_of_reach(sim):
     feet, x = Feet(sim), sim.neutral()
     far = feet.positions(x)[None]
     far[0, 2, 2] -= 0.5
@@ -136,7 +136,7 @@ def on_its_feet(robot, x):
 
 @pytest.mark.parametrize("ground", [Terrain.slope(0.1, (1.0, 0.5)), WAVES])
 def test_equilibrium_on_terrain(ground):
-    """Friction carries what a slope leaves: the whole weight, upwards; what is left creeps with kappa."""
+    """Contact forces carry the whole weight on a slope, upwards; the remaining motion creeps with kappa."""
     robot = Simulator(models.quadruped(damper=0.5).on(ground), time_step=0.02, kappa=1e-8)
     x, u = equilibrium(robot, on_its_feet(robot, robot.neutral()))
     step = robot.step(x, u)

@@ -75,7 +75,7 @@ def test_periodic_motion_is_the_best_of_its_kind(shift):
     np.testing.assert_allclose(plan.x[-1] - plan.x[0], shift, atol=1e-8)
 
 
-def test_what_is_not_free_stays():
+def test_coordinates_that_are_not_free_stay():
     p, _ = problem(free_start=[1], constraints=[Goal([0.0, 0.0])])
     plan = ilqr(p, stages=ONE_STAGE)
     assert plan.success and plan.x[0, 0] == 1.0 and plan.x[0, 1] != 0.0
@@ -138,7 +138,7 @@ def test_a_body_turns_and_returns():
         ({"constraints": [Periodic([1.0])]}, r"Periodic\(shift=...\): expected shape"),
     ],
 )
-def test_what_cannot_be_is_said(settings, message):
+def test_impossible_free_starts_are_refused(settings, message):
     with pytest.raises(ValueError, match=message):
         problem(**settings)
 

@@ -28,7 +28,7 @@ def gait(request, sim):
     return getattr(gaits, request.param)(sim, **PERIODIC[request.param])
 
 
-def test_every_row_is_a_state_whose_velocity_led_to_it(sim, gait):
+def test_every_row_is_a_state_reached_with_its_velocity(sim, gait):
     h, nq = sim.time_step, sim.nq
     following = gait.x[1:].copy()
     back = sim.integrate(
@@ -141,6 +141,6 @@ def test_torques_move_the_reference_as_it_moves(sim):
         ("stand", {"duration": 0.0}, r"gaits.stand\(duration=...\)"),
     ],
 )
-def test_what_cannot_be_is_said(sim, name, settings, message):
+def test_impossible_gaits_are_refused(sim, name, settings, message):
     with pytest.raises(ValueError, match=message):
         getattr(gaits, name)(sim, **settings)

@@ -1,4 +1,4 @@
-"""The study `gradients`: its references are right, and its numbers say what they claim."""
+"""The study `gradients`: its references are right, and its numbers match their names."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_differences_of_a_linear_step_are_its_matrices():
 
 
 def test_ways_to_a_jacobian_agree():
-    """A sliding block without MuJoCo: what is called exact is, and differences have the errors of their order."""
+    """A sliding block without MuJoCo: exact Jacobians are exact, and differences have the errors of their order."""
     scene = peer_steps.scenes()[0]
     points, notes = one_step.measure(scene, 1)
     assert notes == []
@@ -74,7 +74,7 @@ def test_chained_jacobians_are_the_derivative_of_the_motion_and_coulombs(motion)
 
 
 def test_engines_are_differenced_from_their_own_rest():
-    """Our own engine: its rest is 25 cm up, and the derivative that of the chain."""
+    """Our own engine: it rests 25 cm up, and the derivative equals the chained one."""
     motion = sliding.motions()[-1]
     found = sliding.differenced(Ours(kappa=1e-8), motion, 0.02, 1e-5)
     assert found.value == pytest.approx(sliding.chained(motion, 0.02, 1e-8).value, abs=1e-3)
@@ -143,7 +143,7 @@ def test_drake_touches_down_with_the_slope_of_its_own_curve():
     assert curve.gradient[2] == 0.0 and curve.velocity[2] == pytest.approx(-1.0 - 9.81 * touchdown.H)
 
 
-def test_what_drake_cannot_be_told_is_refused():
+def test_scenes_that_drake_cannot_represent_are_refused():
     pytest.importorskip("pydrake")
     from benchmarks.studies.gradients.drake_step import DrakeStep
 
@@ -163,7 +163,7 @@ def test_touch_down_is_half_way_at_the_touch_and_bounded_by_hard_contact():
         assert -1.0 < gradient[0] < -0.5 < gradient[2] < 0.0
 
 
-def test_bias_is_that_of_the_central_path():
+def test_bias_agrees_with_the_central_path():
     """First order in kappa; a resting contact has b / (1 + b), b = kappa / (m g^2 h^3)."""
     for regime in smoothing.regimes():
         small, large = smoothing.bias(regime, (1e-8, 1e-7))
@@ -184,7 +184,7 @@ def test_a_contact_is_felt_from_where_the_formula_says():
         assert smoothing.gradient_at(kappa, smoothing.reach(kappa)) == pytest.approx(smoothing.FELT, rel=1e-6)
 
 
-def test_relative_error_is_that_of_the_whole_matrix():
+def test_relative_error_refers_to_the_whole_matrix():
     assert relative_error(np.diag([3.0, 1.0]), np.diag([3.0, 0.0])) == pytest.approx(1.0 / 3.0)
 
 

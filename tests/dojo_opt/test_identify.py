@@ -46,7 +46,7 @@ def test_outliers_are_resisted():
     assert errors[0] < 3.0 * robust.deviation[0] and errors[0] < 0.5 * errors[1] and robust.outliers > 0.01
 
 
-def test_what_the_data_cannot_tell_is_named():
+def test_unidentifiable_parameters_are_named():
     """Of a body that hangs still on a hinge without gravity, mass and inertia about the hinge act as one."""
     sim = _arm().replace(gravity=(0.0, 0.0, 0.0))
     motions = _motions(sim, np.random.default_rng(2), np.zeros(2))
@@ -85,7 +85,7 @@ def test_friction_is_found_through_contacts():
     np.testing.assert_allclose(found.values, 0.35, rtol=2e-3)
 
 
-def test_derivatives_of_differences_are_those_of_central_differences():
+def test_derivatives_of_differences_agree_with_central_differences():
     sim = dojo.Simulator(dojo.models.sphere(), time_step=0.01)
     from dojo_opt.planning.manifold import tangent_layout
 

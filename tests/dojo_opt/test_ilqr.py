@@ -1,4 +1,4 @@
-"""iLQR on small systems: what it solves, what it reports, what it refuses."""
+"""iLQR on small systems: solutions, reports, refusals."""
 
 import io
 
@@ -24,7 +24,7 @@ def test_lqr_in_one_iteration():
     plan = ilqr(problem)
     assert plan.success and plan.status == Status.SOLVED and plan.nit == 1
     assert plan.history[0]["alpha"] == 1.0 and np.abs(plan.k).max() < 1e-7
-    # its gains are those of the infinite horizon, far from the end
+    # far from the end its gains equal the gains of the infinite horizon
     lin = problem.sim.linearize_trajectory(plan.x[:2], plan.u[:1])
     A, B = lin.A[0], lin.B[0]
     P = solve_discrete_are(A, B, np.eye(2), 0.1 * np.eye(1))

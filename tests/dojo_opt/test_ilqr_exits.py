@@ -116,8 +116,8 @@ def broken(**given):
     return Problem(sim, [1.0, 0.0], 10, cost=[Tracking(np.zeros(2), 1.0), Effort(1e-3)])
 
 
-def test_a_number_that_is_not_finite_is_no_matter_of_regularization():
-    """And it is said where it is; control Hessians that are not positive definite either are what comes of it."""
+def test_a_number_that_is_not_finite_is_not_regularized():
+    """The message names its place, not the control Hessians that lose positive definiteness because of it."""
     plan = ilqr(broken())
     assert plan.status == Status.NOT_FINITE and not plan.success
     assert plan.message.startswith(MESSAGES[Status.NOT_FINITE] + " In the derivatives of the dynamics, at knot 4.")

@@ -63,7 +63,7 @@ def test_partial_steps_leave_the_rest_of_the_gaps(rng):
         np.testing.assert_allclose(following - shot.x[t + 1], 0.75 * now.gaps[t + 1], atol=1e-12)
 
 
-def test_iterations_one_by_one_are_those_of_a_solve():
+def test_iterations_one_by_one_agree_with_a_solve():
     """Gains and regularisation carry over from one call to the next."""
     problem, (stage,) = swingup(), ONE_STAGE
     plan = ilqr(problem, stages=ONE_STAGE)
@@ -97,7 +97,7 @@ def test_a_good_guess_of_states_skips_the_smooth_stages():
 
 
 class Lost(Pendulum):
-    """Its rollouts fail, the first so many of them."""
+    """A pendulum: its first `lost` rollouts fail."""
 
     lost = 14
 

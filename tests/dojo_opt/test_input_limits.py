@@ -13,7 +13,7 @@ from support.urdf_files import arm
 
 
 def limited() -> dojo.Simulator:
-    """A pendulum whose input has 1.5 N m and 2 rad/s."""
+    """A pendulum; its input is limited to 1.5 N m and 2 rad/s."""
     mech = dojo.models.pendulum()
     return dojo.Simulator(replace(mech, inputs=[replace(mech.inputs[0], limits=(-1.5, 1.5), speed=2.0)]), 0.05)
 

@@ -1,4 +1,4 @@
-"""Ctrl-C during plans, closed loops and studies: the process goes on, and has what was done until then."""
+"""Ctrl-C during plans, closed loops and studies: the process goes on, and keeps the results up to then."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ENDLESS: dict[str, Any] = {"tolerance": 1e-12, "violation": 1e-14}
 
 @pytest.mark.slow
 @pytest.mark.parametrize("after", [0.02, 0.1, 0.2, 0.5, 1.0])
-def test_a_plan_that_ctrl_c_ends_is_the_one_of_its_last_iteration(after: float) -> None:
+def test_a_plan_ended_by_ctrl_c_is_its_last_iterate(after: float) -> None:
     dojo.ilqr(dojo.problems.trot(), max_iterations=2)
     plan = heard(lambda: dojo.ilqr(TROT, **ENDLESS), after)
     if plan is None:  # while the first iterate was made
@@ -48,7 +48,7 @@ def test_a_plan_after_interrupted_ones_is_the_same() -> None:
 
 
 @pytest.mark.slow
-def test_closed_loops_and_studies_keep_what_they_have() -> None:
+def test_closed_loops_and_studies_keep_their_results() -> None:
     mpc = dojo.tasks.hopper_mpc()
     plant = dojo.tasks.plant(mpc, 2e-3)
     dojo.closed_loop(mpc, plant, 0.05)
@@ -68,7 +68,7 @@ def test_ctrl_c_from_outside_never_crashes_a_plan() -> None:
     program = (
         "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"  # ignored in a shell's background jobs
         "import dojo_opt as dojo\nproblem = dojo.problems.trot(cycles=30)\n"
-        "dojo.ilqr(problem, tolerance=1e-12, violation=1e-14, time_limit=0.5)\n"  # compiles what is needed below
+        "dojo.ilqr(problem, tolerance=1e-12, violation=1e-14, time_limit=0.5)\n"  # compile the code needed below
         "print('start', flush=True)\n"
         "try:\n    dojo.ilqr(problem, tolerance=1e-12, violation=1e-14)\n"
         "except KeyboardInterrupt as stop:\n    print(type(stop).__name__, stop.result.status.name)\n"
@@ -105,7 +105,7 @@ UNSAFE = {
 
 
 @pytest.mark.parametrize("name", UNSAFE)
-def test_no_kernel_returns_what_python_has_to_make(name: str) -> None:
+def test_no_kernel_returns_python_objects(name: str) -> None:
     with pytest.raises(TypeError, match="expected to return numbers and plain tuples to Python"):
         local_kernel(UNSAFE[name])(1.0)
 

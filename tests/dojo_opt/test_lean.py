@@ -1,4 +1,4 @@
-"""The report `lean`: its scenes differ by what they say, and it counts what is there."""
+"""The report `lean`: its scenes differ by the features in their names, and it counts existing features."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_every_row_has_one_feature_more(measured):
     assert sizes[0] < sizes[1] == sizes[2] < sizes[3] == sizes[4] < sizes[5] == sizes[6]
 
 
-def test_times_are_those_of_solved_steps(measured):
+def test_times_are_for_solved_steps(measured):
     for cost in measured.values():
         assert cost.step.shape == (1,) and np.all(cost.step > 0.0) and cost.iterations >= 1.0
 

@@ -158,7 +158,7 @@ def test_substeps_take_the_gait_at_the_time_step_of_the_simulator():
         problems.follow(gait, guess="flying")
 
 
-def test_figure_of_a_gait_shows_what_the_contacts_do():
+def test_figure_of_a_gait_shows_its_contacts():
     plan = ilqr(problems.trot(damping=5.0, cycles=1))
     figure = plots.gait(plan)
     diagram, forces, paths, friction = figure.axes

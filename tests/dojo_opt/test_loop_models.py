@@ -28,7 +28,7 @@ def test_loops_stay_closed_and_energy_bounded(bench: Any, name: str) -> None:
     assert energy < 0.05
 
 
-def test_what_a_loop_costs_is_measured(bench: Any) -> None:
+def test_the_cost_of_a_loop_is_measured(bench: Any) -> None:
     steps, gap, _, cost, tree, _ = bench.motion("fivebar", 200)
     assert steps == 200 and gap < 1e-10 and cost > 0.0 and tree > 0.0
 

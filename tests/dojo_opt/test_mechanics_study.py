@@ -1,4 +1,4 @@
-"""The mechanics study measures what its columns say, and would notice a wrong one."""
+"""The mechanics study measures the quantities of its columns, and would notice a wrong value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every ready-made mechanism moves as it should: it steps, conserves, and its gradients are those of its steps."""
+"""Every ready-made mechanism moves as it should: it steps, conserves, and its gradients match its steps."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from dojo_opt.plant.plant import Plant
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), time_step=5e-3, kappa=1e-8)
 
 
-def test_wilson_interval_is_the_one_of_the_score_test():
+def test_wilson_interval_inverts_the_score_test():
     """Its ends are the p at which the observed share is 1.96 standard deviations away."""
     for k, n in ((0, 10), (3, 10), (95, 100), (100, 100)):
         lo, hi = wilson_interval(k, n)

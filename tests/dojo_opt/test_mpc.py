@@ -190,7 +190,7 @@ def test_every_guess_keeps_the_hopper_standing(guess):
 
 @pytest.mark.slow
 def test_hopper_hops_and_survives_a_payload_that_the_open_loop_guess_does_not():
-    """Planning facts, section 2.6: what a tick starts from decides."""
+    """Planning facts, section 2.6: the initial guess of a tick decides."""
     mpc = dojo.tasks.hopper_mpc()
     loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, 2e-3, payload=2.35), 2.0)
     assert loop.survived, loop.message

@@ -1,4 +1,4 @@
-"""Parameters as a vector for a fit: what it means, its derivatives, and that a fit does not leave what bodies can have."""
+"""Parameters as a vector for a fit: its meaning, its derivatives, and fits that stay among possible bodies."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_the_space_starts_where_the_simulator_is() -> None:
     assert space.labels[-10:] == tuple(f"block.{label}" for label in inertia_coordinates.LABELS)
 
 
-def test_what_is_common_to_all_ends_with_the_least_of_them() -> None:
+def test_a_common_shift_is_bounded_by_the_least_parameter() -> None:
     mech = dojo.models.npendulum(3)
     sim = dojo.Simulator(mech).with_parameters({"damper": [0.1, 0.2, 0.6]})
     space = dojo.ParameterSpace(sim, ("damper:*", "mass:*"))
@@ -135,7 +135,7 @@ def fit(space: dojo.ParameterSpace, truth: dojo.Simulator) -> np.ndarray:
 
 
 def test_a_fit_of_a_body_stays_among_bodies() -> None:
-    """From a wrong guess: ten coordinates find the body; mass and inertia by themselves leave what bodies can have."""
+    """From a wrong guess: ten coordinates find the body; mass and inertia alone leave the set of possible bodies."""
     truth = block(inertia=np.array([0.02, 0.03, 0.0495, 0.0, 0.0, 0.0]))  # a thin one: 2 % from the border
     guess = block(inertia=np.array([0.1, 0.11, 0.12, 0.0, 0.0, 0.0]), mass=1.0)
     space = dojo.ParameterSpace(guess, bodies=["block"])
@@ -160,6 +160,6 @@ def test_a_fit_of_a_body_stays_among_bodies() -> None:
         ((), ("leg",), None, "no parameter 'mass:leg'"),
     ],
 )
-def test_what_is_refused(names, bodies, bounds, message) -> None:
+def test_refusals(names, bodies, bounds, message) -> None:
     with pytest.raises(ValueError, match=message):
         dojo.ParameterSpace(block(), names, bodies, bounds)

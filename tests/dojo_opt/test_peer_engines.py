@@ -92,7 +92,7 @@ def test_bullet_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize("engine", [pytest.param("lagged", marks=drake), pytest.param("bullet", marks=bullet)])
-def test_what_a_peer_cannot_say_is_refused(engine: str) -> None:
+def test_scenes_that_a_peer_cannot_represent_are_refused(engine: str) -> None:
     with pytest.raises(ValueError, match="not represented|has no spring"):
         motion(make(engine), chain("spherical", 1, base=None, spring=3.0), 1e-2)
 

@@ -21,7 +21,7 @@ from dojo_opt.report import Progress
 needs_mujoco = pytest.mark.skipif(find_spec("mujoco") is None, reason="needs MuJoCo")
 
 
-def test_a_plan_that_lives_on_soft_contact_is_found_out():
+def test_a_plan_that_exploits_soft_contact_is_detected():
     """At kappa 1e-2 the ground pulls a block up that it does not touch: the plan counts as solved, and does not hold."""
     problem = dojo.problems.block("up")
     soft = measure.ours(problem, stages=(Stage(1e-2, 1e-2),))
@@ -64,7 +64,7 @@ def outcome(cost: float, *, success: bool = True, replayed: float = 1e-4, second
     return PlanOutcome("planner", "setting", success, *found)
 
 
-def test_scores_count_what_is_solved_true_and_good():
+def test_scores_count_solved_true_and_good_plans():
     a, b = Setting("default", "default", {}), Setting("solver", "other", {})
     first = [outcome(1.0), outcome(2.0, success=False), outcome(5.0), outcome(0.1, replayed=np.nan)]
     second = [outcome(1.05, seconds=3.0), outcome(1.0), outcome(3.0), outcome(4.0, replayed=1.0)]
@@ -96,7 +96,7 @@ def test_a_lost_guess_of_mujoco_is_an_outcome():
 
 
 @needs_mujoco
-def test_settings_of_the_yardstick_do_what_they_say():
+def test_settings_of_the_yardstick_take_effect():
     problem = dojo.problems.block("up")
     assert MujocoIlqr(problem, MujocoSettings(step=5e-3)).substeps == 20
     assert np.all(MujocoIlqr(problem, MujocoSettings(smooth=True))._model.pair_solimp[:, 0] == 0.0)

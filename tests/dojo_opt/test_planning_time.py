@@ -27,7 +27,7 @@ def trot():
 
 
 @pytest.mark.slow
-def test_rows_exist_without_the_peers_and_a_note_says_what_is_missing(monkeypatch):
+def test_rows_exist_without_the_peers_and_a_note_names_the_missing_ones(monkeypatch):
     monkeypatch.setattr(planning_time, "find_spec", lambda name: None)
     report = Report("title", "command")
     planning_time.add_planning(report, quick=True)
@@ -53,7 +53,7 @@ def test_crocoddyl_with_another_pin_is_left_out(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="needs MuJoCo")
 def test_mujoco_and_numpy_plan_the_same_trot(trot):
-    """The yardstick reaches what ours is asked for: the goal, upright, without gaps, and a cost of the same size."""
+    """The yardstick meets our requirements: it reaches the goal, upright, without gaps, at a cost of the same size."""
     solver = planning_time.MujocoIlqr(trot)
     solution = solver.solve(max_iterations=60)
     assert solution.iterations < 60

@@ -79,7 +79,7 @@ def test_delay_holds_commands_back():
     np.testing.assert_array_equal(loop.u[:, 2], [0, 0, 0, 1, 2, 3])
 
 
-def test_actuators_do_what_they_can():
+def test_actuators_saturate():
     plant = Plant(HOPPER, high(HOPPER), control_limits=(-1.0, [2.0, 2.0, 3.0]))
     loop = dojo.closed_loop(lambda t, x: np.array([-5.0, 5.0, 5.0]), plant, 0.01, fallen=lambda x: False)
     np.testing.assert_array_equal(loop.u, [[-1.0, 2.0, 3.0]] * 2)
@@ -184,7 +184,7 @@ def test_ground_is_learnt_from_a_foot_that_stands():
     moving[2] += 0.01
     ground.learn(policy, 0.0, moving, (-0.005, higher))
     assert ground.height[0] == pytest.approx(0.03, abs=1e-12)
-    r = sim.step(higher, np.array([0.0, 0.0, 41.0]))  # the step of this simulator knows it, that of others does not
+    r = sim.step(higher, np.array([0.0, 0.0, 41.0]))  # this simulator's step knows it, the steps of others do not
     assert r.contacts.normal_force[0] > 10.0 and Ground(HOPPER).height[0] == 0.0
     ground.forget()
     np.testing.assert_array_equal(ground.height, 0.0)

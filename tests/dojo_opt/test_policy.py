@@ -29,7 +29,7 @@ def test_shift_between_knots_keeps_the_impulse_and_stays_on_the_manifold():
     np.testing.assert_allclose(
         HOPPER.difference(later.x[:-1], policy.x[:-1]), 0.3 * HOPPER.difference(policy.x[1:], policy.x[:-1]), atol=1e-9
     )
-    for i in range(6):  # the state of the shifted plan at its knots is that of the old plan at that time
+    for i in range(6):  # at its knots the shifted plan has the state of the old plan at that time
         np.testing.assert_allclose(later.x[i], policy.state(later.time + 0.05 * i), atol=1e-9)
 
 

@@ -1,4 +1,4 @@
-"""Moving references, and what is made up at the end of a horizon that moves on."""
+"""Moving references, and the new references at the end of a horizon that moves on."""
 
 import numpy as np
 import pytest
@@ -56,7 +56,7 @@ def test_references_are_checked_at_the_border(reference, message):
 
 def test_references_move_with_time_and_with_the_ground():
     problem = standing_problem()
-    moved = dojo.MPC(problem)  # MPC's own terms; those of the user's problem stay
+    moved = dojo.MPC(problem)  # MPC's own terms; the terms of the user's problem stay
     references = References(moved.problem, {0: Sampled([0.0, 1.0], _ahead(1.0), HOPPER), 1: np.zeros((3, 3))})
     references.move(0.5, 0.02)
     term = moved.problem.costs[0]

@@ -115,7 +115,7 @@ def test_the_time_of_a_robot() -> None:
     assert measured.figure is not None and measured.command == "dojo-opt report timing --quick"
 
 
-def test_progress_names_what_is_worked_on(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_names_the_current_case(capsys: pytest.CaptureFixture[str]) -> None:
     import sys
 
     assert list(Progress(sys.stderr)([("first", 1), ("second", 2)], "study")) == [1, 2]

@@ -290,7 +290,7 @@ print((rss() - first) / COUNT)
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads the memory of a process as Linux says it")
 def test_memory_of_new_residuals_is_bounded():
-    """Numba frees no code: a residual with a value of its own keeps some; one that was there before, nothing."""
+    """Numba frees no code: a residual with a new value keeps some; a residual with a known value keeps none."""
     again = float(python(MEMORY.replace("COUNT", "10").replace("VALUE", "1.0")))
     anew = float(python(MEMORY.replace("COUNT", "10").replace("VALUE", "10.0 + i")))
     assert again < 0.1

@@ -73,7 +73,7 @@ def reach(rng):
 
 @pytest.mark.parametrize("make", [pushed_box, hop, block, reach], ids=lambda f: f.__name__)
 @pytest.mark.parametrize("seed", range(5))
-def test_plans_from_rest_move_what_has_to_move(make, seed):
+def test_plans_from_rest_succeed(make, seed):
     problem = make(np.random.default_rng(seed))
     plan = dojo.ilqr(problem)
     assert plan.success, plan.closing_line()
@@ -108,8 +108,8 @@ def test_the_quadruped_jumps_from_states_at_rest(seed):
     assert plan.x[top, 2] > stand[2] + height - 2e-3
 
 
-def test_a_guess_that_rests_where_it_is_meant_to_begins_at_the_hardest_stage():
-    """Nothing has to move: smooth contact would only lift it off the ground, and the table says what is skipped."""
+def test_a_guess_that_rests_at_its_goal_begins_at_the_hardest_stage():
+    """Nothing has to move: smooth contact would only lift it off the ground, and the table lists the skipped stages."""
     sim = dojo.Simulator(dojo.models.raiberthopper(), time_step=0.05, kappa=1e-6)
     start, hold = sim.neutral(), np.array([0.0, 0.0, 9.81 * 4.18])
     start, hold = dojo.equilibrium(sim)

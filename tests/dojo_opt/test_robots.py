@@ -77,7 +77,7 @@ def test_an_arm_reaches_a_pose_within_its_limits():
     assert plan.nit < 30 and R.shape == (3, 3)
 
 
-def test_what_no_robot_can_do_is_refused(straight):
+def test_impossible_motions_are_refused(straight):
     arm = dojo.models.panda(gripper=False)
     with pytest.raises(ValueError, match="out of reach"):
         dojo.problems.reach(arm, "link7", (5.0, 0.0, 0.0))

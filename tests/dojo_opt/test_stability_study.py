@@ -55,7 +55,7 @@ def test_trials_pass(name: str) -> None:
     assert verdict.passed, (verdict, run.message)
 
 
-def test_a_rule_is_missed_by_what_breaks_it() -> None:
+def test_rules_fail_when_the_physics_is_wrong() -> None:
     """A damped spring loses its amplitude, a softer kappa holds the load too high, a coarse tolerance loses momentum."""
     spring = replace(joints.spring(1e2, 1e-2), mechanism=joints.slider(spring=1e2, damper=1.0))
     assert not spring.judge(ours(spring), ours=True).passed
@@ -65,7 +65,7 @@ def test_a_rule_is_missed_by_what_breaks_it() -> None:
     assert not spin.judge(ours(spin), ours=True).passed
 
 
-def test_what_can_be_represented_is_no_refusal_and_a_stop_is_no_pass() -> None:
+def test_a_representable_step_is_not_refused_and_a_stop_does_not_pass() -> None:
     gentle = bodies.spin((0.1, 0.2, 0.3), (0.0, 1.0, 0.0), 1e-2, refusal="half a turn")
     verdict = gentle.judge(ours(gentle), ours=True)
     assert not verdict.passed and verdict.text == "not refused" and np.isnan(verdict.value)
@@ -84,7 +84,7 @@ def test_a_chain_beyond_the_limit_of_the_time_step_says_so() -> None:
     assert [ours(trial).message == "" for trial in found] == [False, True]
 
 
-def test_trials_of_a_robot_and_what_they_advise(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_trials_of_a_robot_and_their_advice(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "installed", list)
     mechanism = dojo.models.raiberthopper()
     report = StabilityStudy(quick=True, mechanism=mechanism).run(Progress())

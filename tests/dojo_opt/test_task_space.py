@@ -1,4 +1,4 @@
-"""Costs and constraints in task space: values beside Kinematics and the simulator, derivatives beside differences."""
+"""Costs and constraints in task space: values against Kinematics and the simulator, derivatives against differences."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ T = 3
 
 
 def expansion_error(sim, term, xs, us):
-    """Largest error of the gradient of a term beside central differences of its value, relative to the gradient."""
+    """Largest error of the gradient of a term against central differences of its value, relative to the gradient."""
     n = sim.ndx
     g, H = np.zeros((T + 1, n + sim.nu)), np.zeros((T + 1, n + sim.nu, n + sim.nu))
     term.expand(xs, us, g, H)
@@ -80,7 +80,7 @@ def test_gradients_agree_with_differences(walker, name):
     assert expansion_error(sim, bound(spec, sim, xs), xs, us) <= tolerance
 
 
-def test_places_and_velocities_are_those_of_kinematics(walker):
+def test_positions_and_velocities_agree_with_kinematics(walker):
     sim, xs, us = walker
     kin = dojo.Kinematics(sim)
     at, R = kin.pose(FOOT, xs[:, : sim.nq])
@@ -102,7 +102,7 @@ def test_places_and_velocities_are_those_of_kinematics(walker):
     )
 
 
-def test_forces_and_slips_are_those_of_the_rollout(walker):
+def test_forces_and_slips_agree_with_the_rollout(walker):
     sim, xs, us = walker
     contacts = sim.rollout(xs[0], us, throw=True).contacts
     force = bound(cost.ContactForce(), sim, xs)

@@ -45,7 +45,7 @@ def test_hopping_reference_is_consistent():
 
 @pytest.mark.parametrize("perturbation", [{}, {"friction": 0.25}], ids=["nothing", "half the friction"])
 def test_hopper_keeps_to_all_that_is_tracked(perturbation):
-    """Height included, which the distance along the ground leaves out: to 20 mm."""
+    """With height, which the distance along the ground does not include: to 20 mm."""
     mpc = dojo.tasks.hopper_mpc(velocity=(0.2, 0.0), height=0.25)
     loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, **perturbation), 4.0)
     each = loop.by_coordinate()
@@ -75,7 +75,7 @@ def test_quadruped_trots_under_load_on_slippery_ground_and_pushed(quadruped):
 
 
 def test_plans_count_on_less_friction_than_the_plant_has(quadruped):
-    """The model's forces stay inside the narrower cone; the robot and its plant keep what their feet have."""
+    """The model's forces stay inside the narrower cone; the robot and its plant keep the friction of their feet."""
     mpc, _ = quadruped
     plan = mpc.sim.rollout(mpc.policy.x[0], mpc.policy.u).contacts
     assert np.linalg.norm(plan.impulse[..., :2], axis=-1).max() > 0.1
@@ -127,7 +127,7 @@ def test_command_line_runs_a_task(tmp_path, capsys):
     assert main(fell) == 1
 
 
-def test_figures_show_what_happened(quadruped):
+def test_figures_show_the_motion(quadruped):
     mpc, loop = quadruped
     figure = dojo.plots.closed_loop(loop)
     axes = figure.axes

@@ -39,7 +39,7 @@ def random_states(sim, count, seed=0):
 
 
 def check_expansion(sim, term, xs, us, hessian=True):
-    """Gradient against central differences of the value; Hessian against those of the gradient where it is exact."""
+    """Gradient against differences of the value; an exact Hessian against differences of the gradient; all central."""
     n, m = sim.ndx, sim.nu
     g, H = np.zeros((T + 1, n + m)), np.zeros((T + 1, n + m, n + m))
     term.expand(xs, us, g, H)
@@ -153,7 +153,7 @@ def test_goal_of_an_attitude():
     np.testing.assert_allclose(term.violation().max(), expected, rtol=1e-12)
 
 
-def test_bounds_measure_only_what_is_outside():
+def test_bounds_measure_only_the_excess():
     sim = DoubleIntegrator()
     xs, us = np.zeros((T + 1, 2)), np.zeros((T, 1))
     xs[2, 0], xs[3, 1] = 1.5, -4.0

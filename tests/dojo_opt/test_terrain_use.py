@@ -1,4 +1,4 @@
-"""Terrain in what stands on the simulator: figures, viewer, feet, ground learnt by MPC, plants, other engines."""
+"""Terrain in code that builds on the simulator: figures, viewer, feet, ground learnt by MPC, plants, other engines."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_a_plant_stands_on_terrain_and_refuses_a_slope_of_its_own():
     assert plant.fallen(far)
 
 
-def test_other_engines_refuse_what_they_would_get_wrong():
+def test_other_engines_refuse_scenes_that_they_would_get_wrong():
     bouncing = dataclasses.replace(ball(), contacts=[dojo.Contact("ball", radius=0.1, restitution=0.5)])
     for model in (SIM.model, dojo.Simulator(bouncing).model):
         with pytest.raises(ValueError, match="terrain and restitution"):

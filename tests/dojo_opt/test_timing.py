@@ -1,4 +1,4 @@
-"""What the timing report measures is what its rows say."""
+"""The timing report measures the quantities in the names of its rows."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def test_a_robot_moves_in_a_video(fall, tmp_path):
     assert b"ftyp" in film.read_bytes()[:12]
 
 
-def test_what_is_no_video_is_refused(fall, tmp_path):
+def test_other_formats_and_odd_sizes_are_refused(fall, tmp_path):
     with pytest.raises(ValueError, match="avi"):
         dojo.viewer.save_video(fall, tmp_path / "fall.avi")
     with pytest.raises(ValueError, match="even numbers"):

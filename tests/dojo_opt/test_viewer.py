@@ -25,7 +25,7 @@ DRAWN = 500  # pixels of 480 x 360 that a robot covers at least
 
 @pytest.fixture(scope="module")
 def page():
-    """A page of a headless Chromium, that of the system or playwright's own, which draws without a graphics card."""
+    """A page of a headless Chromium, the system's or playwright's own, which draws without a graphics card."""
     playwright = pytest.importorskip("playwright.sync_api")
     names = ("chromium", "chromium-browser", "google-chrome")
     path = next((found for found in map(shutil.which, names) if found), None)
@@ -200,7 +200,7 @@ NAMES = ["constructor", "__proto__", "<object>", "a/b", "//", "$\\frac{", *(HOST
 
 
 def hostile(names):
-    """A mechanism whose every name is one of these."""
+    """A mechanism with all its names from these."""
     m, b, j, c, o = names
     ball = dojo.Body(b, 1.0, shape=dojo.Sphere(0.1))
     wall = dojo.Collision(b, shape_b=dojo.Box(0.2, 1.0, 1.0, center=(1, 0, 0)), name=o)
@@ -209,7 +209,7 @@ def hostile(names):
 
 
 def opened(page, path):
-    """What went wrong, or out, after loading a page and opening every folder of MeshCat's menu."""
+    """Errors and outgoing requests after loading a page and opening every folder of MeshCat's menu."""
     wrong = []
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on(

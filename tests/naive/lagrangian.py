@@ -81,7 +81,7 @@ def complement(rows: Array) -> Array:
 
 
 def constraint(joint: Joint, child: int, z: Poses) -> Array:
-    """What a joint forbids: 3 - ntrans translations and 3 - nrot components of the relative rotation."""
+    """Constraints of a joint: 3 - ntrans translations and 3 - nrot components of the relative rotation."""
     d, q = separation(joint, child, z)
     rows = [d @ complement(joint.trans_axes).T]
     if joint.lead:  # the two translations across the axis, and the one along it for every radian about it
@@ -199,7 +199,7 @@ def lag(scene: Scene, h: float) -> Array:
 
 
 def damped_mass(scene: Scene, q: Array, h: float) -> Array:
-    """M + C: what takes the velocity of the node to the momentum that arrives there."""
+    """M + C: maps the velocity of the node to the momentum that arrives there."""
     z = stiffness(scene, h)
     share = 3.0 * z / (6.0 + z + z * z)  # lag/I; a body with nothing but the damper has I v2 = (I - lag) v
     return mass_matrix(scene, q) + np.diag(lag(scene, h) / (1.0 - share))

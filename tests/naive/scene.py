@@ -168,7 +168,7 @@ def contact_frame(normal: Any) -> Array:
 
 
 def from_mechanism(mech: Any) -> Scene:
-    """The scene of a `dojo_opt.Mechanism`, from what its parts say about themselves."""
+    """The scene of a `dojo_opt.Mechanism`, from the attributes of its parts."""
     names = [body.name for body in mech.bodies]
     bodies = [Body(body.mass, np.array(body.inertia)) for body in mech.bodies]
     joints, limits, dof = [], [], {}

@@ -71,7 +71,7 @@ def rolled(h: float, q: Array, w: Array, until: float) -> Array:
     return sim.rollout(x, steps=round(until / h), throw=True).x[-1, :7]
 
 
-def test_rolling_is_that_of_the_ode() -> None:
+def test_rolling_agrees_with_the_ode() -> None:
     """After a second the error is of the order of the time step."""
     q = np.array([0.9, 0.3, -0.2, 0.1])
     q /= np.linalg.norm(q)

@@ -21,7 +21,7 @@ def nut(pitch: float = PITCH, **joint) -> dojo.Mechanism:
 
 @pytest.mark.parametrize("pitch", [PITCH, -PITCH])
 def test_a_nut_runs_down_its_spindle(pitch: float) -> None:
-    """(I + m lead^2) q'' = -m g lead: a heavier body, whose angle counts turns."""
+    """(I + m lead^2) q'' = -m g lead: a heavier body; its angle counts turns."""
     lead = pitch / (2.0 * np.pi)
     rate = -M * G * lead / (INERTIA + M * lead**2)
     errors = []
@@ -37,7 +37,7 @@ def test_a_nut_runs_down_its_spindle(pitch: float) -> None:
 
 
 def test_a_motor_holds_the_nut() -> None:
-    """u = m g lead; the spindle carries the weight with what the motor leaves of it, which does no work."""
+    """u = m g lead; the spindle carries the weight with the rest of the constraint force, which does no work."""
     sim = dojo.Simulator(nut(), time_step=0.01, tolerance=1e-13)
     u = M * G * LEAD
     np.testing.assert_allclose(sim.step(sim.neutral(), [u], throw=True).x, 0.0, atol=1e-12)
@@ -98,7 +98,7 @@ def test_a_screw_is_a_hinge_on_a_slide_in_gear(rng) -> None:
     x = np.r_[ours.neutral()[:7], 0.3, rng.normal(size=6), -2.0]
     y = np.r_[x[:7], LEAD * x[7], x[7], x[8:14], LEAD * x[14], x[14]]
     a, b = ours.rollout(x, us, throw=True).x, theirs.rollout(y, us, throw=True).x
-    # the inertia by which a damper is judged stiff is that of the tree, which the gear is not part of
+    # a damper is judged stiff by the inertia of the tree, and the gear is not part of the tree
     np.testing.assert_allclose(a[:, :7], b[:, :7], atol=1e-6)
     np.testing.assert_allclose(a[:, 7], b[:, 8], atol=1e-6)
     assert a[:, 7].min() < -0.39, "it meets the stop"

@@ -40,7 +40,7 @@ def test_no_creep_on_another_body_by_default(shape):
     assert np.linalg.norm(xs[-1, :2] - xs[0, :2]) < 1e-6
 
 
-def test_creep_is_that_of_the_central_path():
+def test_creep_agrees_with_the_central_path():
     """mu gamma v / (a + sqrt(a^2 + v^2)) = tangential load: v = 2 a r / (1 - r^2), a = gap/(2 mu), r = tan/mu."""
     angle, kappa, h = np.deg2rad(15.0), 1e-6, 0.01
     sim = dojo.Simulator(ball(friction=0.8, gravity=tilted(angle)), time_step=h, kappa=kappa, tolerance=1e-12)

@@ -1,4 +1,4 @@
-"""Steps of a given accuracy: asked against got, impacts at their times, derivatives, durations, and what is refused."""
+"""Steps of a given accuracy: requested against achieved, times of impacts, derivatives, durations, and refusals."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ G = 9.81
 
 
 def engine(sim: dojo.Simulator) -> AdaptiveEngine:
-    """That of a simulator with an accuracy."""
+    """The engine of a simulator with an accuracy."""
     assert isinstance(sim._engine, AdaptiveEngine)
     return sim._engine
 
@@ -146,7 +146,7 @@ def test_derivatives_keep_the_division(name: str, height: float, steps: int) -> 
 
 
 def test_orders_agree_on_dampers() -> None:
-    """A falling hopper with dampers: sub-steps of order 2 come to those of order 8, four times closer at half the length."""
+    """A falling hopper with dampers: substeps of order 2 approach order 8, four times closer at half the length."""
     sim = dojo.Simulator(models.hopper(), accuracy=1e-3)
     x = sim.start(np.r_[0.0, 6.0, 0.0, 0.3, 0.4, 0.2], 0.5 * np.random.default_rng(1).normal(size=sim.nv))
     count, ends = 8, []
@@ -180,7 +180,7 @@ def test_sweeps_closed_loops_and_batches_follow(swing: tuple[dojo.Simulator, doj
     assert np.array_equal(pickle.loads(pickle.dumps(sim)).rollout(motion.x[0], motion.u).x, motion.x)
 
 
-def test_states_at_any_time_are_those_of_the_motion(swing: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
+def test_states_at_any_time_agree_with_the_motion(swing: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
     sim, motion = swing
     times = np.array([0.0, 0.013, 0.05, 0.111, 0.5])
     fine = sim.replace(time_step=0.001, accuracy=1e-9).rollout(motion.x[0], np.repeat(motion.u, 50, axis=0))
@@ -190,7 +190,7 @@ def test_states_at_any_time_are_those_of_the_motion(swing: tuple[dojo.Simulator,
         motion.at([0.6])
 
 
-def test_what_cannot_be_is_refused() -> None:
+def test_impossible_accuracies_are_refused() -> None:
     mech = models.npendulum(2)
     for settings, match in (({"accuracy": 0.0}, "accuracy"), ({"accuracy": 1e-20}, "at least")):
         with pytest.raises(ValueError, match=match):
@@ -212,7 +212,7 @@ def test_contacts_refuse_an_accuracy_that_they_do_not_have() -> None:
 
 
 def test_estimated_errors_are_told() -> None:
-    """In flight each step has the error that is allowed; where contacts cannot have it, the message says so."""
+    """In flight each step meets the allowed error; where contacts cannot meet it, the message says so."""
     pendulum = dojo.Simulator(models.npendulum(2), time_step=0.1, accuracy=1e-5)
     swing = pendulum.rollout(np.array([1.0, 0.5, 0.0, 0.0]), steps=10, throw=True)
     assert np.all(swing.errors > 0.0) and swing.errors.max() <= 1.0

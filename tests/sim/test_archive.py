@@ -1,4 +1,4 @@
-"""Archives of simulators, trajectories and plans: what is saved comes back, and nothing else does."""
+"""Archives of simulators, trajectories and plans: loading restores the saved data, and nothing else."""
 
 import csv
 import json

@@ -64,7 +64,7 @@ def test_the_trunk_and_the_head_land_on_a_post(tmp_path: Path, x: float) -> None
     assert t.contacts.gap.min() > -1e-6
 
 
-def test_what_is_seen_only_counts_where_nothing_collides(tmp_path: Path) -> None:
+def test_visual_shapes_count_where_nothing_collides(tmp_path: Path) -> None:
     small, big = '<sphere radius="0.1"/>', '<sphere radius="0.3"/>'
     seen = collision(big).replace("collision", "visual")
     for parts, radius in (
@@ -81,7 +81,7 @@ def test_one_shape_twice_is_one_shape(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.*inertias that no rigid body has were repaired:sim.io.urdf.report.UrdfWarning")
-def test_masses_and_inertias_that_a_file_lacks_are_those_of_the_shapes(tmp_path: Path) -> None:
+def test_missing_masses_and_inertias_come_from_the_shapes(tmp_path: Path) -> None:
     """One link has a mass without inertia, one neither; the third has shapes, but an impossible inertia."""
     box = collision('<box size="0.2 0.4 0.6"/>', "0.1 0 0")
     none = (0.0,) * 6
@@ -116,7 +116,7 @@ def test_mjcf_bodies_keep_every_geom_that_collides() -> None:
 # -- bodies made by hand -----------------------------------------------------------------------------------------------
 
 
-def test_inertia_of_several_shapes_is_that_of_the_solid_they_make() -> None:
+def test_inertia_of_several_shapes_agrees_with_the_solid_they_make() -> None:
     """A box cut in three, one part a polytope that is not about its own centre; and a refusal of parts that are off."""
     corners = np.array(np.meshgrid((0.0, 0.3), (0.0, 0.2), (0.0, 0.4))).reshape(3, -1).T  # of .3 x .2 x .4
     parts = [

@@ -117,7 +117,7 @@ def least_squares_distance(kind: Pair, sizes: Array, R: Array, r: Array) -> floa
 
 
 @pytest.mark.parametrize("kind", CORE, ids=NAMES.get)
-def test_least_distance_is_that_of_bounded_least_squares(kind: Pair, rng: np.random.Generator) -> None:
+def test_least_distance_agrees_with_bounded_least_squares(kind: Pair, rng: np.random.Generator) -> None:
     """Outside of the cores, also with faces and edges that are almost parallel."""
     checked = 0
     for trial in range(150):
@@ -129,7 +129,7 @@ def test_least_distance_is_that_of_bounded_least_squares(kind: Pair, rng: np.ran
         if expected + sum(core(s, v)[2] for s, v in zip(shapes(kind), (sizes[:4], sizes[4:]), strict=True)) < 1e-3:
             continue
         checked += 1
-        # borders of faces are widened by 1e-4: a vertex that far beside a face counts as above it
+        # borders of faces are widened by 1e-4: a vertex within this distance of a border counts as above the face
         np.testing.assert_allclose(deepest(kind, sizes, R, r)[0], expected, atol=2e-5)
     assert checked > 75
 
@@ -144,7 +144,7 @@ MUJOCO = {
 
 
 @pytest.mark.parametrize("kind", [p for p in SIMPLE if p != Pair.STRING], ids=NAMES.get)
-def test_distance_and_normal_are_those_of_mujoco(kind: Pair, rng: np.random.Generator) -> None:
+def test_distance_and_normal_agree_with_mujoco(kind: Pair, rng: np.random.Generator) -> None:
     mujoco = pytest.importorskip("mujoco")
     a, b = shapes(kind)
 
@@ -173,11 +173,11 @@ def test_distance_and_normal_are_those_of_mujoco(kind: Pair, rng: np.random.Gene
             np.testing.assert_allclose(out[4:7], 0.5 * (segment[3:] + segment[:3]), atol=5e-3)
 
 
-# -- what pairs need ---------------------------------------------------------------------------------------------------
+# -- arrangements, bounds, order ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", SIMPLE, ids=NAMES.get)
-def test_what_is_chosen_at_a_pose_makes_the_contact_there(kind: Pair, rng: np.random.Generator) -> None:
+def test_the_elements_chosen_at_a_pose_make_the_contact_there(kind: Pair, rng: np.random.Generator) -> None:
     for trial in range(10):
         sizes = rng.uniform(0.15, 0.5, 2 * SIZES)
         R, r = random_pose(rng, kind, sizes, 0.04 * rng.normal(), aligned=trial % 2 == 0)

@@ -241,7 +241,7 @@ def test_the_deepest_point_is_the_same_from_either_side(kind: Pair, rng: np.rand
         one = min(contacts(kind, a, b, R, r), key=lambda out: out[0])
         other = min(contacts(kind, b, a, R.T, -R.T @ r), key=lambda out: out[0])
         if kind == Pair.BOX_BOX and one[0] < -0.02:
-            continue  # inside, a depth below a face need not be that of the other box
+            continue  # inside, a depth below a face need not equal the depth of the other box
         checked += 1
         np.testing.assert_allclose(other[0], one[0], atol=2e-5)
         np.testing.assert_allclose(-R @ other[1:4], one[1:4], atol=1e-3)

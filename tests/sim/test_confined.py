@@ -105,8 +105,8 @@ def test_the_angle_that_lifts_most_is_found(rng: np.random.Generator) -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_reach_bounds_what_a_chain_can_do(seed: int) -> None:
-    """Random arms: no pose has a gap above that of a contact called sunk, and idle ones keep theirs."""
+def test_reach_bounds_the_motion_of_a_chain(seed: int) -> None:
+    """Random arms: contacts called sunk never have a larger gap in any pose, and idle ones keep theirs."""
     rng = np.random.default_rng(seed)
     kinds = ("fixed", "revolute", "revolute", "spherical", "orbital", "prismatic", "planar", "screw")
     up = np.array([0.0, 0.0, 1.0])
@@ -229,7 +229,7 @@ def test_numbers_are_finite_or_the_status_says_not(seed: int) -> None:
 
 
 def test_a_number_that_is_not_finite_is_seen() -> None:
-    """In whichever step it stands; the status of that step says so."""
+    """At any step of the motion; the status of the step says so."""
     for wrong in (np.nan, np.inf, -np.inf):
         for count in (3, 3000):  # small ones and large ones are looked at in two ways
             reports, rows = np.zeros((count, REPORT)), np.ones((count, 4, 3))
@@ -240,7 +240,7 @@ def test_a_number_that_is_not_finite_is_seen() -> None:
 
 
 def test_a_mechanism_spoilt_afterwards_gets_a_status() -> None:
-    """Whatever a kernel makes of it, no number that is not finite is called solved."""
+    """A result that is not finite never counts as solved, whatever the kernels do."""
     for field in ("contact_friction", "contact_radius", "body_mass", "contact_point"):
         sim = dojo.Simulator(hinged(1.0), 0.01)
         getattr(sim._engine.model, field)[...] = np.nan

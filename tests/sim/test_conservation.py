@@ -1,4 +1,4 @@
-"""Energy and momentum over a motion, for every joint kind: what the node quantities are made for."""
+"""Conservation of energy and momentum at the nodes over a motion, for every joint kind."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ def test_minimal_inverts_maximal(kind: str, on_world: bool) -> None:
 
 
 @pytest.mark.parametrize(("kind", "on_world"), CASES)
-def test_velocities_are_those_of_the_interval(kind: str, on_world: bool) -> None:
+def test_velocities_agree_with_the_interval(kind: str, on_world: bool) -> None:
     maps, x = setup(kind, on_world)
     q, v = x[: maps.mech.nq], x[maps.mech.nq :]
     before = maps.integrate(x, np.concatenate([-H * v, 0 * v]))

@@ -84,7 +84,7 @@ def drop(shape, obstacle, pose, force=(0.0, 0.0), seconds=1.0):
     ids=["cylinder stands", "cylinder lies", "box", "capsule"],
 )
 @pytest.mark.parametrize("obstacle", ["box", "cylinder"])
-def test_what_is_put_on_a_level_top_stays(shape, orientation, height, obstacle) -> None:
+def test_shapes_on_a_level_top_stay(shape, orientation, height, obstacle) -> None:
     """Pushed with .3 of its weight along its axis, below its friction; the forces of all points carry it."""
     if isinstance(shape, Box | Capsule) and obstacle == "box":
         pytest.skip("no cylinder")
@@ -167,7 +167,7 @@ def test_rims_that_run_along_each_other_are_apart(rng: np.random.Generator) -> N
 
 
 @pytest.mark.parametrize(("radius", "length", "seed"), [(0.3, 0.2, 495), (0.3, 0.02, 709)], ids=["wheel", "coin"])
-def test_no_step_is_accepted_whose_impulses_give_energy(radius: float, length: float, seed: int) -> None:
+def test_steps_with_impulses_that_give_energy_are_not_accepted(radius: float, length: float, seed: int) -> None:
     """A box against a wheel and a coin: the first elements with which one step is solved give 228 J and 130 J."""
     sim = dojo.Simulator(two(SHAPES["box"], Cylinder(radius, length)), time_step=0.01)
     t = sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu)))

@@ -20,7 +20,7 @@ def test_it_follows_weight_and_time_step() -> None:
     assert nowhere.kappa == pytest.approx(1e-9 * 2.0 * 9.81 * 0.02, rel=1e-12)
 
 
-def test_it_stays_between_rounding_and_what_is_hard() -> None:
+def test_it_stays_between_rounding_and_soft_contact() -> None:
     assert dojo.Simulator(dojo.models.block(mass=1e-3), time_step=1e-4).kappa == 1e-13
     assert dojo.Simulator(dojo.models.block(mass=1e5), time_step=0.1).kappa == 1e-6
 
@@ -43,7 +43,7 @@ def test_the_lightest_part_counts_with_all_that_hangs_on_it() -> None:
     assert min(free_parts(robot.add(ball, pose=(1.0, 0.0, 0.0), prefix="ball/"))) == pytest.approx(0.3)
     bodies = [dojo.Body("shelf", 0.1, (1e-3,) * 3), dojo.Body("cart", 5.0, (0.1,) * 3)]
     joints = [dojo.Joint("fixed", None, "shelf"), dojo.Joint("prismatic", None, "cart")]
-    assert min(free_parts(dojo.Mechanism(bodies, joints))) == 5.0  # what cannot move does not count
+    assert min(free_parts(dojo.Mechanism(bodies, joints))) == 5.0  # immobile bodies do not count
     fourbar = dojo.models.fourbar()
     assert min(free_parts(fourbar)) == pytest.approx(sum(body.mass for body in fourbar.bodies))
 
@@ -70,7 +70,7 @@ def test_parameters_change_at_the_same_kappa() -> None:
 @pytest.mark.parametrize(
     ("height", "speed"), [(0.0, 0.0), (0.0, 3.0), (0.2, 1.0)], ids=["rolling", "sliding", "flying"]
 )
-def test_derivatives_are_those_of_the_step(height: float, speed: float) -> None:
+def test_derivatives_agree_with_the_step(height: float, speed: float) -> None:
     """Central differences of the solver at its default kappa."""
     sim = dojo.Simulator(dojo.models.sphere(), time_step=0.02, tolerance=1e-12)
     x, u = sim.neutral(), np.array([0.1, -0.2, 0.1])

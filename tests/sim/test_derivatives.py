@@ -42,7 +42,7 @@ def placed(mech, x, u, regime):
 
 
 def assert_regime(mech, result, regime, law, kappa):
-    """The contact with the largest impulse is where the name says, as far as kappa lets it."""
+    """The contact with the largest impulse matches the name of its regime, within the limits of kappa."""
     impulse = np.asarray(result.contacts.impulse)
     impulse = impulse[np.argmax(impulse[:, 2])]
     if kappa > 1e-4 or law != "nonlinear":

@@ -1,4 +1,4 @@
-"""What `describe` and messages say about a scene."""
+"""Descriptions of a scene by `describe` and in messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Division of steps: what cannot be solved as a whole is solved in parts, and everything follows."""
+"""Division of steps: a step that cannot be solved as a whole is solved in parts, and all results follow."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ def links(count: int, length: float = 2.0, mass: float = 2.0) -> dojo.Mechanism:
 
 
 def engine(sim: dojo.Simulator) -> DividingEngine:
-    """That of a simulator which divides steps."""
+    """The engine of a simulator that divides steps."""
     assert isinstance(sim._engine, DividingEngine)
     return sim._engine
 
 
 def forced(sim: dojo.Simulator, x: Floats, u: Floats, parts: int) -> Floats:
-    """The state after a step in so many parts."""
+    """The state after a step in this number of parts."""
     found = engine(sim).in_parts(parts, x, (u, engine(sim).no_wrenches))
     assert found is not None and found.share == 1.0
     return np.asarray(found.x)
 
 
 def moving(name: str, time_step: float, steps: int = 0) -> tuple[dojo.Simulator, Floats, Floats]:
-    """A simulator, a random state or the one that it leads to, and a random input."""
+    """A simulator, a random state or a state reached from it, and a random input."""
     rng = np.random.default_rng(3)
     sim = dojo.Simulator(getattr(models, name)(), time_step=time_step, kappa=1e-4, tolerance=1e-12)
     x = sim.integrate(sim.neutral(), np.r_[0.05 * rng.normal(size=sim.nv), 0.5 * rng.normal(size=sim.nv)])
@@ -76,7 +76,7 @@ def test_a_refused_step_is_divided(whip: tuple[dojo.Simulator, Floats]) -> None:
     assert np.array_equal(motion.x, sim.rollout(x, steps=20).x)  # a division is deterministic
 
 
-def test_a_motion_without_division_is_that_of_a_simulator_that_refuses() -> None:
+def test_a_motion_without_division_agrees_with_a_simulator_that_refuses() -> None:
     sim, x, _ = moving("quadruped", 0.01)
     motion = sim.rollout(x, steps=40, throw=True)
     assert motion.substeps.max() == 1
@@ -110,7 +110,7 @@ def test_momentum_is_handed_on_exactly() -> None:
 
 @pytest.mark.parametrize(("name", "steps"), [("quadruped", 0), ("quadruped", 60), ("hopper", 60), ("fourbar", 3)])
 def test_derivatives_of_a_divided_step(name: str, steps: int) -> None:
-    """The products of those of its parts and of the conversions, against central differences that keep the division."""
+    """Products of the derivatives of parts and conversions, against central differences that keep the division."""
     sim, x, u = moving(name, 0.01, steps)
     if name == "fourbar":
         x = sim.start(sim.neutral()[: sim.nq], np.ones(sim.nv))
@@ -251,7 +251,7 @@ def test_higher_orders_divide_their_steps_of_order_two(order: int) -> None:
     assert motion.success, motion.message
 
 
-def test_what_division_cannot_solve_keeps_its_reason() -> None:
+def test_steps_that_division_cannot_solve_keep_their_reason() -> None:
     sim = dojo.Simulator(models.quadruped(), time_step=0.01, max_iterations=1)
     result = sim.step(sim.neutral())
     assert result.status == dojo.Status.MAX_ITERATIONS

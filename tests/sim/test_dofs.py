@@ -8,7 +8,7 @@ import pytest
 import dojo_opt as dojo
 
 
-def test_each_degree_of_freedom_has_the_name_of_what_it_moves() -> None:
+def test_names_of_degrees_of_freedom() -> None:
     assert dojo.models.raiberthopper().dof_names == (*(f"body {a}" for a in ("x", "y", "z", "rx", "ry", "rz")), "leg")
     assert dojo.models.cartpole().dof_names == ("cart", "pole")
     body = dojo.Body("b", 1.0, (1, 1, 1))
@@ -23,7 +23,7 @@ def test_each_degree_of_freedom_has_the_name_of_what_it_moves() -> None:
         assert mech.dof_names == names
 
 
-def test_the_name_of_a_plane_is_that_of_the_direction_it_moves_in() -> None:
+def test_directions_in_a_plane_have_the_names_of_their_axes() -> None:
     body = dojo.Body("b", 1.0, (1, 1, 1))
     mech = dojo.Mechanism([body], [dojo.Joint("planar_axis", None, "b", axis=(0, 1, 0))])
     sim = dojo.Simulator(mech, time_step=0.01)

@@ -1,4 +1,4 @@
-"""Dry friction of joints: it holds, it brakes, it never gives energy, and its derivatives are those of the motion."""
+"""Dry friction of joints: it holds, it brakes, it never gives energy, and its derivatives match the motion."""
 
 from dataclasses import replace
 
@@ -20,14 +20,14 @@ def rail():
 
 @pytest.fixture(scope="module")
 def arm():
-    """Two rods whose joints have springs, dampers, limits and dry friction."""
+    """Two rods on joints with springs, dampers, limits and dry friction."""
     mech = pendulum(2, spring=4.0, damper=0.05, friction=0.7, limits=(-1.5, 1.5))
     return dojo.Simulator(mech, time_step=0.01, kappa=1e-6)
 
 
 @pytest.fixture(scope="module")
 def quadruped():
-    """A robot whose joints hold it by friction alone."""
+    """A robot held by friction of its joints alone."""
     mech = dojo.models.quadruped(damper=0.1)
     joints = [mech.joints[0], *(replace(joint, friction=15.0) for joint in mech.joints[1:])]
     return dojo.Simulator(replace(mech, joints=joints), time_step=0.01)
@@ -54,13 +54,13 @@ def test_energy_never_grows_and_the_arm_comes_to_rest(arm):
     assert motion.success, motion.message
     energy = np.array([np.sum(arm.energy(x)) for x in motion.x])
     drop = np.diff(energy[2:])
-    assert drop.max() < 3e-6 * np.ptp(energy), drop.max()  # energies at nodes are those of the motion to second order
+    assert drop.max() < 3e-6 * np.ptp(energy), drop.max()  # energies at nodes match the motion to second order
     late = motion.x[-100:]
     assert np.abs(late[:, 2:]).max() < 1e-4 and np.abs(late[:, :2]).max() > 0.02  # it rests away from the equilibrium
 
 
 @pytest.mark.parametrize("state", [(0.4, -0.3, 0.0, 0.0), (0.4, -0.3, 0.02, -0.01), (0.9, 0.5, 3.0, -2.0)])
-def test_derivatives_are_those_of_differences(arm, state):
+def test_derivatives_agree_with_differences(arm, state):
     """Of states and inputs, and by the time step; sticking, nearly sticking and sliding."""
     x, u = np.array(state), np.array([0.3, -0.2])
     linear = arm.linearize(x, u)
@@ -76,7 +76,7 @@ def test_derivatives_are_those_of_differences(arm, state):
 
 
 @pytest.mark.parametrize("state", [(0.4, -0.3, 0.0, 0.0), (0.9, 0.5, 3.0, -2.0)])
-def test_derivatives_by_parameters_are_those_of_differences(arm, state):
+def test_derivatives_by_parameters_agree_with_differences(arm, state):
     case = (arm, np.array(state), np.array([0.3, -0.2]))
     assert max(error(case, kind) for kind in ("time_step", "mass", "damper")) < 1e-5
 
@@ -90,7 +90,7 @@ def test_a_robot_with_dry_joints_lands(quadruped):
     assert motion.x[-1, 2] > 0.8 * x[2] and np.abs(motion.x[-1, quadruped.nq :]).max() < 0.01
 
 
-def test_what_cannot_have_it_is_refused():
+def test_joints_without_dry_friction_refuse_it():
     with pytest.raises(ValueError, match=">= 0"):
         dojo.Joint("revolute", None, "b", friction=-1.0)
     with pytest.raises(ValueError, match="quaternion"):

@@ -15,7 +15,7 @@ from support.scenes import KINDS, block, chain, free_body, order, pendulum, rand
 
 @local_kernel
 def joints_work(model_at, data_at, h, v):
-    """What the last step of this thread left."""
+    """Work of the constraints in the last step of this thread."""
     return constraint_work(model_view(model_at), data_view(data_at), h, v)
 
 
@@ -50,7 +50,7 @@ def mean_motion(sim, x, after):
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "spherical", "orbital"])
-def test_work_of_constraints_is_that_of_the_reactions(kind, rng):
+def test_work_of_constraints_agrees_with_the_reactions(kind, rng):
     """Force times relative velocity where it acts, and torque times relative angular velocity, joint by joint."""
     mech = chain(kind, 3)
     sim = dojo.Simulator(mech, time_step=0.1, tolerance=1e-12)
@@ -87,7 +87,7 @@ def test_a_body_without_joints_tumbles_without_it():
 
 @pytest.mark.parametrize("damper", [0.0, 0.5])
 @pytest.mark.parametrize("kind", KINDS)
-def test_energy_on_arrival_is_that_of_the_simulator(kind, damper, rng):
+def test_energy_on_arrival_agrees_with_the_simulator(kind, damper, rng):
     """Before the step and after it, without leaving the step: another kernel computes `kinetic_energy`.
 
     After the step, axes of ball joints are those before it carried along: their dampers differ, as inertias do.
@@ -105,7 +105,7 @@ def test_energy_on_arrival_is_that_of_the_simulator(kind, damper, rng):
 @pytest.mark.parametrize(
     "action", [{}, {"spring": 40.0}, {"armature": 0.3}, {"spring": 20.0, "armature": 0.3}], ids=str
 )
-def test_what_acts_on_a_chain_gives_what_it_gains(action, rng):
+def test_a_chain_gains_the_work_done_on_it(action, rng):
     """Gravity, springs, rotors and torques: the balance is of third order in a step."""
     errors = []
     for h in (0.02, 0.01, 0.005):
@@ -122,7 +122,7 @@ def test_what_acts_on_a_chain_gives_what_it_gains(action, rng):
     assert np.all(order(errors) > 2.5), (errors, order(errors))
 
 
-def test_work_of_inputs_is_what_bodies_gain():
+def test_work_of_inputs_equals_the_energy_gain_of_bodies():
     """A free body under forces and torques in its own and in world axes."""
     body = dojo.Body("b", 2.0, inertia=(0.3, 0.2, 0.4))
     push = [dojo.Input(body="b", force=(1.0, 2.0, 0.5), torque=(0.3, -0.1, 0.2), frame=f) for f in ("world", "body")]
@@ -165,7 +165,7 @@ def driven(case):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_what_gains_by_right_is_accepted(case):
+def test_rightful_gains_are_accepted(case):
     sim, x, u = driven(case)
     r = sim.step(x, u)
     assert r.success, r.message
@@ -186,7 +186,7 @@ def test_no_accepted_step_of_a_passive_fall_gains_energy(attacks, capsys):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [583, 663, 752])
 def test_a_step_ends_where_the_next_one_can_begin(attacks, seed):
-    """With joints of two rotations, whose columns change with their angles: momenta of such ends were those of others."""
+    """Columns of joints with two rotations change with their angles: such ends used to get the momenta of others."""
     assert attacks.step_case(seed) in ("SOLVED", "ANGULAR_STEP", "ENERGY_STEP")
 
 

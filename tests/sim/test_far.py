@@ -1,4 +1,4 @@
-"""Far contacts: the same step as when everything is near, and only what is far is left out.
+"""Far contacts: the same step as when everything is near, and only far contacts are omitted.
 
 The reference is the same simulator at a tolerance so small that no contact is far: the rule looks at the tolerance.
 """
@@ -23,7 +23,7 @@ EXACT = 1e-13
 
 
 def far(sim):
-    """How many contacts the last step of this thread left out of the interior point."""
+    """Number of contacts that the last step of this thread omitted from the interior-point problem."""
     return int(sim._engine.far().sum())
 
 
@@ -88,7 +88,7 @@ def test_at_a_large_kappa_a_contact_is_felt_from_a_distance():
 
 
 @pytest.mark.parametrize("height", [4.0, 12.0])
-def test_what_comes_near_within_the_step_is_solved_for(height):
+def test_contacts_that_come_near_within_the_step_are_solved_for(height):
     """Shot at the ground with 2 km/s, far and at rest before: balance and contact law hold at the solution."""
     push = dojo.Input(body="ball", force=(0.0, 0.0, 1.0))
     mech = dataclasses.replace(ball(radius=0.1, friction=0.5), inputs=[push])
@@ -111,9 +111,8 @@ def test_a_fall_from_far_to_near():
     counts = [far(sim) for t in range(0, 61, 5) if sim.rollout(x, us[: t + 1]).success]
     assert counts[0] == 8 and counts[-1] == 0
     path, expected = sim.rollout(x, us), exact.rollout(x, us)
-    flight = int(
-        np.argmax(expected.contacts.gap.min(axis=1) < 1e-2)
-    )  # what follows an impact depends on its last digit
+    # the motion after an impact depends on the last digit
+    flight = int(np.argmax(expected.contacts.gap.min(axis=1) < 1e-2))
     assert flight > 10
     np.testing.assert_allclose(path.x[:flight], expected.x[:flight], rtol=0, atol=1e-5)
     np.testing.assert_allclose(path.contacts.gap, [gaps(sim, x) for x in path.x[1:]], rtol=0, atol=1e-9)
@@ -134,7 +133,7 @@ def test_far_contacts_push_by_the_law_of_the_central_path():
     assert push.sum() > 100 * TOLERANCE * steps / 50, "nothing to be seen"
 
 
-def test_arms_of_far_impulses_turn_with_a_body_whose_law_still_holds():
+def test_arms_of_far_impulses_turn_with_the_body():
     """Angular momentum changes by the moment of the impulses where they act, of contacts far to one side of a body."""
     kappa, steps = 1e-6, 40
     points = [(1.0, 0.1 * y, 0.1 * z) for y in range(5) for z in range(4)]
@@ -189,6 +188,7 @@ def test_mobility_bounds_the_velocity_per_impulse(rng):
     assert largest <= model.cluster[0, 5] <= 4.0 * largest
 
 
+<<<<<<< HEAD
 def test_corners_of_a_body_that_touches_are_left_out_one_by_one(rng):
     """The law and the balance of momenta hold for all; derivatives take all as active, and are exact."""
     points = rng.normal(size=(24, 3))
@@ -213,6 +213,9 @@ def test_corners_of_a_body_that_touches_are_left_out_one_by_one(rng):
 
 
 def test_names_and_distances_of_what_is_left_out():
+=======
+def test_names_and_distances_of_omitted_contacts():
+>>>>>>> english
     mech = dataclasses.replace(
         block(), contacts=[*block().contacts, dojo.Contact("block", height=-50.0, name="wall", normal=(1.0, 0.0, 0.0))]
     )

@@ -74,7 +74,7 @@ def test_gears_of_a_floating_robot_keep_its_momentum() -> None:
 
 @pytest.mark.parametrize("name", ["robot", "loop"])
 def test_derivatives(name: str) -> None:
-    """With limits, and with a loop beside: the crank of a four-bar turns a flywheel."""
+    """With limits, and together with a loop: the crank of a four-bar turns a flywheel."""
     mech = robot()
     if name == "loop":
         plain = fourbar("pin", inputs=("crank",))
@@ -93,7 +93,7 @@ def test_derivatives(name: str) -> None:
     check_step(sim, x, u)
 
 
-def test_what_is_wrong_with_a_gear_is_said() -> None:
+def test_wrong_gears_are_refused() -> None:
     mech = robot()
     for gear, message in (
         (Gear("left", "arm"), "joint of gear 'left': 'arm' is not one of"),
@@ -152,7 +152,7 @@ def test_couplings_of_mjcf() -> None:
 
 
 def test_gears_and_acting_loops_come_along_when_mechanisms_are_added() -> None:
-    """Beside one another, and as alone."""
+    """Two copies in one scene move like one alone."""
     alone, both = robot(), robot().add(robot(), (2.0, 0.0, 0.0), prefix="b/")
     assert [g.name for g in both.gears] == ["left", "rack", "b/left", "b/rack"]
     linkage = fourbar("pin", spring=3.0)

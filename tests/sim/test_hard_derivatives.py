@@ -1,4 +1,4 @@
-"""Derivatives of hard impacts: contacts 1e8 to 1e14 times stiffer than what they stop, and still 1e-6.
+"""Derivatives of hard impacts: contacts 1e8 to 1e14 times stiffer than the bodies they stop, errors of 1e-6.
 
 Figure of merit as in test_derivatives.py: the largest error over all entries relative to the largest entry. Impacts
 without friction, with it, sticking and sliding, against planes, terrain and bodies, with restitution, behind joints.
@@ -25,7 +25,7 @@ FREE = dojo.Joint("floating", None, "b")
 def landing(
     mech: dojo.Mechanism, h: float, speed: float, kappa: float | None = None, turn=(1, 0.3, 0.2, 0.1)
 ) -> tuple[dojo.Simulator, np.ndarray]:
-    """A state whose next step brings the lowest contact to the ground, .7 of a step's way too early."""
+    """A state before landing: its next step brings the lowest contact to the ground, .7 of a step's way too early."""
     sim = dojo.Simulator(mech, h, kappa)
     x = np.array(sim.neutral())
     x[3:7] = np.array(turn) / np.linalg.norm(turn)
@@ -51,7 +51,7 @@ def meeting(mech: dojo.Mechanism, h: float, speed: float) -> tuple[dojo.Simulato
 
 
 def heavy(load: float) -> dojo.Mechanism:
-    """A load on a leg, whose foot of 1 kg stands on four points."""
+    """A load on a leg; its foot of 1 kg stands on four points."""
     bodies = [
         dojo.Body("b", load, np.full(3, 0.1 * load)),
         dojo.Body("leg", 2.0, (0.1, 0.1, 0.02)),
@@ -143,7 +143,7 @@ def error_along(sim: dojo.Simulator, x: np.ndarray, seed: int) -> tuple[float, f
 @pytest.mark.parametrize("h", [1e-3, 1e-2])
 @pytest.mark.parametrize("name", ["quadruped", "atlas", "humanoid"])
 def test_robots_that_fall(name: str, h: float) -> None:
-    """Whose parts differ much in mass, at 5 m/s: to 1e-6, and no worse than they say."""
+    """Robots with parts of very different mass, at 5 m/s: to 1e-6, and no worse than the reported accuracy."""
     sim, x = landing(getattr(dojo.models, name)(), h, 5.0, turn=(1, 0.1, 0.1, 0.05))
     for seed in range(3):
         off, accuracy = error_along(sim, x, seed)
@@ -151,7 +151,7 @@ def test_robots_that_fall(name: str, h: float) -> None:
         assert off < accuracy < 1e-5
 
 
-def test_the_accuracy_says_what_a_load_costs() -> None:
+def test_the_accuracy_includes_the_effect_of_a_load() -> None:
     """It grows with stiffness over inertia; far from contacts there is nothing to lose."""
     for load in (1e2, 1e4, 1e6):
         sim, x = landing(heavy(load), 1e-3, 10.0, turn=(1, 0.1, 0.05, 0.02))

@@ -59,7 +59,7 @@ def test_extreme_state(robustness, cell):
 
 @pytest.mark.parametrize("kappa", [1e-4, 1e-8])
 @pytest.mark.parametrize("number", [67, 155])
-def test_extreme_state_whose_solutions_gain_energy(robustness, number, kappa):
+def test_extreme_state_with_solutions_that_gain_energy(robustness, number, kappa):
     """They were accepted with 2 to 5 times the energy before the step; the motion loses some, in finer steps."""
     sim = dojo.Simulator(robustness.MECHANISMS["quadruped"](0.0), time_step=0.05, kappa=kappa)
     rng = np.random.default_rng([0, list(robustness.MECHANISMS).index("quadruped"), 500])
@@ -133,7 +133,7 @@ def test_friction_that_follows_the_impulses_from_a_large_kappa(name, start, knot
 def test_joints_give_no_energy(start, ends, kappa):
     """Atlas falls on its feet with 2 kJ. In one step, joints and friction wound one another up to 70 kJ and more.
 
-    The third start has a solution beside that. The second has none with 10 ms, and with half of it has.
+    The third start has another solution too. The second has none with 10 ms, but has one with half of it.
     """
     sim = dojo.Simulator(dojo.models.atlas(), time_step=0.01, kappa=kappa)
     fall = sim.replace(divide=False).rollout(thrown(sim, start), np.zeros((100, sim.nu)))

@@ -1,4 +1,4 @@
-"""Simulators of order 4, 6, 8: the order is there, momentum stays, and what they cannot do is refused."""
+"""Simulators of order 4, 6, 8 reach their order, keep momentum, and refuse unsupported features."""
 
 from __future__ import annotations
 
@@ -152,12 +152,12 @@ def test_springs_and_dampers_are_refused_where_they_would_be_unstable(order: int
         ),
     ],
 )
-def test_what_order_two_alone_moves_and_what_is_too_fast_is_refused(mechanism: Mechanism, what: str) -> None:
+def test_features_of_order_two_alone_and_too_fast_dynamics_are_refused(mechanism: Mechanism, what: str) -> None:
     with pytest.raises(ValueError, match=what):
         dojo.Simulator(mechanism, time_step=0.01, order=4)
 
 
-def test_what_order_two_alone_has_and_unknown_orders_are_refused() -> None:
+def test_methods_of_order_two_alone_and_unknown_orders_are_refused() -> None:
     sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01, order=4)
     x = sim.neutral()
     for call in (lambda: sim.maximal_jacobian(x), lambda: sim.minimal_jacobian(sim.maximal(x))):

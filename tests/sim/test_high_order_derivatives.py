@@ -14,7 +14,7 @@ from support.mechanisms import random_state
     "kind", ["floating", "spherical", "revolute", "cylindrical_free", "planar_axis", "prismatic", "fixed", "screw"]
 )
 @pytest.mark.parametrize("on_world", [True, False])
-def test_derivatives_are_those_of_central_differences(kind: str, on_world: bool) -> None:
+def test_derivatives_agree_with_central_differences(kind: str, on_world: bool) -> None:
     mech = branch(kind, on_world, damper=0.1)
     sim = dojo.Simulator(mech, time_step=0.05, order=4)
     x = sim.start(*random_state(np.random.default_rng(3), mech, speed=1.0))

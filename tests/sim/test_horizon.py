@@ -36,7 +36,7 @@ def counted(horizon, *given, **named):
 
 
 @pytest.mark.parametrize("alpha", [1.0, 0.5])
-def test_rollouts_are_those_of_the_simulator(alpha):
+def test_rollouts_agree_with_the_simulator(alpha):
     xs, us = trajectory()
     k, K, gaps = gains()
     horizon = HOPPER.horizon(T, limits=(-50.0, 50.0))
@@ -53,7 +53,7 @@ def test_rollouts_are_those_of_the_simulator(alpha):
         np.testing.assert_allclose(trial.u, expected.u, atol=1e-4)
 
 
-def test_what_is_known_saves_iterations():
+def test_known_solutions_save_iterations():
     xs, us = trajectory()
     horizon = HOPPER.horizon(T)
     near, linear = horizon.roll(xs[0], xs, us, 1e-4), horizon.linearize(xs, us, 1e-4)
@@ -72,7 +72,7 @@ def test_a_rollout_of_no_change_takes_one_iteration_per_step():
     np.testing.assert_allclose(again.x, near.x, atol=1e-6)
 
 
-def test_derivatives_and_gaps_are_those_of_the_simulator():
+def test_derivatives_and_gaps_agree_with_the_simulator():
     xs, us = trajectory()
     horizon = HOPPER.horizon(T)
     expected = HOPPER.linearize_trajectory(xs, us, kappa=1e-3)

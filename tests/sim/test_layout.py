@@ -1,4 +1,4 @@
-"""The flat buffers hold what the NamedTuples declare, for compiled code and for Python alike."""
+"""The flat buffers match the declarations of the NamedTuples, for compiled code and for Python alike."""
 
 from __future__ import annotations
 

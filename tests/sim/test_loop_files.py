@@ -40,7 +40,7 @@ NEUTRAL = {"crank": -1.0, "coupler": 0.6, "rocker": -1.2}
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.7])
-def test_a_loop_joint_is_that_of_the_mechanism_by_hand(tmp_path: Path, damping: float) -> None:
+def test_a_loop_joint_agrees_with_the_mechanism_by_hand(tmp_path: Path, damping: float) -> None:
     path = write(tmp_path, *PARTS, PIN.format(f'<dynamics damping="{damping}"/>'))
     mech = dojo.load_urdf(path, floating=False, neutral=NEUTRAL)
     by_hand = fourbar("pin", damper=damping)
@@ -85,7 +85,7 @@ def test_a_motor_on_a_loop_joint(tmp_path: Path) -> None:
         (('link="rocker"', 'link="ground"'), "'ground' is part of the world; exchange link1 and link2"),
     ],
 )
-def test_what_is_wrong_with_a_loop_joint_is_said(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+def test_wrong_loop_joints_are_refused(tmp_path: Path, change: tuple[str, str], message: str) -> None:
     path = write(tmp_path, *PARTS, PIN.format("").replace("\n", "").replace(*change), "")
     with pytest.raises(ValueError, match=message.replace("(", r"\(")):
         dojo.load_urdf(path, floating=False)

@@ -1,4 +1,4 @@
-"""Closing joints that act: what they do is what the same joint does in the tree, with the loop cut elsewhere."""
+"""Closing joints that act have the same effect as in the tree, with the loop cut elsewhere."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def both_cuts(steps: int, u: float = 0.0, **given: Any) -> tuple[tuple[dojo.Simu
 
 
 @pytest.mark.parametrize("action", ACTIONS)
-def test_an_action_in_the_closing_joint_is_that_of_a_joint_of_the_tree(action: str) -> None:
+def test_an_action_in_the_closing_joint_agrees_with_a_joint_of_the_tree(action: str) -> None:
     """A damper sees another inertia in another tree: the same to second order in the time step."""
     (a, t), (b, reference) = both_cuts(150, **ACTIONS[action])
     atol = {"damper": 1e-4, "limits": 1e-6, "all": 1e-6}.get(action, 1e-8)
@@ -57,7 +57,7 @@ def test_a_motor_in_the_closing_joint() -> None:
     np.testing.assert_allclose(energy[-1] - energy[0], work, atol=0.02 * np.ptp(energy))
 
 
-def test_inputs_left_out_are_those_of_the_tree() -> None:
+def test_inputs_left_out_agree_with_the_tree() -> None:
     mech = fourbar("pin", **ACTIONS["spring"])
     plain = Mechanism(mech.bodies, mech.joints, loops=mech.loops)
     assert [joint.name for joint in mech.joints] == ["crank", "coupler", "rocker", "pin"]
@@ -132,7 +132,7 @@ def test_closing_positions_are_found_from_a_guess() -> None:
     assert np.abs(x - start)[:3].max() < 0.5
 
 
-def test_what_is_redundant_is_said() -> None:
+def test_redundant_constraints_are_reported() -> None:
     sim = dojo.Simulator(fourbar("pin"), time_step=0.01)
     rank = sim.loop_rank()
     assert (rank.constraints, rank.redundant, rank.mobility) == ({"pin": 5}, {"pin": 3}, 1)
@@ -145,7 +145,7 @@ def test_what_is_redundant_is_said() -> None:
 
 
 def test_a_loop_that_contradicts_the_tree_is_refused() -> None:
-    """The end of the rocker on a second pin on the ground, beside its first."""
+    """The end of the rocker on a second pin on the ground, next to its first."""
     mech = fourbar("pin")
     rods = [Joint("spherical", None, "rocker", "rod", (1.0, 0.0, 0.2), (-ROCKER / 2, 0, 0), close=True)]
     with pytest.raises(
@@ -199,7 +199,7 @@ def test_a_rollout_from_a_loop_that_cannot_close_stops_at_its_first_step() -> No
     assert "step 0" in t.message and "far" in t.message
 
 
-def test_what_carries_a_share_has_a_mass() -> None:
+def test_bodies_that_carry_a_share_have_mass() -> None:
     bodies = [Body("a", 1.0, shape=Sphere(0.1)), Body("middle", 0.0), Body("b", 1.0, shape=Sphere(0.1))]
     joints = [
         Joint("revolute", None, "a"),

@@ -61,7 +61,7 @@ def test_a_closing_joint_with_a_coordinate_of_its_own() -> None:
 
 
 def test_a_parallelogram() -> None:
-    """Flat and closed it stays as it is; with its cranks opposite it has to move, and on either branch it is closed."""
+    """Flat and closed it stays unchanged; with opposite cranks it has to move, and on either branch it is closed."""
     mech = plain_fourbar(0.5, 1.0, 0.5, 1.0)
     np.testing.assert_array_equal(at(mech, (0.0, 0.0, 0.0)).neutral(), np.zeros(6))
     sim = at(mech, (np.pi, 0.0, 0.0))
@@ -90,7 +90,7 @@ def test_start_closes_as_neutral_does() -> None:
 
 
 def test_links_that_are_too_short() -> None:
-    """The pin of the second four-bar cannot close, that of the first one can: the message names the second."""
+    """The pin of the second four-bar cannot close, the first one's can: the message names the second."""
     short = plain_fourbar(0.5, 0.3, 0.5, 2.0)
     with pytest.raises(ValueError, match=r"loop joint 'pin' cannot be closed .* off by 0\.[5-7].* links are too short"):
         at(short, (-0.3, 0.1, 0.2)).neutral()
@@ -107,7 +107,7 @@ def test_a_joint_that_acts_is_called_by_its_own_name() -> None:
 
 
 def test_loops_of_which_each_closes_alone() -> None:
-    """A pin for the rocker's end half a metre beside that of the coupler."""
+    """A pin for the rocker's end half a metre away from the coupler's pin."""
     mech = plain_fourbar()
     other = replace(mech.loops[0], name="other", parent_point=(COUPLER / 2 - 0.5, 0.0, 0.0))
     with pytest.raises(

@@ -15,7 +15,7 @@ LINEAR = LINKS / FEWER
 
 
 def loaded(folder: Path, links: int, above) -> tuple[float, dojo.Mechanism, dojo.Simulator]:
-    """Processor time [s] to load a file of so many links, and what was loaded."""
+    """Processor time [s] to load a file with this number of links, and the mechanism and simulator from it."""
     names = [f"l{k}" for k in range(links)]
     joints = [joint(f"j{k}", names[above(k)], names[k]) for k in range(1, links)]
     path = write(folder, *(link(name, inertial()) for name in names), *joints)

@@ -1,4 +1,4 @@
-"""What a Mechanism refuses, by name, and the order it brings things into."""
+"""A Mechanism refuses wrong parts by name, and puts its parts in order."""
 
 from __future__ import annotations
 

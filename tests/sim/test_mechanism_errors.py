@@ -1,4 +1,4 @@
-"""What a Mechanism and its parts refuse, by name."""
+"""A Mechanism and its parts refuse wrong arguments by name."""
 
 from __future__ import annotations
 

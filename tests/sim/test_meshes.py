@@ -67,7 +67,7 @@ def test_flat_and_thin_meshes_get_a_thickness(flat: int, rng: np.random.Generato
     assert np.ptp(few, axis=0).min() == pytest.approx(2e-3) and ConvexHull(few).volume > 0.0
 
 
-def test_fitted_primitives_are_those_of_the_mesh() -> None:
+def test_fitted_primitives_agree_with_the_mesh() -> None:
     turned = trimesh.transformations.euler_matrix(0.3, -0.5, 0.8)
     turned[:3, 3] = 0.1, 0.2, -0.3
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.2).apply_transform(turned)

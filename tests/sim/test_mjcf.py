@@ -72,7 +72,7 @@ def difference(mech: MjcfMechanism, a: np.ndarray, b: np.ndarray) -> float:
 
 @needs_gym
 @pytest.mark.parametrize("file", FILES)
-def test_free_flight_is_that_of_mujoco(file: str) -> None:
+def test_free_flight_agrees_with_mujoco(file: str) -> None:
     """1e-6 at h = 1e-4 over 0.1 s, of second order: bodies, joints, armature, springs, gravity."""
     mech = unhindered(quietly(ASSETS / file), dampers=False)
     model = mujoco.MjModel.from_xml_path(str(ASSETS / file))
@@ -86,8 +86,8 @@ def test_free_flight_is_that_of_mujoco(file: str) -> None:
 
 @needs_gym
 @pytest.mark.parametrize("file", FILES)
-def test_damped_and_driven_flight_is_that_of_mujoco(file: str) -> None:
-    """Dampers and held inputs act at first order: what remains after extrapolation is of second order."""
+def test_damped_and_driven_flight_agrees_with_mujoco(file: str) -> None:
+    """Dampers and held inputs act at first order: the error that remains after extrapolation is of second order."""
     mech = unhindered(quietly(ASSETS / file), dampers=True)
     model = mujoco.MjModel.from_xml_path(str(ASSETS / file))
     q, v, control = start(mech, 2)
@@ -184,7 +184,7 @@ SERVOS = """<mujoco><worldbody><body><joint name="j" axis="0 1 0"/><geom size="0
 
 
 def test_actuators_that_are_servos_are_read_as_servos() -> None:
-    """The force of all of them is that of MuJoCo, for the same controls at the same state."""
+    """Their total force equals MuJoCo's, for the same controls at the same state."""
     with pytest.warns(MjcfWarning, match="other"):
         mech = load_mjcf(SERVOS)
     assert [part.servo for part in mech.inputs] == ["position", "velocity", "position", None]
@@ -202,7 +202,7 @@ def test_actuators_that_are_servos_are_read_as_servos() -> None:
     np.testing.assert_allclose(forces, data.actuator_force[:3] * model.actuator_gear[:3, 0], atol=1e-12)
 
 
-def test_poses_are_those_of_mujoco() -> None:
+def test_poses_agree_with_mujoco() -> None:
     mech = quietly(CHAIN)
     model = mujoco.MjModel.from_xml_string(CHAIN)
     data = mujoco.MjData(model)

@@ -1,4 +1,4 @@
-"""load_mjcf: what rows of joints become, what is left out, and what is refused."""
+"""load_mjcf: conversion of rows of joints, omitted elements, and refusals."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_hinges_about_one_axis_are_refused(axis: str) -> None:
         assert sim.step(sim.neutral() + 0.1, np.zeros(0)).status.name == "SOLVED"
 
 
-def test_what_is_left_out_is_said() -> None:
+def test_omitted_elements_are_reported() -> None:
     text = """
     <mujoco><option density="1000"/><worldbody>
       <body name="a"><freejoint/><geom name="g" size="0.1"/></body>

@@ -1,4 +1,4 @@
-"""load_mjcf: actuators on sites, and collisions of bodies with one another and with what is fixed to the world."""
+"""load_mjcf: actuators on sites, and collisions of bodies with one another and with shapes fixed to the world."""
 
 from __future__ import annotations
 

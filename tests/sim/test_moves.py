@@ -13,7 +13,7 @@ FAR = 100.0  # [m]
 
 @pytest.mark.parametrize(("kind", "on_world"), CASES)
 def test_mean_velocities_over_a_tiny_interval(kind: str, on_world: bool) -> None:
-    """Over 1e-10 s mean velocities are those of the moment; differences of poses would be off by 1e-5."""
+    """Over 1e-10 s mean velocities equal instantaneous ones; differences of poses would be off by 1e-5."""
     sim = Simulator(chain_with(kind, on_world), time_step=1e-10)
     q, v = random_state(np.random.default_rng(3), sim.mechanism)
     mean = sim.maximal(np.concatenate([q, v]))
@@ -37,7 +37,7 @@ def test_increments_end_at_the_poses_of_the_coordinates(kind: str, speed: float)
 
 
 def test_momentum_is_known_far_from_the_origin() -> None:
-    """A floating tree 100 m away: its momentum over 1 us is that of the same tree at the origin."""
+    """A floating tree 100 m away has the same momentum over 1 us as at the origin."""
     sim = Simulator(chain_with("spherical", on_world=False), time_step=1e-6)
     q, v = random_state(np.random.default_rng(5), sim.mechanism)
     near, _ = sim.momentum(np.concatenate([q, v]))

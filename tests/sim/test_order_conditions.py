@@ -10,7 +10,7 @@ from support.branches import ORDERS
 
 
 def trees(size: int) -> list[tuple]:
-    """Rooted trees of so many nodes, as sorted tuples of the trees below the root."""
+    """Rooted trees with this number of nodes, as sorted tuples of the trees below the root."""
     if size == 1:
         return [()]
     parts = {()}

@@ -1,4 +1,4 @@
-"""Frames of contacts between bodies: orthonormal, continuous, with their derivative; what pyramids of friction need."""
+"""Frames of contacts between bodies are orthonormal and continuous, with a derivative, as friction pyramids need."""
 
 from __future__ import annotations
 

@@ -58,8 +58,8 @@ def test_collisions_conserve_momentum_and_do_not_overlap(a: str, b: str) -> None
     ],
 )
 def test_corners_that_slide_over_edges(a: str, b: str, seeds: list[int]) -> None:
-    """Motions (benchmarks/collisions.py) whose steps have no solution, or one that gains energy, when the elements in
-    contact follow the iterates.
+    """Motions (benchmarks/collisions.py) with steps that have no solution, or one that gains energy, when the elements
+    in contact follow the iterates.
     """
     sim = dojo.Simulator(two(SHAPES[a], SHAPES[b]), time_step=0.01, kappa=1e-6)
     for seed in seeds:
@@ -112,7 +112,7 @@ def balls(count: int, spacing: float) -> Mechanism:
 
 @pytest.mark.parametrize("kappa", [1e-6, 1e-4])
 def test_far_pairs_are_the_same_as_near_ones(kappa: float) -> None:
-    """The law of a far pair is evaluated, not left out; momentum is kept, and derivatives have all pairs."""
+    """The law of a far pair is evaluated, not omitted; momentum is kept, and derivatives include all pairs."""
     sim, other = (dojo.Simulator(balls(4, 0.7), time_step=0.01, kappa=kappa, tolerance=1e-11) for _ in range(2))
     other._engine.model.pair_far[:, 3] = np.inf  # nothing is far for bodies without inertia
     x = sim.neutral()

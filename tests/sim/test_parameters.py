@@ -31,7 +31,7 @@ def test_no_kind_is_left_out() -> None:
     assert {kind for name in CASES for kind in case_of(name).kinds()} == set(KINDS)
 
 
-def test_the_situations_are_what_they_are_called() -> None:
+def test_the_situations_match_their_names() -> None:
     def impulse(name: str) -> np.ndarray:
         case = case_of(name)
         contacts = case.sim.step(case.x, case.u).contacts

@@ -67,7 +67,7 @@ def test_each_height_of_stairs() -> None:
 
 @pytest.mark.slow
 def test_rises_of_stairs_by_the_chain_rule() -> None:
-    """What a docstring of Terrain says: a loss by the rises, against differences."""
+    """The example in the docstring of Terrain: derivatives of a loss by the rises, against differences."""
     rises = np.array([0.1, 0.08])
     ball = dojo.Body("ball", 1.0, shape=dojo.Sphere(0.1))
     plain = dojo.Mechanism([ball], [dojo.Joint("floating", None, "ball")], [dojo.Contact("ball", radius=0.1)])

@@ -45,7 +45,7 @@ PAIRS = [
     "cylinder ellipsoid",
     "stone ellipsoid",
 ]
-# gap [m], kappa, restitution, and the least impulse that makes it what it is called [N s]
+# gap [m], kappa, restitution, and the least impulse of a situation with this name [N s]
 WHERE = {
     "near": (0.05, 1e-3, 0.0, 1e-3),
     "touching": (0.0, 1e-4, 0.0, 0.1),

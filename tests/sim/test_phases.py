@@ -75,7 +75,7 @@ def test_momentum_and_energy_across_the_handover() -> None:
         np.testing.assert_allclose(np.hstack(second.momentum(mean)), np.hstack(sim.momentum(x)), atol=1e-12)
 
 
-def test_contact_is_that_of_order_two() -> None:
+def test_contact_agrees_with_order_two() -> None:
     sim, second = simulator(4), simulator(2)
     x, us = thrown(sim, 0.15), np.zeros((60, 3))
     t = sim.rollout(x, us, throw=True)
@@ -88,7 +88,7 @@ def test_contact_is_that_of_order_two() -> None:
     np.testing.assert_allclose(t.contacts.impulse[k:], s.contacts.impulse, atol=1e-8)
 
 
-def test_what_flies_does_not_depend_on_how_it_is_asked() -> None:
+def test_all_calls_take_the_same_steps_in_flight() -> None:
     """Single steps, batches, policies, knots and copies take the same steps."""
     sim = simulator(4)
     x, us = thrown(sim, 0.1), inputs(sim, 12)
@@ -143,7 +143,7 @@ def check(sim: dojo.Simulator, A: np.ndarray, B: np.ndarray, end) -> None:  # ty
 
 
 @pytest.mark.parametrize("spring", [0.0, 30.0])
-def test_derivatives_in_contact_are_those_of_order_two_in_other_coordinates(spring: float) -> None:
+def test_derivatives_in_contact_agree_with_order_two_in_other_coordinates(spring: float) -> None:
     """Smooth contact is never far: order 2 throughout; springs of all joints, one of them a ball joint's."""
     mech = dojo.models.raiberthopper(spring=spring)
     ball = dojo.Body("tail", 0.3, (2e-3, 3e-3, 4e-3))

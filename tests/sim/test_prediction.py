@@ -1,4 +1,4 @@
-"""Where a motion that goes on starts its step: the Delassus matrix, and what the prediction saves."""
+"""Initial guess of a step within a motion: the Delassus matrix, and the iterations that the prediction saves."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def both_ways(model_at, data_at, h, points, size, by_solves):
     delassus(model, work, h, points, size)
 
 
-def test_the_delassus_matrix_is_that_of_whole_solves():
+def test_the_delassus_matrix_agrees_with_whole_solves():
     sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.01)
     us = np.random.default_rng(0).uniform(-5.0, 5.0, (3, sim.nu))
     sim.rollout(sim.neutral(), us, throw=True)  # leaves factors and Jacobians of a step

@@ -66,7 +66,7 @@ def test_a_static_arm_held_by_its_motor() -> None:
 
 
 def test_springs_dampers_limits_and_armature_are_active() -> None:
-    """What the joint gives along its axis: the spring's torque at rest, a stop's, and what a rotor takes."""
+    """Torque of the joint along its axis: from the spring at rest, from a stop, and from a rotor."""
     lever = (3.0 * 0.5 + 2.0 * 1.0) * G
     rest = -lever / 500.0
     actions: tuple[dict[str, Any], ...] = ({"spring": 500.0, "rest": rest}, {"limits": (-1.0, 1e-7)})
@@ -159,7 +159,7 @@ def test_every_body_is_in_balance(name: str) -> None:
 
 
 @pytest.mark.parametrize(("damper", "atol"), [(0.0, 1e-7), (0.4, 2e-4)])
-def test_a_closing_joint_that_acts_transmits_what_it_would_in_the_tree(damper: float, atol: float) -> None:
+def test_a_closing_joint_that_acts_transmits_the_same_wrench_as_in_the_tree(damper: float, atol: float) -> None:
     """The wrench of the four-bar's pin, with the loop cut there or at the rocker's bearing.
 
     A damper there sees another inertia, so the weights of its velocities differ, to second order in the time step.

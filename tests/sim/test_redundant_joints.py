@@ -1,4 +1,4 @@
-"""Two joints on one pair of bodies: what both say counts once."""
+"""Two joints on one pair of bodies: their common constraints count once."""
 
 import numpy as np
 

@@ -70,7 +70,7 @@ def test_a_rollout_without_inputs_needs_their_number_only() -> None:
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_what_no_state_holds_is_refused_by_name(bad: float) -> None:
+def test_numbers_that_are_not_finite_are_refused_by_name(bad: float) -> None:
     x, u = X.copy(), np.zeros(HOPPER.nu)
     x[1] = bad
     with pytest.raises(ValueError, match=r"Simulator\.step\(x\): expected finite numbers"):

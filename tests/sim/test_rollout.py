@@ -32,7 +32,7 @@ def test_step_and_rollout_agree() -> None:
     for expected in t.x[1:]:
         r = PENDULUM.step(x, us[0])
         assert r.success and r.status == Status.SOLVED
-        np.testing.assert_allclose(r.x, expected, rtol=0, atol=1e-8)  # a rollout hands on what the tolerance left
+        np.testing.assert_allclose(r.x, expected, rtol=0, atol=1e-8)  # a rollout passes on errors within the tolerance
         x = r.x
     assert t.contacts.impulse.shape == (5, 0, 3) and t.contacts.normal_force.shape == (5, 0)
 
@@ -123,5 +123,5 @@ def test_closed_loop_follows_its_policy() -> None:
         x = PENDULUM.rollout(x, [u, u]).x[-1] - 0.75 * gaps[t + 1]
         np.testing.assert_allclose(shot.x[t + 1], x, atol=1e-12)
     assert (shot.status, shot.knot) == (Status.SOLVED, 3)
-    # a rollout under a policy looks for the next velocity near that of the policy: equal to the tolerance of a step
+    # under a policy, the guess for the next velocity is the policy's velocity: equal to the tolerance of a step
     np.testing.assert_allclose(PENDULUM.closed_loop(x0, us).x, PENDULUM.rollout(x0, us).x, atol=1e-7)

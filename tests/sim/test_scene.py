@@ -79,7 +79,7 @@ def test_bodies_of_both_collide():
     np.testing.assert_allclose(rows[-1, [sim.nq, sim.nq + 6]], 1.0, atol=5e-3)  # inelastic, equal masses
 
 
-def test_an_obstacle_stops_what_touches_the_ground():
+def test_an_obstacle_stops_shapes_that_touch_the_ground():
     step = dojo.Box(1.0, 1.0, 0.4, center=(1.0, 0.0, 0.0))
     mech = ball(radius=0.1, friction=0.0).with_obstacle(step, friction=0.0)
     sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-8)
@@ -91,7 +91,7 @@ def test_an_obstacle_stops_what_touches_the_ground():
 
 
 def test_files_can_be_put_together(tmp_path):
-    """A robot from a URDF file twice, each on terrain of its own."""
+    """A robot from a URDF file twice, each on its own terrain."""
     path = tmp_path / "pod.urdf"
     path.write_text(
         '<robot name="pod"><link name="base"><inertial><mass value="1"/>'

@@ -1,4 +1,4 @@
-"""The Simulator's border: what it accepts, what it returns, and how it says no."""
+"""The Simulator's interface: arguments, results, and error messages."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_pickle() -> None:
         np.testing.assert_array_equal(mine, theirs)
 
 
-def test_describe_says_what_is_there_and_what_is_not() -> None:
+def test_describe_lists_present_and_missing_features() -> None:
     text = SIM.describe()
     for word in (
         "raiberthopper: 2 bodies, 7 degrees",

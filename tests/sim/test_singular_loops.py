@@ -31,7 +31,7 @@ def strength(x: np.ndarray, lengths: tuple[float, float, float, float]) -> float
 
 
 def passages(x: np.ndarray, lengths: tuple[float, float, float, float]) -> int:
-    """How often a motion came closest to where branches meet."""
+    """Number of a motion's closest approaches to the meeting point of branches."""
     s = np.array([strength(y, lengths) for y in x])
     return int(np.sum((s[1:-1] < s[:-2]) & (s[1:-1] < s[2:]) & (s[1:-1] < 0.05)))
 
@@ -71,7 +71,7 @@ def test_both_branches_leave_the_pose_where_they_meet() -> None:
     sim = dojo.Simulator(linkage(PARALLELOGRAM, (0.0, 0.0, 0.0)), time_step=0.01)
     same = sim.rollout(np.array([0.0, 0.0, 0.0, 1.0, -1.0, 1.0]), np.zeros((50, 3)), throw=True)
     np.testing.assert_allclose(same.x[-1, 3:], [1.0, -1.0, 1.0], atol=1e-7)
-    # small angles a of the crank, c of the rocker: (a - c) ((L + r) a + (L - r) c) = 0, L = 2 r that of the coupler
+    # small angles a of the crank, c of the rocker: (a - c) ((L + r) a + (L - r) c) = 0, with L = 2 r of the coupler
     cross = sim.rollout(np.array([0.0, 0.0, 0.0, 1.0, -3.0, -3.0]), np.zeros((30, 3)), throw=True)
     assert cross.x[-1, 0] > 0.1 and cross.x[-1, 2] < -0.5
     energy = sim.energy(cross.x[1:])
@@ -80,7 +80,7 @@ def test_both_branches_leave_the_pose_where_they_meet() -> None:
 
 @pytest.mark.parametrize("tolerance", [1e-8, 1e-11])
 def test_a_grashof_linkage_keeps_its_energy(tolerance: float) -> None:
-    """Twice a turn its links lie in line, at up to .1 rad a step; the error is that of the scheme, of second order."""
+    """Twice a turn its links lie in line, at up to .1 rad a step; the error is of the scheme's second order."""
     errors = []
     for h in (0.01, 0.005):
         sim = dojo.Simulator(linkage(GRASHOF, (0.0, 0.0, -9.81)), time_step=h, tolerance=tolerance)
@@ -115,7 +115,7 @@ def test_energy_is_bounded_over_1e5_steps(lengths: tuple[float, float, float, fl
     assert abs(energies[-1].mean() - energies[0].mean()) < 0.01 * kinetic
 
 
-def test_what_time_steps_cannot_follow_is_said() -> None:
+def test_motions_too_fast_for_the_time_step_are_refused() -> None:
     """A rod of the delta robot swings past half a turn: it has to spin by more than a turn in a step, or less gains."""
     mech = dojo.models.delta()
     free = replace(mech, joints=[replace(j, limits=None, armature=0.0) for j in mech.joints])
@@ -129,7 +129,7 @@ def test_what_time_steps_cannot_follow_is_said() -> None:
 
 
 def test_singular_configurations_are_described() -> None:
-    """At the pose in line, beside it, and far from it."""
+    """At the pose in line, near it, and far from it."""
     sim = dojo.Simulator(linkage(PARALLELOGRAM, (0.0, 0.0, 0.0)), time_step=0.01)
     for a, singular, text in ((0.0, 1, "; singular: 1 of the"), (1e-3, 0, "close to a singular"), (1.0, 0, "")):
         rank = sim.loop_rank(np.array([a, -a, a, 0.0, 0.0, 0.0]))
@@ -140,8 +140,8 @@ def test_singular_configurations_are_described() -> None:
 
 
 def test_velocity_and_energy_at_the_nodes_of_loops() -> None:
-    """Those of the single coordinate, a steady turn: exact to second order; without the half of the loop's impulse that
-    acts at the node they were off by the first."""
+    """They equal those of the single coordinate, a steady turn, to second order. Without the half of the loop's impulse
+    that acts at the node they were off to first order."""
     errors = []
     for h in (0.02, 0.01):
         sim = dojo.Simulator(linkage(PARALLELOGRAM, (0.0, 0.0, 0.0)), time_step=h, tolerance=1e-12)

@@ -26,7 +26,7 @@ any_state = st.composite(states)()
 
 @st.composite
 def perturbations(draw: st.DrawFn) -> np.ndarray:
-    """Steps whose rotations stay below half a turn, from tiny to large."""
+    """Steps with rotations below half a turn, from tiny to large."""
     size = draw(st.sampled_from([0.0, 1e-300, 1e-160, 1e-12, 1e-6, 1e-3, 0.1, 1.0]))
     return size * np.array(draw(st.lists(st.floats(-1.8, 1.8), min_size=SIM.ndx, max_size=SIM.ndx)))
 

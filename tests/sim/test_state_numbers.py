@@ -77,7 +77,7 @@ def test_a_result_is_finite_or_refused(name: str, call: str, rng: np.random.Gene
     )
 
 
-def test_the_joint_whose_numbers_are_largest_is_named() -> None:
+def test_the_joint_with_the_largest_numbers_is_named() -> None:
     sim = simulator("hopper")
     x = sim.neutral()
     x[sim.nq + sim.mechanism.v_slice("leg").start] = 1e200
@@ -116,7 +116,7 @@ def test_a_maximal_state_with_a_quaternion_of_length_zero_is_refused(call: str) 
         getattr(sim, call)(z)
 
 
-def test_numbers_whose_sum_overflows_are_no_warning() -> None:
+def test_an_overflowing_sum_of_numbers_does_not_warn() -> None:
     sim = simulator("hopper")
     with pytest.raises(ValueError, match="expected finite numbers, got inf at index 0"):
         sim.integrate(sim.neutral(), np.concatenate([[np.inf, -np.inf], np.zeros(sim.ndx - 2)]))

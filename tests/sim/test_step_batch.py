@@ -1,4 +1,4 @@
-"""Steps of independent rows: each as if it were alone, with derivatives, parameters and smoothing of its own."""
+"""Steps of independent rows: each as if alone, with its own derivatives, parameters and smoothing."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_a_row_is_the_rollout_of_its_state_whatever_its_neighbours(sim):
         np.testing.assert_array_equal(sim.step_batch(X, U, substeps=3, derivatives=True).B, found.B)
 
 
-def test_derivatives_are_those_of_central_differences(sim):
+def test_derivatives_agree_with_central_differences(sim):
     """Differences of steps that end early are off by the root of their tolerance: these are exact."""
     sim = sim.replace(tolerance=1e-13)
     X, U = _rows(sim)

@@ -52,7 +52,7 @@ def pendulum(h: float, **given: object) -> dojo.Simulator:
 
 
 def hanging(angle: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
-    """q, v of the ball beside the vertical, moving across: on a circle at speed sqrt(g L sin tan)."""
+    """q, v of the ball off the vertical, moving across: on a circle at speed sqrt(g L sin tan)."""
     return np.r_[np.sin(angle), 0.0, -np.cos(angle), 1, 0, 0, 0], np.r_[0.0, speed, 0.0, np.zeros(3)]
 
 

@@ -1,4 +1,4 @@
-"""Terrain: its heights, what a ball feels of it, the derivatives of a step on it, and motions whose answer is known."""
+"""Terrain: its heights, its contact with a ball, the derivatives of a step on it, and motions with known solutions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from support.scenes import ball, block, chain, order, run
 # -- heights -----------------------------------------------------------------------------------------------------------
 
 
-def test_a_function_is_met_and_its_normal_is_that_of_the_spline(rng):
+def test_a_function_is_met_and_its_normal_agrees_with_the_spline(rng):
     x, y = rng.uniform(-1.9, 1.9, (2, 200))
     np.testing.assert_allclose(WAVES.height(x, y), waves(x, y), atol=2e-6)
     e = 1e-5
@@ -106,7 +106,7 @@ def test_an_inclined_plane_on_a_grid_is_the_half_space(rng):
 @pytest.mark.parametrize("law", ["impact", "linear", "nonlinear"])
 @pytest.mark.parametrize("height", [-0.01, 0.0, 0.3])
 def test_derivatives_on_waves(law, height, kappa, rng):
-    """Pressed, touching and flying; a ball whose radius is not small against the waves, and points of a block."""
+    """Pressed, touching and flying; a ball with a radius not small against the waves, and points of a block."""
     for mech in (ball(radius=0.25, law=law), block(0.4, law=law)):
         sim = dojo.Simulator(mech.on(WAVES), time_step=H, kappa=kappa)
         x = sim.neutral()
@@ -139,7 +139,7 @@ def test_derivatives_of_a_chain_on_waves(rng):
 
 
 def test_far_contacts_are_left_out_and_change_nothing():
-    """High above the ground, and in a long fall onto it; beside the same without the list of far contacts."""
+    """High above the ground, and in a long fall onto it; against the same without the list of far contacts."""
     mech = ball(radius=0.1).on(WAVES)
     sim = dojo.Simulator(mech, time_step=H, kappa=1e-8, tolerance=1e-8)
     x = sim.neutral()
@@ -172,7 +172,7 @@ def test_a_ball_on_an_incline(friction):
 
 
 def test_without_friction_energy_stays_in_a_bowl():
-    """A block on its points slides through a bowl; what it loses is of first order in the time step."""
+    """A block on its points slides through a bowl; its loss of energy is of first order in the time step."""
     bowl = dojo.Terrain.from_function(lambda X, Y: 0.2 * (X**2 + Y**2), GRID, GRID)
     mech = block(0.2, friction=0.0).on(bowl)
     drift = []
@@ -190,7 +190,7 @@ def test_without_friction_energy_stays_in_a_bowl():
 
 @pytest.mark.parametrize("friction", [0.5, 1.0, 2.0])
 def test_boxes_land_on_curved_ground(friction, rng):
-    """Four corners hold a box in four directions, one of them hardly: landings whose determinant is negative."""
+    """Four corners hold a box in four directions, one of them hardly: landings with a negative determinant."""
     ground = dojo.Terrain.from_function(lambda X, Y: 0.3 * X + 0.1 * Y**2, GRID, GRID)
     box = dojo.Mechanism([dojo.Body("box", 1.0, shape=dojo.Box(0.3, 0.2, 0.1))], [dojo.Joint("floating", None, "box")])
     sim = dojo.Simulator(box.on(ground, bodies=["box"], friction=friction), time_step=H, kappa=1e-9)

@@ -165,7 +165,7 @@ def test_floating_tree_in_flight_and_in_contact(law, height, time_step, rng):
 @pytest.mark.sweep(4)
 @pytest.mark.parametrize("kind", KINDS)
 def test_energy_momentum_and_start(kind, rng):
-    """What is reported at the nodes is the discrete Legendre transform."""
+    """Energy, momentum and start at the nodes follow from the discrete Legendre transform."""
     sim = make(chain(kind, 2, gravity=(0.0, 1.0, -9.81), spring=3.0), 0.02)
     scene, x = from_mechanism(sim.mechanism), random_state(sim, rng, 3.0)
     q, v = x[: sim.nq], x[sim.nq :]

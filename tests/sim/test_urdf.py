@@ -1,4 +1,4 @@
-"""Links and joints of URDF files arrive, and what is not represented is said."""
+"""Links and joints of URDF files are read, and unsupported elements are reported."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_a_continuous_joint_has_no_limits(tmp_path: Path) -> None:
     assert mech.joints[1].limits == ((-np.inf, np.inf),)
 
 
-def test_inputs_act_on_what_moves_or_on_what_is_chosen(tmp_path: Path) -> None:
+def test_inputs_act_on_moving_or_on_chosen_joints(tmp_path: Path) -> None:
     tool = (link("hand"), joint("wrist", "forearm", "hand"))
     path = arm(tmp_path, *tool)
     assert dojo.load_urdf(path).input_names == ("elbow", "wrist")
@@ -133,7 +133,7 @@ def test_inputs_act_on_what_moves_or_on_what_is_chosen(tmp_path: Path) -> None:
         dojo.load_urdf(path, actuated=["knee"])
 
 
-# -- what is not represented -------------------------------------------------------------------------------------------
+# -- unsupported elements ----------------------------------------------------------------------------------------------
 
 
 def test_mimics_become_gears_or_move_freely_with_a_warning_or_are_locked(tmp_path: Path) -> None:

@@ -139,7 +139,7 @@ def test_contact_names_never_collide(tmp_path: Path) -> None:
     assert mech.contact_names == ("foot_0", "foot_1", "foot_0_1")
 
 
-def test_what_cannot_touch_the_ground_is_said(tmp_path: Path) -> None:
+def test_shapes_that_cannot_touch_the_ground_are_reported(tmp_path: Path) -> None:
     with pytest.warns(dojo.UrdfWarning, match="nothing of the robot makes contact with the ground"):
         one(tmp_path, collision(MESH))
     path = biped(tmp_path)
@@ -182,7 +182,7 @@ def trolley(folder: Path) -> dojo.UrdfMechanism:
 
 
 def test_wheels_roll_without_loss(tmp_path: Path) -> None:
-    """At 1.2 m/s for 2 s: as far as it would go on round wheels, at the same height, without slip."""
+    """At 1.2 m/s for 2 s: the same distance as on round wheels, at the same height, without slip."""
     mech = trolley(tmp_path)
     assert len(mech.contacts) == 8
     sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-8)

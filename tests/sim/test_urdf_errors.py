@@ -1,4 +1,4 @@
-"""A URDF file that cannot be read is refused with the file, the line, the element, and what is wrong with it."""
+"""A URDF file that cannot be read is refused; the message has the file, the line, the element and the error."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ BROKEN: dict[str, tuple[tuple[str, ...], str]] = {  # parts from line 2 on, and 
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, case: str) -> None:
+def test_errors_are_named_with_their_line(tmp_path: Path, case: str) -> None:
     parts, message = BROKEN[case]
     message = message if ".*" in message else re.escape(message)
     with pytest.raises(dojo.UrdfError, match=rf"^load_urdf: robot\.urdf\b.*{message}"):
@@ -148,7 +148,7 @@ def test_another_format_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "not xml", '<robot name="r"><link name="a"></robot>', "\0\0"])
-def test_what_is_not_xml_is_refused(tmp_path: Path, text: str) -> None:
+def test_files_that_are_not_xml_are_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "robot.urdf"
     path.write_text(text)
     with pytest.raises(dojo.UrdfError, match=r"load_urdf: robot\.urdf, line 1.*: not XML: "):

@@ -17,7 +17,7 @@ from support.urdf_files import branched, compare_with_mujoco, inertial, joint, l
 pytestmark = pytest.mark.filterwarnings("ignore:.*keeps one collision shape:sim.io.urdf.report.UrdfWarning")
 
 
-def test_an_inertia_is_that_of_its_point_masses(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_an_inertia_agrees_with_its_point_masses(tmp_path: Path, rng: np.random.Generator) -> None:
     """Masses at points of two links, one fixed to the other; written about turned frames, read back as one body."""
     masses, points = rng.uniform(0.5, 2.0, size=(2, 6)), rng.normal(size=(2, 6, 3))
     at, angles = np.array([0.4, -0.1, 0.2]), np.array([0.2, 0.9, -1.3])
@@ -50,7 +50,7 @@ def test_poses_masses_and_energy_are_mujocos(tmp_path: Path, rng: np.random.Gene
     assert energy < 1e-9
 
 
-def test_poses_are_those_of_the_simulator(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_poses_agree_with_the_simulator(tmp_path: Path, rng: np.random.Generator) -> None:
     mech = dojo.load_urdf(branched(tmp_path), ground=False)
     q = np.concatenate(
         [rng.normal(size=3), *[v / np.linalg.norm(v) for v in rng.normal(size=(1, 4))], rng.normal(size=3)]
@@ -63,7 +63,7 @@ def test_poses_are_those_of_the_simulator(tmp_path: Path, rng: np.random.Generat
 
 
 def test_merged_and_kept_fixed_joints_have_the_same_dynamics(tmp_path: Path, rng: np.random.Generator) -> None:
-    """The same mass matrix; and motions that differ by what the step does to a body in two pieces, of second order."""
+    """The mass matrices are the same; a step treats a body in two pieces differently, to second order."""
     mechs = [dojo.load_urdf(branched(tmp_path), merge_fixed=m, ground=False) for m in (True, False)]
     assert [m.nbody for m in mechs] == [4, 6]  # the marker has no mass, so it is never a body
     assert mechs[0].nv == mechs[1].nv == 9
@@ -140,7 +140,7 @@ def test_a_root_without_mass_is_told_to_be_fixed(tmp_path: Path) -> None:
     assert dojo.load_urdf(path, floating=False).body_names == ("cart",)
 
 
-def test_a_repair_changes_only_what_is_impossible() -> None:
+def test_a_repair_changes_only_impossible_inertias() -> None:
     body = RigidInertia(2.0, np.array([0.1, 0.2, 0.3]), np.diag([1.0, 1.0, 2.5]))  # second moments 1.25, 1.25, -0.25
     fixed = repaired(body)
     least = 0.4 * BALL_RADIUS**2

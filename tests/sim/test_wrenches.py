@@ -1,4 +1,4 @@
-"""External wrenches: what they do to momentum, that they are constants of derivatives, and what is refused."""
+"""External wrenches: their effect on momentum, derivatives that hold them constant, and refusals."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def test_none_and_zero_are_the_same_simulator(rng):
     assert not sim.__dict__.get("_pushed")
 
 
-def test_derivatives_are_those_of_the_pushed_step(rng):
-    """A and B of a ball that is pressed onto the ground, with gains of a policy beside it."""
+def test_derivatives_agree_with_the_pushed_step(rng):
+    """A and B of a ball that is pressed onto the ground, and gains of a policy."""
     sim = dojo.Simulator(ball(), time_step=0.01, kappa=1e-4, tolerance=1e-13)
     x = sim.neutral()
     x[2] = 0.1

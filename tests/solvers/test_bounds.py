@@ -1,4 +1,4 @@
-"""Bounds checks: NUMBA_BOUNDSCHECK=1 finds what kernels would read or write beyond an array, before its begin too."""
+"""Bounds checks: NUMBA_BOUNDSCHECK=1 finds reads and writes of kernels outside an array, before its start too."""
 
 from __future__ import annotations
 

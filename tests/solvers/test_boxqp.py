@@ -44,8 +44,8 @@ def test_without_limits_it_is_a_linear_solve():
     np.testing.assert_allclose(x, -np.linalg.solve(H, g), rtol=1e-12)
 
 
-def test_a_start_beside_the_solution_is_finished():
-    """The decrease that is left is less than the rounding of the value, whose comparison then says anything."""
+def test_a_start_near_the_solution_is_finished():
+    """The remaining decrease is below the rounding error of the value, so comparing values decides nothing."""
     for seed in range(40):
         rng = np.random.default_rng(seed)
         n = 12

@@ -1,4 +1,4 @@
-"""The way back onto the central path."""
+"""The return to the central path."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Block Gauss-Seidel for contacts: what it ends at satisfies the laws."""
+"""Block Gauss-Seidel for contacts: its solutions satisfy the laws of contact."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ ROOM = SIZE + 4  # the matrices of a step have room for more
 
 
 def problem(seed):
-    """G of bodies whose gaps change by h times their speeds, and w of a motion that closes some of them."""
+    """G of bodies with gaps that change by h times their speeds, and w of a motion that closes some of them."""
     rng = np.random.default_rng(seed)
     J = rng.normal(size=(SIZE, 14))
     scale = np.ones(SIZE)

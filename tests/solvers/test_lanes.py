@@ -1,4 +1,4 @@
-"""Lanes: what they load, keep and store is what the rows hold; six rows of them as wrenches."""
+"""Lanes load, keep and store the values of the rows; six rows of lanes as wrenches."""
 
 import numpy as np
 
@@ -22,7 +22,7 @@ def _rows(S, P):
 
 
 def both(kernel, *arguments):
-    """What it makes of the arguments compiled, and as it is written."""
+    """The arguments after the compiled kernel; the Python function has to leave the same values."""
     copies = [[a.copy() if isinstance(a, np.ndarray) else a for a in arguments] for _ in range(2)]
     kernel(*copies[0])
     kernel.py_func(*copies[1])
@@ -41,7 +41,7 @@ def test_arithmetic(rng):
     np.testing.assert_array_equal(out[2, [0, *range(1 + LANES, 2 * LANES)]], A[2, [0, *range(1 + LANES, 2 * LANES)]])
 
 
-def test_what_is_not_kept_may_be_anything():
+def test_masked_lanes_may_hold_anything():
     A = np.full((4, 2 * LANES), np.nan)
     A[1, 0] = 3.0
     out = A.copy()

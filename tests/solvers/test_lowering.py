@@ -1,4 +1,4 @@
-"""Arrays and numbers in kernels mean what they mean in Python: the compiler writes some of their instructions itself."""
+"""Arrays and numbers behave in kernels as in Python, although the compiler writes some of their instructions itself."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ pytestmark = pytest.mark.kernel
 
 @kernel
 def _negative(a, i, out):
-    """Indices from the end, written as numbers, beside others, of an entry and of a row."""
+    """Indices from the end, written as numbers, combined with others, of an entry and of a row."""
     row = a[-1]
     out[0] = a[i, -2]
     out[1] = row[i]
@@ -22,7 +22,7 @@ def _negative(a, i, out):
 
 @kernel
 def _variable_index(a, i, out):
-    """An index kept in a variable stays what it was when its parts change."""
+    """An index kept in a variable does not change with its parts."""
     at = (i, i + 1)
     i += 1
     out[0] = a[at]
@@ -59,7 +59,7 @@ def _mixed(n, x, counts, out):
 
 @kernel
 def _compared(x, y, out):
-    """Whatever is compared with NaN is false, but for `!=`."""
+    """Every comparison with NaN is false, except `!=`."""
     out[0] = 1.0 * (x < y) + 2.0 * (x <= y) + 4.0 * (x > y) + 8.0 * (x >= y)
     out[1] = 1.0 * (x == y) + 2.0 * (x != y)
     out[2] = x / y

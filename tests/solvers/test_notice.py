@@ -1,4 +1,4 @@
-"""Signs of life for whoever waits for a compilation: late, short, and only to a terminal or a notebook."""
+"""Progress messages during compilation: late, short, and only to a terminal or a notebook."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Terminal(io.StringIO):
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """A clock to be set, and nothing said so far."""
+    """A settable clock, and no messages so far."""
     now = [0.0]
     monkeypatch.setattr(notice, "_CLOCK", notice._Clock())
     monkeypatch.setattr(notice.time, "perf_counter", lambda: now[0])
@@ -32,7 +32,7 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
 
 
 def watched(monkeypatch: pytest.MonkeyPatch, stream: io.StringIO, *modules: str) -> io.StringIO:
-    """The stream as standard error; that of `sys` itself changes hands between a fixture and its test."""
+    """The stream as standard error; `sys.stderr` itself changes between a fixture and its test."""
     monkeypatch.setattr(notice, "sys", SimpleNamespace(stderr=stream, modules=modules))
     return stream
 
@@ -49,7 +49,7 @@ def parts_of(items: Iterable[int]) -> list[int]:
     return list(notice.parts(items))
 
 
-def test_what_takes_longer_than_a_second_says_what_it_does(clock: list[float], terminal: io.StringIO) -> None:
+def test_compiling_for_longer_than_a_second_is_announced(clock: list[float], terminal: io.StringIO) -> None:
     notice.because("no code is shipped")
     compile_for(clock, 0.4, within=2)
     assert terminal.getvalue() == ""

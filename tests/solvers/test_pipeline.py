@@ -1,4 +1,4 @@
-"""The two pipelines of the compiler, and what other users of Numba in the process see of them: nothing."""
+"""The two pipelines of the compiler are invisible to other users of Numba in the process."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ product(np.zeros(3), 1, 2)
     "first", ["import dojo_opt, sim.integrators.rollout", "import dojo_opt, sim.integrators.rollout" + COMPILE]
 )
 def test_numba_compiles_others_functions_as_it_does_without_us(first: str):
-    """Lanes add cases of their own to `+`; nothing else is registered with an operator."""
+    """Lanes add their own cases to `+`; nothing else is registered with an operator."""
     assert python(GUEST.format(first=first)) == python(GUEST.format(first=""))
 
 

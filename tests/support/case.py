@@ -1,4 +1,4 @@
-"""Case: a step whose derivatives by parameters are measured."""
+"""Case: a step for which derivatives by parameters are measured."""
 
 from __future__ import annotations
 

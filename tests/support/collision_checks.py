@@ -1,4 +1,4 @@
-"""What a pair of shapes should give, measured: near (0.1 m apart), touching and deep (0.05 m inside).
+"""Errors of a pair of shapes: near (0.1 m apart), touching and deep (0.05 m inside).
 
 distance    of the nearest points, against the largest separation of the two along any direction [m]
 frame       how far the points that the contact names, p + phi/2 n and p - phi/2 n, are from the surfaces of a and b [m]
@@ -31,13 +31,13 @@ TRIALS = 6
 
 
 def bar(name: str, measure: str) -> float:
-    """What a measure of a pair ("distance near", ...) is held against."""
+    """The bar of a measure of a pair ("distance near", ...)."""
     what = measure.partition(" ")[0]
     return BARS[what] if what == "derivative" else ROUNDED.get(name, BARS[what])
 
 
 def chosen(case: Case, R: Floats, r: Floats) -> list[tuple[int, int]]:
-    """The contact points that there are at a pose, and the elements of the shapes that make each."""
+    """The existing contact points at a pose, each with its elements of the shapes."""
     pose = np.ascontiguousarray(R).ravel(), np.ascontiguousarray(r)
     number, out = features(case), np.empty(OUT)
     if case.kind in CYLINDERS:
@@ -50,7 +50,7 @@ def chosen(case: Case, R: Floats, r: Floats) -> list[tuple[int, int]]:
 
 
 def contact(case: Case, feature: int, code: int, R: Floats, r: Floats) -> Floats:
-    """What the kernels say of a contact point of these elements, (43,)."""
+    """The kernels' data of a contact point of these elements, (43,)."""
     pose = np.ascontiguousarray(R).ravel(), np.ascontiguousarray(r)
     out = np.empty(OUT)
     if case.kind in CYLINDERS:

@@ -53,5 +53,5 @@ COUPLED: dict[str, Callable[[], Case]] = {
 
 
 def kinds(name: str, case: Case) -> list[str]:
-    """The kinds of parameters whose derivatives can be checked."""
+    """The kinds of parameters with derivatives that can be checked."""
     return [kind for kind in case.kinds() if name != "geared, in a loop" or kind not in PLANAR]

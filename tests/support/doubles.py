@@ -136,7 +136,7 @@ class System:
 
 
 class Horizon:
-    """The interface of `sim.horizon.Horizon` around a system, which learns nothing from the steps before."""
+    """The interface of `sim.horizon.Horizon` around a system; it learns nothing from previous steps."""
 
     def __init__(self, system, substeps, limits):
         self.system, self.substeps, self.limits = system, substeps, limits

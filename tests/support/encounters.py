@@ -36,7 +36,7 @@ def two(a: Shape | Polytope, b: Shape | Polytope, friction: float = 0.5, law: st
 
 
 def approaching(sim: Simulator, seed: int, distance: float) -> np.ndarray:
-    """Random poses about so far apart, moving towards one another and spinning."""
+    """Random poses about this distance apart, moving towards one another and spinning."""
     rng = np.random.default_rng(seed)
     n = rng.normal(size=3)
     n /= np.linalg.norm(n)

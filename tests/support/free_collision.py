@@ -1,4 +1,4 @@
-"""What holds along a motion of two bodies that nothing but their collision acts on."""
+"""Invariants along a motion of two bodies under their collision alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An engine that ends its process; a module of its own, so that the process of the engines can import it."""
+"""An engine that ends its process; in a separate module, so that the process of the engines can import it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Planar four-bars on the ground: one whose loop may be cut at any of its joints, and one of any lengths."""
+"""Planar four-bars on the ground: one with a loop that may be cut at any of its joints, and one of any lengths."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mechanisms and states that hide nothing: skewed axes, offsets everywhere, every joint kind."""
+"""General mechanisms and states: skewed axes, offsets everywhere, every joint kind."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def random_state(rng: np.random.Generator, mech: Mechanism, speed: float = 1.0) 
 
 
 def two(**changes: object) -> Mechanism:
-    """A floating body with a hinged one, and what the test wants to be wrong with it."""
+    """A floating body with a hinged one, and the errors that the test wants."""
     parts: dict[str, object] = {
         "bodies": [Body("torso", shape=BALL), Body("leg", shape=BALL)],
         "joints": [Joint("floating", None, "torso"), Joint("revolute", "torso", "leg", name="hip")],

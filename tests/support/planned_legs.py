@@ -1,4 +1,4 @@
-"""What a plan of the quadruped has to be: converged, upright, within its limits, and not only at its own time step."""
+"""Requirements of a quadruped's plan: converged, upright, within its limits, and not only at its own time step."""
 
 import numpy as np
 
@@ -31,7 +31,7 @@ def check(problem, plan, iterations, tilt=0.99, off=0.02):
 
 
 def lands(problem, plan, off=5e-3):
-    """On its feet and where the plan says, at 1 ms and with hard contacts."""
+    """On its feet and near the plan's end, at 1 ms and with hard contacts."""
     hard = problem.sim.replace(time_step=1e-3, kappa=1e-8)
     shot = hard.closed_loop(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=20, limits=problem.control_limits)
     assert shot.status == 0 and upright(shot.x).min() > 0.98

@@ -1,4 +1,4 @@
-"""What a call refuses, and the words of its message."""
+"""Refusals of a call, and the words of its message."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 
 def check_refused(call: Callable[[], Any], *words: str) -> None:
-    """The call raises a ValueError or TypeError whose message has all the words."""
+    """The call raises a ValueError or TypeError with all the words in its message."""
     with pytest.raises((ValueError, TypeError)) as error:
         call()
     for word in words:

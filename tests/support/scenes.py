@@ -1,4 +1,4 @@
-"""Small mechanisms for the tests, by the public interface, and what tests measure on them."""
+"""Small mechanisms for the tests, by the public interface, and measures of them."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from support.collide import collide, collide_rows
 
 Array = np.ndarray
 NO_HULL = np.zeros((1, 4))
-TABLES = {"POLYTOPE"}  # test_collision_table.py has those of polytopes
+TABLES = {"POLYTOPE"}  # test_collision_table.py covers polytopes
 SIMPLE = [p for p in Pair if p < Pair.POLYTOPE_POLYTOPE and not TABLES & set(p.name.split("_"))]
 CORE = [p for p in SIMPLE if not {"CYLINDER", "HALFSPACE", "STRING", "ELLIPSOID"} & set(p.name.split("_"))]
 NAMES = {p: p.name.lower() for p in Pair}
@@ -30,7 +30,7 @@ def contacts_at(kind: int, feature: int, sizes: Array, Rs: Array, rs: Array) -> 
 
 
 def features(kind: Pair, sizes: Array, R: Array, r: Array) -> list[Array]:
-    """What `collide` returns for the contact points that exist."""
+    """Results of `collide` for the existing contact points."""
     outs = [touch(kind, f, sizes, R, r) for f in range(count(kind))]
     return [out for out in outs if out[0] < 1e8]
 

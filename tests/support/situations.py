@@ -89,7 +89,7 @@ def _resting(kind: str, height: float, friction: float, speed: float, kappa: flo
 
 
 def _pyramid() -> Case:
-    """A box slides on two corners, its friction that of the linear law, pushed by inputs on the body."""
+    """A box slides on two corners with friction of the linear law, pushed by inputs on the body."""
     corners = [(0.2, 0.1, -0.1), (-0.2, 0.1, -0.1)]
     contacts = [Contact("box", p, friction=0.3, law="linear") for p in corners]
     inputs = [

@@ -30,7 +30,7 @@ def collision(shape: str, xyz: str = "0 0 0", rpy: str = "0 0 0") -> str:
 
 
 def link(name: str, *parts: str) -> str:
-    """A link; one of 1 kg when nothing is said about it."""
+    """A link, by default of 1 kg."""
     return f'<link name="{name}">{"".join(parts or [inertial()])}</link>'
 
 

@@ -61,15 +61,15 @@ class AccuracyStudy:
             advice(report, self.quick)
         report.figure = drawing.figure(measured)
         report.notes.append(
-            "processor time is that of the steps: what a call with nothing to do takes from Python is taken off, of "
-            "every engine; ours is one rollout, MuJoCo's mj_step with a number of steps per sample; an engine whose "
-            "energy is off by more than all there is counts as lost"
+            "processor time counts the steps only: the time of an empty call from Python is subtracted for every "
+            "engine; ours is one rollout, MuJoCo's mj_step with a number of steps per sample; an engine counts as "
+            "lost when its energy error exceeds the total energy"
         )
         report.notes.append(
-            f"errors count as equal below {curves.FLOOR:g}, or below what a change of the start by one rounding makes "
-            "of the reference, if that is more (5e-10 rad after 10 s for the free body, which turns about its unstable "
-            "axis); a step whose run would take longer than "
-            f"{'0.02' if self.quick else '0.2'} s is left out, but not of ours of order 2 where momentum is conserved; "
+            f"errors count as equal below {curves.FLOOR:g}, or below the change of the reference after a change of the "
+            "start by one rounding, if that is more (5e-10 rad after 10 s for the free body, which turns about its "
+            "unstable axis); steps are omitted when their run would take longer than "
+            f"{'0.02' if self.quick else '0.2'} s, except ours of order 2 where momentum is conserved; "
             "inf: the engine was lost on the way"
         )
         return report
@@ -89,7 +89,7 @@ class AccuracyStudy:
 _SUMMARY = (
     "Smooth motion in every engine with time steps from 0.1 s to 0.1 ms, errors at ten samples against equations of "
     "motion in continuous time (DOP853, relative tolerance 1e-12; bodies by Newton and Euler, pendulums in absolute "
-    "angles), which share no code with the simulator. Processor time is that of the stepping alone. Ratios compare the "
+    "angles), which share no code with the simulator. Processor time covers the stepping alone. Ratios compare the "
     "best of our orders with MuJoCo's RK4 at the same processor time, for every step of RK4: below 1, ours is better."
 )
 

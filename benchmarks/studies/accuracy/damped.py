@@ -1,4 +1,4 @@
-"""Motions with dampers: errors of order 2 from step to step, beside other engines at the same steps.
+"""Motions with dampers: errors of order 2 from step to step, compared with other engines at the same steps.
 
 A damper that acts on the velocity at the end of a step makes a method of first order, whatever it is otherwise.
 """
@@ -33,14 +33,14 @@ def arm(damper: float) -> SmoothScene:
 
 
 def legs() -> SmoothScene:
-    """A quadruped in space, whose legs are damped by 0.5 N m s/rad."""
+    """A quadruped in space; dampers of 0.5 N m s/rad act on its legs."""
     mech = dojo.models.quadruped(damper=0.5, gravity=(0.0, 0.0, 0.0))
     v = np.random.default_rng(1).normal(size=18)
     return replace(smooth(mech, np.array(mech.neutral), v, 0.5), name="quadruped in space")
 
 
 def dampers(report: Report, everyone: list[PhysicsEngine], quick: bool) -> None:
-    """Order of convergence, and errors over those of the peer."""
+    """Order of convergence, and errors relative to the peer's."""
     peers = [engine for engine in everyone if not engine.name.startswith("dojo-opt")]
     rows: list[list[Cell]] = []
     scenes = [pendulum()] if quick else [pendulum(), arm(0.5), arm(5.0), legs()]

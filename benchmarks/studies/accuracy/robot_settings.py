@@ -31,8 +31,8 @@ def recommendations(report: Report, quick: bool) -> None:
         report.details.setdefault("robots", {})[name] = [{**vars(t), "realtime": t.realtime} for t in trials]
     header = ["", "dofs", "time step, ms", "kappa", "error, mm", "asked for, mm", "times real time", "converged to, mm"]
     note = (
-        "The largest time step, then the largest kappa, with an error after 0.1 s as small as asked for: 1 mm, or "
-        "twice what the converged motion itself is known to. Passive robots that start in the air with random joint "
-        "velocities of 1 rad/s and land. For yours: dojo-opt report accuracy ROBOT.urdf."
+        "The largest time step, then the largest kappa, with the requested error after 0.1 s: 1 mm, or twice the "
+        "error of the converged motion itself. Passive robots start in the air with random joint velocities of "
+        "1 rad/s and land. For your robot: dojo-opt report accuracy ROBOT.urdf."
     )
     report.tables.insert(0, Table("Recommended time step and kappa, with contacts and limits", header, rows, note))

@@ -40,7 +40,7 @@ def _creep(ax: Any, curve: dict[str, list[float]]) -> None:
 
 
 def _bars(ax: Any, results: dict[str, dict[str, Any]], step: str) -> None:
-    """One group per engine; what is not positive is drawn at the foot of the axis, failures are left out."""
+    """One group per engine; draw values that are not positive at the foot of the axis, and omit failures."""
     foot = 1e-13
     names = list(results)
     columns = [

@@ -1,4 +1,4 @@
-"""What the contact study measures: numbers of one engine on one scene; not-a-number where the engine stopped early."""
+"""Measures of the contact study: numbers of one engine on one scene; NaN where the engine stopped early."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ TILTED = (0.8, 0.36, 0.48, 0.0)  # a unit quaternion with no axis along an edge
 
 @dataclass(frozen=True)
 class Scene:
-    """A mechanism, where it starts, how long it moves; every step is a sample unless a number of samples is given."""
+    """A mechanism, its start and its duration; every step is a sample unless a number of samples is given."""
 
     mechanism: Mechanism
     q: ArrayLike
@@ -37,7 +37,7 @@ class Scene:
     samples: int | None = None
 
     def run(self, engine: PhysicsEngine, time_step: float) -> Run:
-        """Its motion by one engine."""
+        """Motion of the scene in one engine."""
         return engine.simulate(
             self.mechanism,
             time_step=time_step,
@@ -61,7 +61,7 @@ def sliding(angle: float, q: ArrayLike) -> Scene:
 
 
 def on_slope(duration: float) -> Scene:
-    """The cube on a slope of 20 degrees with friction 0.5: tan 20 = 0.364, it must stay."""
+    """The cube on a slope of 20 degrees with friction 0.5: it must stay, as tan 20 = 0.364."""
     gravity = (G * sin(SLOPE), 0.0, -G * cos(SLOPE))
     return Scene(block(friction=GRIP, gravity=gravity), (0, 0, 0.25, 1, 0, 0, 0), np.zeros(6), duration)
 
@@ -97,7 +97,7 @@ def ramp(time_step: float) -> Scene:
 
 
 def ramp_displacement() -> float:
-    """Where the pushed cube is after its second [m]: it starts when 20 t = mu m g, then a = 20 t - mu g."""
+    """Position of the pushed cube after one second [m]: it starts when 20 t = mu m g, then a = 20 t - mu g."""
     begin = 0.4 * G / 20.0
     return 20.0 * (1.0 - begin) ** 3 / 6.0
 

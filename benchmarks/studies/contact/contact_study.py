@@ -1,4 +1,4 @@
-"""The contact study: every engine on the same scenes, rows for ours at the kappa that is recommended for simulation."""
+"""The contact study: every engine on the same scenes, rows for ours at the kappa recommended for simulation."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ _LEFT_OUT = ("MuJoCo implicit", "Drake RK3")  # as implicitfast here; an explici
 Results = dict[str, dict[str, Any]]
 
 SUMMARY = (
-    "Blocks, a ball and a quadruped against a half-space: what friction, rest and impact do in each engine, held "
-    "against Coulomb's law in closed form: a sliding block stops after v^2/(2 mu g) in every direction and does not "
-    "rise, a block on a slope below the cone does not move, nothing sinks in at any speed, a push that grows moves "
+    "Blocks, a ball and a quadruped against a half-space: friction, rest and impact in each engine, compared with "
+    "Coulomb's law in closed form. A sliding block stops after v^2/(2 mu g) in every direction and does not rise, a "
+    "block on a slope below the friction angle does not move, nothing sinks in at any speed, and a growing push moves "
     "a cube as the integral says. Where there is no closed form, an engine is compared with itself at a much smaller "
     "time step."
 )
 NOTES = [
-    f"kappa {KAPPA:g} is the one to simulate these with: creep and the gap at rest are proportional to kappa, run time "
-    "is not. The gap is kappa over the impulse m g h, so light bodies and small time steps ask for a smaller one: the "
-    "default is 1e-9 m/s * m g h. That of plans, 1e-6, lets the block of 1 kg float at 0.4 mm and creep at 1.3 mm/s "
-    "at 1 ms.",
+    f"Simulate these scenes with kappa {KAPPA:g}: creep and the gap at rest are proportional to kappa, run time is "
+    "not. The gap is kappa over the impulse m g h, so light bodies and small time steps need a smaller kappa: the "
+    "default is 1e-9 m/s * m g h. With the kappa of plans, 1e-6, the block of 1 kg floats at 0.4 mm and creeps at "
+    "1.3 mm/s at 1 ms.",
     "MuJoCo: elliptic cones, its defaults otherwise; 'stiff contacts' are solref .001 1, solimp .99 .999 .0001. Drake: "
     "point contact, 1 mm penetration allowance. PyBullet: 50 iterations. Points are balls of a tenth of a millimetre "
     "there. The sliding block starts from where it rests in each engine.",
@@ -114,7 +114,7 @@ class ContactStudy:
 
 
 def _peers(quick: bool) -> list[PhysicsEngine]:
-    """Those installed, and MuJoCo with the hardest contacts that hold."""
+    """The installed engines, and MuJoCo with the hardest contacts that hold."""
     peers = [engine for engine in installed() if engine.name not in _LEFT_OUT]
     if find_spec("mujoco") is not None:
         from benchmarks.engines.mujoco import stiff

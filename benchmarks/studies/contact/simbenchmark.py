@@ -1,7 +1,7 @@
-"""Three tests of SimBenchmark (leggedrobotics/SimBenchmark), which say what contact does to motion as a whole.
+"""Three tests of SimBenchmark (leggedrobotics/SimBenchmark), which show the effect of contact on whole motions.
 
 rolling    a box of 10 kg with 25 balls of 1 kg on it is pulled over the ground by 150 N for 4 s, along y or askew
-bouncing   balls of 10 kg fall from 5 m on a floor that gives everything back, without friction, for 20 s
+bouncing   balls of 10 kg fall from 5 m on an elastic floor without friction, for 20 s
 momentum   a ball of 10 kg at 5 m/s hits a floating quadruped, inelastically, without gravity, for 10 s
 """
 
@@ -109,7 +109,7 @@ def rolling_mujoco(time_step: float, direction: tuple[float, float], duration: f
 
 
 def bouncing(time_step: float, side: int = 7, duration: float = 20.0) -> float:
-    """Largest error of the energy of side x side balls, over that of their start above the floor."""
+    """Largest error of the energy of side x side balls, relative to their initial energy above the floor."""
     names = [f"ball{k}" for k in range(side**2)]
     places = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2)
     mech = Mechanism(
@@ -126,7 +126,7 @@ def bouncing(time_step: float, side: int = 7, duration: float = 20.0) -> float:
 
 
 def momentum(time_step: float, duration: float = 10.0) -> float:
-    """Largest change of the momentum of ball and robot, over that of the ball; they have met."""
+    """Largest change of the momentum of ball and robot, relative to the ball's, after they have met."""
     robot = replace(quadruped(gravity=(0.0, 0.0, 0.0)), contacts=())
     ball = Mechanism([Body("ball", 10.0, shape=Sphere(RADIUS))], [Joint("floating", None, "ball")], gravity=(0, 0, 0))
     both = robot.add(ball, pose=(-1.0, 0.02, 0.02 + float(np.asarray(robot.neutral)[2])))

@@ -1,4 +1,4 @@
-"""Derivatives of one step and of whole motions: error and cost, ours and those of other engines."""
+"""Derivatives of one step and of whole motions: error and cost, for ours and for other engines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Gradients: derivatives of one step and of whole motions, ours and others', against what is known about them."""
+"""Gradients: derivatives of one step and of whole motions, ours and others', against reference values."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from sim.mechanism.mechanism import Mechanism
 from solvers.compiler import threads
 
 KAPPAS = (1e-6, 1e-8, 1e-10)  # of whole motions
-JUDGED = 1e-8  # the one that is held against the bars
+JUDGED = 1e-8  # the bars apply to this kappa
 TIME_STEPS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2)  # [s]
 BARRED = (1e-3, 1e-2)
-EPS = (1e-5, 1e-2)  # of differenced motions: what one would choose, and a wide one that averages
-CHAINED = ("implicitfast", "discrete")  # of the integrators of which MuJoCo gives Jacobians
+EPS = (1e-5, 1e-2)  # of differenced motions: the usual choice, and a wide one that averages
+CHAINED = ("implicitfast", "discrete")  # MuJoCo's integrators with Jacobians
 AHEAD = 5e-3  # [m] above the height from which a step reaches the ground
 _LEFT_OUT = ("MuJoCo implicit", "Drake RK3")  # of a block as implicitfast; explicit, for stiff contacts
 _NO_MUJOCO = 'without MuJoCo; pip install ".[bench]" for its rows'
@@ -59,8 +59,8 @@ class GradientsStudy:
             for name, part in progress([(name, (name, part)) for name, part in parts.items()], "gradients"):
                 results[name] = part(report)
         report.summary = (
-            "Every Jacobian of one step is compared with the extrapolated differences of the very same step; "
-            "those of whole motions with the answers of Coulomb's law, touch-down and smoothing with those of hard "
+            "Every Jacobian of one step is compared with the extrapolated differences of the very same step. "
+            "Jacobians of whole motions are compared with Coulomb's law, touch-down and smoothing with hard "
             "contact. Times are processor time on one core."
         )
         report.figure = draw(results)
@@ -162,7 +162,7 @@ def _able(report: Report, quick: bool) -> list[PhysicsEngine]:
 
 
 def _smoothing(report: Report) -> dict[str, Any]:
-    """Bias against kappa, and the reach that it buys."""
+    """Bias and reach against kappa."""
     bias = {regime.name: smoothing.bias(regime) for regime in smoothing.regimes()}
     reach = np.array([smoothing.reach(kappa) for kappa in smoothing.KAPPAS])
     felt = [smoothing.gradient_at(kappa, d) for kappa, d in zip(smoothing.KAPPAS, reach, strict=True)]

@@ -41,9 +41,9 @@ def smoothing_table(
     rows: list[list[Cell]] = []
     for i in range(0, len(kappas), 2):
         rows.append([f"{kappas[i]:.0e}", *(float(errors[i]) for errors in bias.values()), 1e3 * float(reach[i])])
-    note = "1 kg, steps of 20 ms: errors of d(next velocity)/d(position / h, velocity), whose entries are around 1. "
-    note += "A contact is felt where the gradient of a free step that ends there is 1 % of that of a pressed one."
-    return Table("What smoothing costs and brings", ("kappa", *bias, "felt from [mm]"), rows, note)
+    note = "1 kg, steps of 20 ms: errors of d(next velocity)/d(position / h, velocity), with entries around 1. "
+    note += "A contact is felt where the gradient of a free step that ends there is 1 % of a pressed step's."
+    return Table("Cost and benefit of smoothing", ("kappa", *bias, "felt from [mm]"), rows, note)
 
 
 def resting_table(needed: NDArray[np.float64], usual: NDArray[np.float64]) -> Table:

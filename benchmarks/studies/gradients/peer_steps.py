@@ -23,14 +23,14 @@ from dojo_opt.report.gradients.one_step import (
 )
 from sim.simulator.simulator import Simulator
 
-INTEGRATOR = "discrete"  # of MuJoCo: the one that holds the scenes
+INTEGRATOR = "discrete"  # MuJoCo's only integrator that holds the scenes
 _CALLS = 10  # Jacobians of Drake's per clocked call
 AUTODIFF = "AutoDiffXd, by the state alone"
 MUJOCO_FORWARD, MUJOCO_CENTRED = "mjd_transitionFD, one-sided", "mjd_transitionFD, centred"
 
 
 def installed_steps() -> list[Peer]:
-    """The engines whose Jacobians can be measured here."""
+    """The installed engines with measurable Jacobians."""
     peers: list[Peer] = [("MuJoCo", _mujoco)] if find_spec("mujoco") is not None else []
     if find_spec("pydrake") is not None:
         peers += [(f"Drake {name.lower()}", partial(_drake, name)) for name in drake_step.APPROXIMATIONS]
@@ -38,7 +38,7 @@ def installed_steps() -> list[Peer]:
 
 
 def scenes() -> list[StepScene]:
-    """A sliding block, a standing hopper, a landing quadruped two of whose feet slide."""
+    """A sliding block, a standing hopper, and a landing quadruped with two sliding feet."""
     block = Simulator(dojo.models.block(friction=0.3), time_step=0.01)
     hop = dojo.problems.hop()
     robot = Simulator(dojo.models.quadruped(spring=80.0, damper=4.0), time_step=0.02)

@@ -8,8 +8,8 @@ and slides with v0 = 3 m/s along an axis, or at 30 degrees to it, until friction
 
     x = v0^2 / 2 mu g,    dx/dv0 = v0 / mu g
 
-Ours by chaining (A, B) of every step, others by differencing the whole motion, ours and MuJoCo in both ways; Drake by
-automatic differentiation besides (drake_motion.py).
+Ours are chained from (A, B) of every step, others are differences of the whole motion, ours and MuJoCo's are both;
+Drake differentiates automatically in addition (drake_motion.py).
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class SlidingMotion(NamedTuple):
 
 
 class Derivative(NamedTuple):
-    """What an engine says."""
+    """An engine's derivative."""
 
     engine: str
     how: str
@@ -102,7 +102,7 @@ def chained(motion: SlidingMotion, time_step: float, kappa: float) -> Derivative
 
 
 def ours_differenced(motion: SlidingMotion, time_step: float, eps: float, kappa: float) -> Derivative:
-    """Ours: what `chained` has to agree with."""
+    """Ours by differences, the reference for `chained`."""
     sim = Simulator(motion.mechanism, time_step=time_step, kappa=kappa)
 
     def way(p: float) -> float:
@@ -177,7 +177,7 @@ def _start_slope(sim: Simulator, motion: SlidingMotion) -> Vector:
 def _end(
     engine: PhysicsEngine, motion: SlidingMotion, h: float, q: Vector, v: Vector, u: Vector, duration: float
 ) -> Vector:
-    """Pose at the end, which is what the coordinates of a block are; NaN when the engine stopped before."""
+    """Pose at the end, that is, the coordinates of the block; NaN when the engine stopped early."""
     run = engine.simulate(motion.mechanism, time_step=h, q=q, v=v, duration=duration, samples=1, inputs=u)
     if run.message:
         return np.full(len(q), np.nan)
@@ -193,7 +193,7 @@ def _central(way: Callable[[float], float], motion: SlidingMotion, eps: float) -
 def derivative(
     engine: str, how: str, kappa: float | None, motion: SlidingMotion, h: float, run: Callable[[], tuple[float, float]]
 ) -> Derivative:
-    """What `run`, which returns (way, derivative), says, and the time it takes."""
+    """Result of `run`, which returns (way, derivative), with its processor time."""
     start = time.process_time()
     way, value = run()
     seconds = time.process_time() - start

@@ -1,4 +1,4 @@
-"""What smoothing costs: the derivative of a step at kappa against that of hard contact, known for a point mass.
+"""Cost of smoothing: the derivative of a step at kappa against hard contact, which has a closed form for a point mass.
 
 A point of 1 kg over the ground, one step of 20 ms; with the free velocity f = v + g h and the normal impulse p,
 
@@ -7,8 +7,8 @@ A point of 1 kg over the ground, one step of 20 ms; with the free velocity f = v
     sliding   v+ = (f_x - mu p / m, 0, -z/h),   p = m (-z/h - f_z),   moving along x
     touching  z + h f_z = 0: the hard answer jumps; the mean of flying and pressed is the derivative at every kappa
 
-What it brings is the distance at which a contact is felt, of the size sqrt(kappa h / m). What it costs a contact that
-carries its load m g depends on the time step far more: with the free gap d = -g h^2 and m w (d + h w) = kappa,
+The benefit is the distance at which a contact is felt, of the size sqrt(kappa h / m). The error at a contact that
+carries its load m g depends far more on the time step: with the free gap d = -g h^2 and m w (d + h w) = kappa,
 
     w = g h,   -h dw/dd = h w / (d + 2 h w) = 1 / (1 + b),   b = kappa / (m g^2 h^3)
 """
@@ -30,7 +30,7 @@ Matrix = NDArray[np.float64]
 H, MASS, FRICTION = 0.02, 1.0, 0.5
 FLIGHT = 0.01  # [m] gap after the step of the flying point
 KAPPAS = tuple(float(kappa) for kappa in 10.0 ** np.arange(-10.0, -0.5, 0.5))
-FELT = 0.01  # of 1/h: a contact is felt where the gradient of the velocity by the height is that large
+FELT = 0.01  # of 1/h: a contact is felt where the gradient of the velocity by the height reaches this
 _TOLERANCE = 1e-14
 
 

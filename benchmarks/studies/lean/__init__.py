@@ -1,4 +1,4 @@
-"""Omitted terms: what a pendulum saves by the features that it does not have."""
+"""Omitted terms: time that a pendulum saves by its missing features."""
 
 from __future__ import annotations
 

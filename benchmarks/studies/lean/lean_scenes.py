@@ -46,7 +46,7 @@ def along(mechanism: Mechanism, count: int, *, friction: float, distance: float 
 
 
 def features() -> list[tuple[str, Mechanism]]:
-    """The pendulum, each with everything of the one before and one feature more; many contacts come last, twice."""
+    """Pendulums, each with the features of the previous one and one more; many contacts come last, twice."""
     plain = pendulum()
     limit = with_joints(plain, limits=(-1.0, 1.0))
     spring = with_joints(limit, spring=2.0)
@@ -64,7 +64,7 @@ def features() -> list[tuple[str, Mechanism]]:
 
 
 def absent() -> list[tuple[str, Mechanism, Mechanism]]:
-    """(what, a mechanism that never had the feature, one that mentions it and does not have it)."""
+    """(feature, a mechanism that never had it, one that mentions it and does not have it)."""
     plain = pendulum()
     tip = with_contacts(plain, [Contact("link_0", (0.0, 0.0, -0.5), law="impact", friction=0.0)])
     none = {"spring": 0.0, "damper": 0.0, "limits": (-np.inf, np.inf)}

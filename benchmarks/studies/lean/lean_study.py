@@ -1,7 +1,7 @@
 """The study `lean`: the terms that a scene omits, and the time that this saves.
 
 A pendulum gets limits, a spring, a contact, friction, and a hundred contacts more, inactive and active. All run on one
-core, in interleaved rounds; the kernels of a scene are compiled in a process of its own.
+core, in interleaved rounds; a separate process compiles the kernels of each scene.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from sim.mechanism.mechanism import Mechanism
 from sim.simulator.omitted_contacts import reach
 from solvers.compiler import threads
 
-ABSENT = 1.05  # of the time of a model that never had the feature: what two runs of the same model differ by
+ABSENT = 1.05  # times a model that never had the feature: two runs of the same model differ by this much
 SHARE = 0.03  # of a near contact
 
 
 @dataclass(frozen=True)
 class LeanStudy:
-    """The pendulum, or a mechanism and what each of its features costs."""
+    """The pendulum, or a mechanism with the cost of each of its features."""
 
     quick: bool = False
     mechanism: Mechanism | None = None
@@ -48,10 +48,10 @@ class LeanStudy:
         if self.mechanism is not None:
             return OmittedTerms(self.mechanism, self.quick).run(progress)
         rounds = 15 if self.quick else 100
-        report = Report("What a scene leaves out")
+        report = Report("Omitted terms")
         report.summary = (
-            "A pendulum of one link to which features are added one by one, each compared with the scene that never "
-            f"had it; then {MANY} contacts that face a wall {FAR:g} m away, against {MANY} that are over the floor. "
+            "A pendulum of one link gets features one by one, each compared with the scene that never had it; then "
+            f"{MANY} contacts that face a wall {FAR:g} m away are compared with {MANY} contacts above the floor. "
             "Times are processor time on one core, medians over interleaved rounds; ratios are taken round by round."
         )
         with threads(1):
@@ -63,16 +63,16 @@ class LeanStudy:
 
 
 def _features(report: Report, rounds: int) -> None:
-    """The pendulum with one feature more in every row, and what one far contact costs of a near one."""
+    """The pendulum with one feature more in every row, and the cost of a far contact relative to a near one."""
     measured = costs([pendulum_scene(name, mechanism) for name, mechanism in features()], rounds)
     report.tables.append(
         Table(
             "One feature more in every row",
             COST_HEADER,
             [cost_row(cost) for cost in measured],
-            "Variables: of the interior point. Left out: contacts that are far, whose forces are given, not "
-            "solved for. Gradient: all of d(next state)/d(state, input), without its step. The last row has the "
-            "contacts of the row before over the floor instead.",
+            "Variables: of the interior-point problem. Left out: far contacts; their forces are given, not "
+            "solved for. Gradient: all of d(next state)/d(state, input), without its step. In the last row the "
+            "contacts of the row before are above the floor instead.",
         )
     )
     report.details["features"] = [raw_cost(cost) for cost in measured]
@@ -104,7 +104,7 @@ def _absent(report: Report, rounds: int) -> None:
 
 
 def _distance(report: Report, rounds: int) -> None:
-    """A step with the wall at many distances, at several kappa; and from where on its contacts are far."""
+    """A step with the wall at many distances, at several kappa; and the distance beyond which its contacts are far."""
     cone = dict(features())["+ cone"]
     grid = [(kappa, distance) for kappa in KAPPAS for distance in DISTANCES]
     scenes = [
@@ -137,7 +137,7 @@ def _distance(report: Report, rounds: int) -> None:
 
 
 def _processes(report: Report, progress: Progress, *, cold: bool) -> None:
-    """Modules that new processes import, and, with an empty cache, what they compile: without and with a contact."""
+    """Modules that new processes import, and code that they compile from an empty cache: with and without a contact."""
     names = ["pendulum", "+ cone"]
     runs = {name: new_process(name, cold=cold) for name in progress([(n, n) for n in names], "new process")}
     heavy = sum(len(run["modules"]) for run in runs.values())
@@ -146,7 +146,7 @@ def _processes(report: Report, progress: Progress, *, cold: bool) -> None:
     )
     report.details["processes"] = {"cold": cold, **runs}
     if not cold:
-        report.notes.append("quick: nothing is compiled in a process of its own, so no kernels are counted")
+        report.notes.append("quick: no kernels are counted, since nothing is compiled in a separate process")
         return
     plain, full = runs.values()
     unwanted = [name for name in plain["kernels"] if name.startswith(CONTACT_KERNELS)]

@@ -33,7 +33,7 @@ print(json.dumps({"seconds": seconds, "success": path.success, "kernels": sorted
 def new_process(feature: str, *, cold: bool) -> dict[str, Any]:
     """seconds of processor time, kernels, and heavy modules of a new process that simulates one scene of `features`.
 
-    cold: with an empty cache and no shipped code, so that it compiles everything; otherwise it loads what it finds.
+    cold: with an empty cache and no shipped code, so that it compiles everything; otherwise it loads existing code.
     """
     with tempfile.TemporaryDirectory() if cold else nullcontext(None) as folder:
         path = os.pathsep.join(filter(None, sys.path))  # of the checkout, too

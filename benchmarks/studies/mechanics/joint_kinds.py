@@ -1,12 +1,12 @@
-"""What a joint of each kind should do, measured.
+"""Each kind of joint against its expected behaviour.
 
-momentum     largest change of the angular momentum of a free body that carries another by a sprung joint [N m s]
-energy       order in h of the energy error of the same without dampers
-limits       largest excess over the stops, or the cone, of a body pushed against them; 1 if it gets to none [m, rad]
+momentum     largest change of the angular momentum of a free body with another on a sprung joint [N m s]
+energy       order in h of the energy error of the same pair without dampers
+limits       largest excess over the stops, or the cone, of a body pushed against them; 1 if it reaches none [m, rad]
 spring       k (q - rest) = u at rest under an input u; k sin(angle) = u for a quaternion; relative error
 damper       a body thrown with momentum p stops after p / d; relative error
 input        momentum after an input u for a time T is u T, of a screw its share; relative error
-derivatives  of a step of the first with stops, with respect to state and input, against central differences, relative
+derivatives  of a step of the first pair with stops, by state and input, against central differences; relative error
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ BARS = {
 }
 SPRING, DAMPER, INERTIA = 20.0, 5.0, 0.4
 PITCH = {"screw": 1.5}  # [m/rev]
-STOP = 0.3  # [m, rad] either side; a cone has twice that
+STOP = 0.3  # [m, rad] on either side; twice this for a cone
 
 
 def check(kind: str) -> dict[str, float | None]:
-    """All of them; None where a kind has no coordinate for it."""
+    """All measures; None where a kind has no coordinate for one."""
     measures: dict[str, Callable[[str], float]] = {
         "momentum": momentum,
         "energy": energy,

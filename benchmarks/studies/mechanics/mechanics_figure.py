@@ -40,7 +40,7 @@ def margins(details: dict[str, Any]) -> Any:
 
 
 def _joint(values: dict[str, float | None]) -> dict[str, float]:
-    """Over the bars, without what a kind does not have and without the order of the energy error."""
+    """Values over their bars, without missing features and without the order of the energy error."""
     return {name: v / joints.BARS[name] for name, v in values.items() if v is not None and name != "energy"}
 
 

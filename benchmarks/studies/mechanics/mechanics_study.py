@@ -1,4 +1,4 @@
-"""Study `mechanics`: the table of everything a mechanism can be made of, each entry measured against its bar."""
+"""Study `mechanics`: tables of all parts of mechanisms, each entry measured against its bar."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class MechanicsStudy:
         """Measure."""
         report = Report("Mechanics")
         report.summary = (
-            "Every kind of joint, every pair of shapes that can collide and the derivatives by every kind of parameter "
-            "against what they should be. Empty: there is no such thing."
+            "Every kind of joint, every pair of shapes that can collide and the derivatives with respect to every kind "
+            "of parameter, against reference values. Empty: not applicable."
         )
         self._joints(report, progress)
         self._pairs(report, progress)
@@ -75,7 +75,7 @@ class MechanicsStudy:
             report.rows.append(_worst(title, values, bar, "" if what == "derivative" else "m"))
 
     def _parameters(self, report: Report, progress: Progress) -> None:
-        """A line per kind of parameter, what couples bodies apart; a row per situation with the worst of them."""
+        """A line per kind of parameter, couplings of bodies apart; a row per situation with its worst value."""
         names = QUICK_CASES if self.quick else tuple(CASES)
         found = {name: parameters.check(name) for name in progress([(name, name) for name in names], "parameters")}
         coupled = [name for name in names if name.startswith(("in a loop", "geared", "colliding", "rolling", "tied"))]
@@ -99,7 +99,7 @@ class MechanicsStudy:
 
 
 def _note(doc: str | None) -> str:
-    """What stands below the first line of a docstring."""
+    """The docstring without its first line."""
     return (doc or "").partition("\n\n")[2]
 
 
@@ -109,6 +109,6 @@ def _short(value: float | None) -> str:
 
 
 def _worst(name: str, values: dict[str, float], bar: float, unit: str) -> Row:
-    """The largest value, and what it belongs to; NaN is larger than any."""
+    """The largest value, with its name; NaN is larger than any."""
     worst = max(values, key=lambda key: (isnan(values[key]), values[key]))
     return Row(name, values[worst], unit, bar, note=f"worst of {len(values)}: {worst}")

@@ -1,4 +1,4 @@
-"""Cost and violation of plans against run time, beside a planner on MuJoCo."""
+"""Cost and violation of plans against run time, compared with a planner on MuJoCo."""
 
 from __future__ import annotations
 

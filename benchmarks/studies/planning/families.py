@@ -1,4 +1,4 @@
-"""Settings of the planner, each on all variants of a problem: how often it finds a good plan, and how fast."""
+"""Settings of the planner, each on all variants of a problem: success rate and run time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from benchmarks.studies.planning.planners import PlanOutcome, ours
 from benchmarks.studies.planning.planning_cases import Setting
 from dojo_opt.planning.problem import Problem
 
-TRUE = 5e-3  # violation of a plan that is replayed on hard contact; more, and the plan lived on soft contact
+TRUE = 5e-3  # violation of a plan replayed on hard contact; a plan with more exploits soft contact
 GOOD = 1.1  # times the least cost that any setting found: another local minimum costs more
 _ITERATIONS = 100
 

@@ -1,4 +1,4 @@
-"""One plan: what it costs, how true it is, and how its cost and violation fell with processor time."""
+"""One plan: its cost, its fidelity, and the history of cost and violation against processor time."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def peer(problem: Problem, settings: MujocoSettings) -> PlanOutcome:
 
 
 def upright(x: Matrix) -> float:
-    """Of states that begin with a floating base."""
+    """Least cosine between the base's z axis and the vertical, over states that begin with a floating base."""
     return float((1.0 - 2.0 * (x[:, 4] ** 2 + x[:, 5] ** 2)).min())
 
 

@@ -1,4 +1,4 @@
-"""What is planned, and with which settings of the planner."""
+"""Problems of the planning study, and settings of the planner."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ KAPPA_GRAD = (1e-2, 1e-3, 1e-4, 1e-5)  # of plans in one stage
 class Setting(NamedTuple):
     """Options of `ilqr`, by name."""
 
-    group: str  # what is varied
+    group: str  # the setting that is varied
     name: str
     options: dict[str, Any]
 
@@ -40,7 +40,7 @@ def finer(problem: Problem, substeps: int) -> Problem:
 
 
 def reference(name: str) -> Problem:
-    """One of the four problems whose plans are drawn."""
+    """One of the four problems with a figure of their plans."""
     makers: dict[str, Callable[[], Problem]] = {
         "hop": dojo.problems.hop,
         "block right": lambda: dojo.problems.block("right"),
@@ -68,7 +68,7 @@ def _steps(problem: Problem) -> str:
 
 
 def family(name: str, *, quick: bool) -> list[Problem]:
-    """Variants of a reference problem, so that no setting is judged by the luck of one of them.
+    """Variants of a reference problem, so that luck with one variant decides nothing.
 
     hop: ten random targets within .6 m; block: friction .3, .5, .8 and .7, 1, 1.5 kg; trot: 0, .2, .4 m/s and damping
     .5, 1.5, 5.
@@ -86,7 +86,7 @@ def family(name: str, *, quick: bool) -> list[Problem]:
 
 
 def settings(*, quick: bool) -> list[Setting]:
-    """The default first; then one thing at a time."""
+    """The default first, then one change at a time."""
     last = CONTINUATION[-1]
 
     def stages(*kappas: float, end: tuple[float, float] = last[:2]) -> dict[str, Any]:

@@ -48,7 +48,7 @@ def draw(
 
 
 def _history(top: Any, bottom: Any, plan: PlanOutcome, label: str, look: dict[str, Any]) -> None:
-    """Cost, where the trajectory has no gaps, and violation; a cross where a solve gave up."""
+    """Cost, where the trajectory has no gaps, and violation; a cross marks a failed solve."""
     seconds, cost, violation, gap = plan.history.T
     ms, closed = 1e3 * seconds, gap <= _CLOSED
     top.plot(ms[closed], cost[closed], **look)
@@ -60,7 +60,7 @@ def _history(top: Any, bottom: Any, plan: PlanOutcome, label: str, look: dict[st
 
 
 def _scatter(axes: Any, scores: Sequence[Score]) -> None:
-    """Settings: filled where every variant has a plan that holds when replayed; the number that has one elsewhere."""
+    """Settings: filled if every variant has a plan that holds when replayed, else the number of variants with one."""
     named = set()
     for s in scores:
         colour = _COLOURS[s.setting.group]

@@ -44,8 +44,8 @@ class PlanningStudy:
         report.summary = (
             "Plans of a hop, of a block that is pushed or lifted, and of a trot, against the processor time of one "
             f"core. Every plan is replayed under its own gains on contact at kappa {HARD:g}, at its time step and at "
-            f"1/{REFINE} of it: what only soft contact or long steps made possible is lost there. Beside them the same "
-            "problems by MuJoCo's finite differences and iLQR in NumPy, whose plans MuJoCo replays."
+            f"1/{REFINE} of it: plans that exploit soft contact or long steps fail there. For comparison, the same "
+            "problems are solved by MuJoCo's finite differences and iLQR in NumPy; MuJoCo replays those plans."
         )
         with threads(1):
             plans = self._references(report, progress)

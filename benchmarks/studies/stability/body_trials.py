@@ -33,7 +33,7 @@ def spin(inertia: Three, omega: Three, time_step: float, *, refusal: str = "") -
 
 
 def trials() -> list[StabilityTrial]:
-    """All of them."""
+    """All trials of free bodies."""
     return [
         spin((0.1, 0.2, 0.3), (2.0, 1000.0, 2.0), 1e-4),
         spin((0.1, 0.2, 0.3), (2.0, 1000.0, 2.0), 1e-3),

@@ -126,7 +126,7 @@ def on_the_ground(time_step: float) -> StabilityTrial:
 
 
 def trials() -> list[StabilityTrial]:
-    """All of them."""
+    """All trials of chains."""
     return [
         heavy_tip(5e2, 5e-4, angle=pi / 2.0),
         heavy_tip(5e4, 2e-4, angle=0.5),

@@ -1,4 +1,4 @@
-"""Trials on the ground: impacts, friction, redundant contacts, heavy on light, deep overlap, time steps 1e-5 to 0.5."""
+"""Trials on the ground: impacts, friction, redundant contacts, mass ratios, deep overlap, time steps 1e-5 to 0.5."""
 
 from __future__ import annotations
 
@@ -192,7 +192,7 @@ def overlap(depth: float) -> StabilityTrial:
 
 
 def trials() -> list[StabilityTrial]:
-    """All of them."""
+    """All trials on the ground."""
     return [
         *(on_a_foot(ratio, h) for ratio in (1e2, 1e4, 1e6) for h in (1e-3, 1e-2)),
         *(impact(what, h) for what in ("ball", "box") for h in (1e-3, 1e-2, 1e-1)),

@@ -1,4 +1,4 @@
-"""Trials of joints: springs to 1e8, dampers to 1e6, jammed limits, poses at the edge of what a joint can do."""
+"""Trials of joints: springs to 1e8, dampers to 1e6, jammed limits, poses at the edge of a joint's range."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def straight_legs(angle: float) -> StabilityTrial:
 
 
 def trials() -> list[StabilityTrial]:
-    """All of them."""
+    """All trials of joints."""
     springs = [spring(k, h) for k in (1e2, 1e4, 1e6, 1e8) for h in (1e-3, 1e-2)] + [spring(1e8, 0.5)]
     turning = [turning_spring(kind, 1e8, h) for kind in ("revolute", "spherical") for h in (1e-3, 1e-2)]
     dampers = [damper(d, 1e-2) for d in (1e2, 1e4, 1e6)]

@@ -14,16 +14,16 @@ from dojo_opt.report.study import Progress
 from sim.mechanism.mechanism import Mechanism
 
 SUMMARY = (
-    "Scenes at the edge of what a simulator can do, each with the rule by which it passes, stated before it runs. "
-    "Rules ask for the physics and not only for survival: a stiff spring keeps its amplitude, a spinning body its "
-    "angular momentum, a chain its energy; nothing sinks in at any speed. What a step cannot represent has to be "
-    "refused with a reason. The same scene, time step and start for every engine."
+    "Extreme scenes, each with its rule for passing, stated before it runs. Rules ask for correct physics and not only "
+    "for survival: a stiff spring keeps its amplitude, a spinning body its angular momentum, a chain its energy; "
+    "nothing sinks in at any speed. Motions that a step cannot represent have to be refused with a reason. Every "
+    "engine gets the same scene, time step and start."
 )
 NOTES = [
-    f"dojo-opt runs with kappa {KAPPA:g} N s m and its default tolerance of 1e-8; free bodies with one of 1e-13, and "
-    "what weighs grams or moves in microseconds with a smaller kappa, as the trial says.",
-    "x: measured, and above the bar. 'failed': not finite, lost, or a step that was not solved; the time is that of "
-    "the last good sample. (s): other engines ran only so many seconds of it.",
+    f"dojo-opt runs with kappa {KAPPA:g} N s m and its default tolerance of 1e-8; free bodies have a tolerance of "
+    "1e-13, and bodies of a few grams or motions of microseconds a smaller kappa, as the trial says.",
+    "x: measured, and above the bar. 'failed': not finite, lost, or a step that was not solved, with the time of the "
+    "last good sample. (s): other engines ran only for these seconds.",
     "Chains: forces of hinges act along the links at the start of a step, as in SHAKE and RATTLE. That limits the time "
     "step to 2/omega, omega = 2 sqrt(tension / (m l)) for links of mass m and length l; above it a step has no "
     "solution, and says so.",
@@ -36,7 +36,7 @@ _LEFT_OUT = ("MuJoCo implicit",)  # as implicitfast in all of these
 
 @dataclass(frozen=True)
 class StabilityStudy:
-    """All trials, or those of a mechanism; quick leaves out the long ones and all peers but one."""
+    """All trials, or the trials of a mechanism; quick omits the long ones and all peers but one."""
 
     quick: bool = False
     mechanism: Mechanism | None = None
@@ -50,7 +50,7 @@ class StabilityStudy:
         return report
 
     def trials(self) -> list[StabilityTrial]:
-        """What is run."""
+        """Every trial of the study."""
         rooms = (ground_trials, stack_trials, joint_trials, body_trials, chain_trials)
         return [trial for room in rooms for trial in room.trials()]
 

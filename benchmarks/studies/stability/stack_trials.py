@@ -12,7 +12,7 @@ from support.towers import EDGE, tower
 
 
 def out_of_place(mechanism: Mechanism, run: Run) -> float:
-    """How far any body is off its height at the end [m]."""
+    """Largest error of a body's height at the end [m]."""
     heights = EDGE * (0.5 + np.arange(mechanism.nbody))
     return float(np.abs(run.position[-1, :, 2] - heights).max())
 
@@ -58,5 +58,5 @@ def heavy_on_light(ratio: float, time_step: float) -> StabilityTrial:
 
 
 def trials() -> list[StabilityTrial]:
-    """All of them."""
+    """All trials of stacks."""
     return [stack(5, 1e-2), stack(10, 1e-2), *(heavy_on_light(ratio, h) for ratio in (1e4, 1e6) for h in (1e-3, 1e-2))]

@@ -1,1 +1,1 @@
-"""Microseconds per step, gradient and planner iteration, beside other engines; and the cold start."""
+"""Microseconds per step, gradient and planner iteration, compared with other engines; and the cold start."""

@@ -1,4 +1,4 @@
-"""What the first step of a scene compiles, by feature, from an empty cache and without shipped code."""
+"""Code that the first step of a scene compiles, by feature, from an empty cache and without shipped code."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import dojo_opt as dojo
 from dojo_opt.report.result import Cell, Table
 from sim.mechanism.mechanism import Mechanism
 
-_FOREIGN = {  # rooms whose kernels a scene needs only with the feature
+_FOREIGN = {  # rooms with kernels that a scene needs only with the feature
     "contacts": ("sim.contact.", "solvers.cones"),
     "pairs": ("sim.contact.pairs.", "sim.contact.collision."),
     "loops": ("sim.dynamics.loops.", "sim.solve.loop_branch"),

@@ -1,4 +1,4 @@
-"""Report `compile`: what the first plan costs in a new process: cache empty, cache filled, code shipped."""
+"""Report `compile`: time of the first plan in a new process: cache empty, cache filled, code shipped."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ print(json.dumps({"import": imported, "first": first, "again": second, "success"
 
 @dataclass(frozen=True)
 class CompileTimeStudy:
-    """One cold start, then warm ones (1 quick, otherwise the median of 5), each in its own process; with the code that
-    came with an installation as many, again with an empty cache.
+    """One cold start, then warm ones (1 quick, otherwise the median of 5), each in its own process; then as many with
+    shipped code and again an empty cache.
     """
 
     quick: bool = False
@@ -91,7 +91,7 @@ class CompileTimeStudy:
 
 
 def _start(folder: str, shipped: bool = False) -> dict[str, Any]:
-    """The program in a new process whose cache is below `folder`, with or without shipped code."""
+    """Run the program in a new process with its cache below `folder`, with or without shipped code."""
     own = {"NUMBA_CACHE_DIR": folder, "DOJO_OPT_CACHE": "1", "DOJO_OPT_SHIPPED": str(int(shipped))}
     environment = {**os.environ, **own}
     done = subprocess.run([sys.executable, "-c", _PROGRAM], env=environment, capture_output=True, text=True)

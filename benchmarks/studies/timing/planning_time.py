@@ -1,7 +1,7 @@
-"""Rows of report `timing` about planning: iterations of iLQR, ticks of MPC, and what peers take for the same gait.
+"""Rows of report `timing` about planning: iterations of iLQR, ticks of MPC, and the times of peers for the same gait.
 
-An iteration's time is that of a whole solve divided by its iterations, the rejected ones and the change from one
-smoothing to the next included. Peers solve in the same rounds, to the ends of their own stopping rules.
+An iteration's time is the time of a whole solve divided by its iterations. It includes rejected iterations and the
+changes from one smoothing to the next. Peers solve in the same rounds, each until its own stopping rule ends it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report.clock import interleave
 from dojo_opt.report.result import Cell, Report, Row, Table
 
-CROCODDYL, PIN = "3.2.1", "4.0.0"  # wheels that fit one another: with others crocoddyl ends the process
+CROCODDYL, PIN = "3.2.1", "4.0.0"  # compatible wheels: with other versions crocoddyl ends the process
 
 
 def add_planning(report: Report, *, quick: bool) -> None:
@@ -84,7 +84,7 @@ def _trot(report: Report, rounds: int) -> None:
 
 
 def _missing(package: str) -> str:
-    """Why a peer is left out, empty when it is not."""
+    """The reason for omitting a peer; empty when it takes part."""
     if package == "mujoco":
         return "" if find_spec("mujoco") is not None else "trot: without MuJoCo"
     if find_spec("crocoddyl") is None:
@@ -98,7 +98,7 @@ def _missing(package: str) -> str:
 
 
 def _mujoco(problem: Problem) -> tuple[Callable[[], Any], int, float, str]:
-    """Solve by MuJoCo's finite differences and NumPy; iterations; cost; what it is."""
+    """Solve by MuJoCo's finite differences and NumPy; iterations; cost; a description."""
     solver = MujocoIlqr(problem)
     solution = solver.solve()
     if max(solution.violation, solution.gap) > 1e-3:
@@ -108,7 +108,7 @@ def _mujoco(problem: Problem) -> tuple[Callable[[], Any], int, float, str]:
 
 
 def _crocoddyl(problem: Problem) -> tuple[Callable[[], Any], int, float, str]:
-    """Solve by FDDP with the contact sequence given; iterations; cost; what it is."""
+    """Solve by FDDP with the contact sequence given; iterations; cost; a description."""
     trot = CrocoddylTrot(problem)
     iterations = trot.solve()
     if not trot.solver.isFeasible:

@@ -1,8 +1,8 @@
 """Rows of report `timing` about robots under random inputs: a step and its gradient, as in Table V of the Dojo paper.
 
-A thousand steps of 10 ms from the neutral state, each with inputs drawn anew, uniformly within a third of what the
-maker's motors can do: with all of it an A1 turns its joints five times faster than they can. Ours solves a step once
-and differentiates it where it ends (`Simulator.linearize_rollout`); MuJoCo takes `mjd_transitionFD`, one-sided, and a
+A thousand steps of 10 ms from the neutral state, each with new random inputs, uniform within a third of the motors'
+limits: with the full limits an A1 turns its joints five times faster than its motors can. Ours solves a step once
+and differentiates it at its solution (`Simulator.linearize_rollout`); MuJoCo takes `mjd_transitionFD`, one-sided, and a
 step. Its humanoid has two hinges where ours has an orbital joint.
 
 Dojo's figures were measured by its authors (arXiv 2203.00806v5, Table V, Intel i9-10885H), with 12 contacts on the A1.
@@ -45,7 +45,7 @@ class TimedRobot(NamedTuple):
 
 
 def robots() -> list[TimedRobot]:
-    """The four of Table V; the quadrotor is another one (Pelican, not X2), like Dojo's model."""
+    """The four robots of Table V; the quadrotor is a Pelican, like Dojo's model, not an X2."""
     hinges = np.array([40.0, 40.0, 40.0, *[40.0, 40.0, 120.0, 80.0, 20.0, 10.0, 10.0, 10.0] * 2])  # gym's, ankles 20
     panda = np.array([87.0] * 4 + [12.0] * 3 + [70.0] * 2)
     hover = 1.04 * 9.81 / 4

@@ -1,11 +1,11 @@
-"""Report `timing`: microseconds per step and gradient, per link of a chain, per planner iteration; beside peers.
+"""Report `timing`: microseconds per step and gradient, per link of a chain, per planner iteration; with peers.
 
 One core, processor time, whole horizons per call so that no Python is inside the clock. Every case runs once per
 round; times are medians over the rounds, ratios medians of the ratios taken round by round.
 
-A gradient's time is that of `linearize_trajectory` per knot minus that of a step: a linearised knot solves its step,
-at the same kappa, and then differentiates it. All knots are the state in which the scene stands still, so that the next
-knot, where a step starts to look, tells it no more than its own velocity does, and iterations are those of the rollout.
+A gradient's time is the time of `linearize_trajectory` per knot minus the time of a step: a linearised knot solves its
+step, at the same kappa, and then differentiates it. At all knots the scene stands still. A step's initial guess is the
+next knot, which then holds no more information than the current velocity: iterations equal those of the rollout.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ class Bars(NamedTuple):
 
     step: float | None = None  # [us]
     gradient: float | None = None  # [us]
-    over_step: float | None = None  # at most so many steps of MuJoCo
-    under_jacobian: float | None = None  # at least so many gradients in one Jacobian of MuJoCo
+    over_step: float | None = None  # most steps of MuJoCo in the time of one of ours
+    under_jacobian: float | None = None  # least gradients in the time of one Jacobian of MuJoCo
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def _standing(time_step: float, *, limits: bool = False) -> tuple[Simulator, Vec
 
 
 def _atlas(report: Report, rounds: int) -> None:
-    """Atlas on eight balls under its soles, its joints sprung. MuJoCo does not hold it at this time step: no ratios."""
+    """Atlas on eight balls under its soles, its joints sprung. No ratios: MuJoCo does not hold it at this time step."""
     sim = Simulator(dojo.models.atlas(spring=1e4, damper=500.0), time_step=0.01)
     x, u = equilibrium(sim)
     _scene(report, "Atlas, 10 ms", sim, x, u, rounds, Bars(120.0, 100.0), peer=False)
@@ -216,9 +216,9 @@ def _chains(report: Report, rounds: int) -> None:
 
 
 def _batch(report: Report, rounds: int) -> None:
-    """Rollouts of 64 quadrupeds on two threads against one, by the clock on the wall."""
+    """Rollouts of 64 quadrupeds on two threads against one, by wall-clock time."""
     if int(os.environ.get("NUMBA_NUM_THREADS", os.cpu_count() or 1)) < 2:
-        report.notes.append("batch: left out, there is one core, or NUMBA_NUM_THREADS is 1")
+        report.notes.append("batch: omitted, since there is one core or NUMBA_NUM_THREADS is 1")
         return
     sim, start = _standing(0.02)
     x = np.tile(start, (64, 1))
@@ -238,7 +238,7 @@ def _batch(report: Report, rounds: int) -> None:
 
 
 def _solved(name: str, trajectory: Any) -> Any:
-    """The trajectory, or an error: the time of a step that failed means nothing."""
+    """The trajectory, or an error, because the time of a failed step is meaningless."""
     if trajectory.status != 0:
         raise RuntimeError(f"report timing: {name}: step {trajectory.knot} ended with {trajectory.status!r}")
     return trajectory
