@@ -132,13 +132,8 @@ class Victim:
             self.process.kill()
 
 
-<<<<<<< HEAD
 def answer(program: str, cache: Path, **more: str) -> str:
-    """What a process prints that has this cache, or what became of it."""
-=======
-def answer(program: str, cache: Path, timeout: float = PATIENCE) -> str:
     """Output of a process with this cache, or its failure."""
->>>>>>> english
     try:
         done = subprocess.run(
             [sys.executable, "-c", program],

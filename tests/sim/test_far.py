@@ -188,7 +188,6 @@ def test_mobility_bounds_the_velocity_per_impulse(rng):
     assert largest <= model.cluster[0, 5] <= 4.0 * largest
 
 
-<<<<<<< HEAD
 def test_corners_of_a_body_that_touches_are_left_out_one_by_one(rng):
     """The law and the balance of momenta hold for all; derivatives take all as active, and are exact."""
     points = rng.normal(size=(24, 3))
@@ -212,10 +211,7 @@ def test_corners_of_a_body_that_touches_are_left_out_one_by_one(rng):
     )
 
 
-def test_names_and_distances_of_what_is_left_out():
-=======
 def test_names_and_distances_of_omitted_contacts():
->>>>>>> english
     mech = dataclasses.replace(
         block(), contacts=[*block().contacts, dojo.Contact("block", height=-50.0, name="wall", normal=(1.0, 0.0, 0.0))]
     )
