@@ -130,8 +130,6 @@ def _evaluate(model: Model, data: Data, h: float, c: int) -> None:
     kappa = data.inactive_kappa[0]
     least = 1e300
     for k in range(c, model.cluster_end[c]):
-        if data.contact_out[k] == 0:
-            continue
         p = model.contact_point[k]
         rho = model.contact_radius[k]
         gap = max(D - model.contact_height[k] + n0 * p[0] + n1 * p[1] + n2 * p[2] - rho, row[Inactive.ACTIVATION])

@@ -6,7 +6,7 @@ central path the condensed contact matrices W are the exact derivatives of the i
 
 from __future__ import annotations
 
-from sim.contact.inactive import all_stiff
+from sim.contact.pairs.inactive_pairs import all_near
 from sim.derivatives.coupling_gradient import add_coupling_composites, add_coupling_derivatives
 from sim.derivatives.residual_gradient import residual_derivatives
 from sim.derivatives.restitution_gradient import add_bounce_composites, add_bounce_derivatives
@@ -14,7 +14,6 @@ from sim.dynamics.elimination import factor_of
 from sim.dynamics.elimination_panel import solve_panel
 from sim.dynamics.external_forces import input_wrench
 from sim.dynamics.joints.limits import add_limit_derivatives
-from sim.dynamics.joints.servo_gradient import add_drive_derivatives, add_drive_inputs
 from sim.dynamics.joints.terms import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.dynamics.kinematics import velocity_columns
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling_panel
@@ -38,7 +37,7 @@ def gradient(model: Model, data: Data, h: float, kappa: float, q: Vector, v: Vec
     inertial_jacobians(model, data, h)
     velocity_columns(model, data.S3, data.nu, h, data.S3nu)
     joint_blocks(model, data, h, q, v)
-    all_stiff(model, data, h)
+    all_near(model, data)
     add_stiffness(model, data, h, kappa)
     pose2_to_origin(data)
     bounces = add_bounce_composites(model, data)
@@ -53,10 +52,8 @@ def gradient(model: Model, data: Data, h: float, kappa: float, q: Vector, v: Vec
     if not factor_coupling(model, data):
         return False
     add_spring_derivatives(model, data, h, q, v)
-    add_drive_derivatives(model, data, h)
     _joint_columns(model, data, h, v)
     _input_columns(model, data, h)
-    add_drive_inputs(model, data, h)
     solve_panel(model, data)
     solve_coupling_panel(model, data)
     _next_state(model, data, h, A, B)

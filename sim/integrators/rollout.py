@@ -15,7 +15,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.contact.contact_report import report_contacts
-from sim.contact.pairs.reach import end_of
 from sim.derivatives.step_gradient import gradient
 from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import normalise_state
@@ -75,7 +74,6 @@ def options_of(data: Data, settings: Vector, begins: bool) -> StepOptions:
 def begin(data: Data) -> None:
     """Forget the motion before: clear all fields of CARRY (sim/model/layout.py)."""
     data.carried_steps[0] = 0
-    data.ways_known[0] = 0
     data.inactive_kappa[0] = 0.0
     clear(data.cone_step)
     clear(data.bound_step)
@@ -92,21 +90,6 @@ def is_finite(row: Vector) -> bool:
     for k in range(row.shape[0]):
         total += 0.0 * row[k]
     return total == 0.0
-
-
-@kernel
-def _are_finite(model: Model, data: Data, contacts: Matrix) -> bool:
-    """Whether all numbers of the contacts are; those of collisions beyond their reach are constants."""
-    ground = model.contact_height.shape[0]
-    for c in range(ground):
-        if not is_finite(contacts[c]):
-            return False
-    for m in range(data.near_count[0]):
-        first = data.near_first[m]
-        for j in range(first, end_of(model, first)):
-            if not is_finite(contacts[ground + j]):
-                return False
-    return True
 
 
 @kernel
@@ -143,9 +126,10 @@ def roll(model_at: Table, data_at: Table, settings: Vector, motion: MotionBuffer
         done = report[1]
         if motion.contacts.shape[0] > 0:
             report_contacts(model, data, options.h, motion.contacts[t])
-            if not _are_finite(model, data, motion.contacts[t]):
-                report[0] = _NOT_FINITE
-                return t
+            for c in range(motion.contacts.shape[1]):
+                if not is_finite(motion.contacts[t, c]):
+                    report[0] = _NOT_FINITE
+                    return t
         if motion.A.shape[0] > 0:
             if not gradient(model, data, options.h, options.kappa, x[:nq], x[nq:], motion.A[t], motion.B[t]):
                 report[0] = _SINGULAR

@@ -189,9 +189,3 @@ class Slot(IntEnum):
     DRY_PRODUCTS_AHEAD = 156
     DRY_BOUNDARY = 157
     ADD_DRY_TIME_STEP = 158
-    # contacts that only derivatives take as active
-    ALL_STIFF = 159
-    # servos whose force has limits
-    APPLY_FRICTION = 160
-    ADD_DRIVE_DERIVATIVES = 161
-    ADD_DRIVE_INPUTS = 162

@@ -30,7 +30,7 @@ from sim.contact.active_contacts import (
 from sim.contact.collision.pair_kernels import KERNELS
 from sim.contact.contact_law import slip_noise
 from sim.contact.contact_report import report_contacts, worst_contact
-from sim.contact.inactive import all_stiff, choose_active, has_activated, sunk_contact
+from sim.contact.inactive import choose_active, has_activated, sunk_contact
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.contact.pairs.active_features import choose_pairs, overlapping
 from sim.contact.pairs.cylinder_pairs import choose_cylinders, collide_cylinders, cylinder_before, cylinder_distance
@@ -69,7 +69,6 @@ from sim.dynamics.joints.dry_friction import (
     add_dry_blocks,
     add_dry_time_step,
     apply_dry,
-    apply_friction,
     dry_boundary,
     dry_constants,
     dry_error,
@@ -86,7 +85,6 @@ from sim.dynamics.joints.dry_friction import (
     start_dry,
 )
 from sim.dynamics.joints.limits import add_limit_derivatives
-from sim.dynamics.joints.servo_gradient import add_drive_derivatives, add_drive_inputs
 from sim.dynamics.joints.swing import swing_curvature, swing_pose, swing_turn
 from sim.dynamics.loops.branch_motion import (
     is_farther,
@@ -145,7 +143,6 @@ _CONTACTS = (
 _DRY = (
     add_dry_blocks,
     apply_dry,
-    apply_friction,
     dry_boundary,
     dry_constants,
     dry_error,
@@ -315,11 +312,9 @@ def link_gradient(model: Model) -> None:
     if len(model.contact_body) + len(model.limit_dof) + len(model.dry_dof):
         link(model.optional, add_stiffness)
     if len(model.contact_body):
-        link(model.optional, add_slip_jacobians, all_stiff)
+        link(model.optional, add_slip_jacobians)
     if len(model.limit_dof):
         link(model.optional, add_limit_derivatives)
-    if np.any(model.dry_input >= 0):
-        link(model.optional, add_drive_derivatives, add_drive_inputs)
     if np.any(model.limit_cone):
         link(model.optional, cone_derivative)
     if np.any(model.joint_nrot == 2):

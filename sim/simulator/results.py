@@ -17,7 +17,6 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.contact.collision.witness import ABSENT
 from sim.integrators.feedback import Path
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr, drawn
@@ -119,8 +118,7 @@ class Contacts:
         time_step: time step [s].
         impulse: (..., ncontact, 3) impulse on the body [N s].
         point: (..., ncontact, 3) its point of action at the end of the step [m].
-        gap: (..., ncontact) distance from the ground at the end of the step, 1e9 of what is beyond its reach (see
-            Collision) or does not exist in this configuration [m].
+        gap: (..., ncontact) distance from the ground at the end of the step [m].
         slip: (..., ncontact) sliding speed [m/s].
     """
 
@@ -131,14 +129,6 @@ class Contacts:
     point: Floats
     gap: Floats
     slip: Floats
-
-    def __getattr__(self, name: str) -> Floats:
-        """`gap` where it waits until somebody asks (`contacts_of`): without a normal, a contact is beyond its reach."""
-        measured = vars(self).get("measured")
-        if name != "gap" or measured is None:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        object.__setattr__(self, "gap", np.where(self.normals.any(axis=-1), measured, ABSENT))
-        return self.gap
 
     def __repr__(self) -> str:
         if self.impulse.ndim > 2:
@@ -540,10 +530,7 @@ def carried(call: Callable[[], Any], made: Callable[[Any], Any]) -> Any:
 def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
     """Contacts from the rows (..., ncontact, 11) of a kernel."""
     parts = (rows[..., 8:11], time_step, rows[..., :3], rows[..., 3:6], rows[..., 6], rows[..., 7])
-    contacts = Contacts(mech.contact_names, *parts)
-    if mech.collisions:  # to look through thousands that are beyond their reach takes longer than a step
-        vars(contacts)["measured"] = vars(contacts).pop("gap")
-    return contacts
+    return Contacts(mech.contact_names, *parts)
 
 
 def path_of(call: str, trajectory: Any) -> tuple[Any, Any]:

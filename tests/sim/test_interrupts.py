@@ -82,7 +82,7 @@ BATCHES = {
         lambda n: QUADRUPED.rollout_batch(rows(QUADRUPED, n), np.zeros((n, 25, 12))),
         8_000,
     ),
-    "few long ones": (lambda n: HOPPER.rollout_batch(rows(HOPPER, 3), np.zeros((3, n, 3))), 400_000),
+    "few long ones": (lambda n: HOPPER.rollout_batch(rows(HOPPER, 3), np.zeros((3, n, 3))), 150_000),
     "higher order": (lambda n: CHAIN.rollout_batch(rows(CHAIN, 4) + 0.1, np.zeros((4, n, CHAIN.nu))), 100_000),
 }
 DERIVATIVES = {

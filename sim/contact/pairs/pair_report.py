@@ -4,43 +4,20 @@ from __future__ import annotations
 
 from sim.contact.contact_law import report_contact
 from sim.contact.pairs.pair_contact import is_absent
-from sim.contact.pairs.reach import end_of
-from sim.model.columns import PairShare, Witness
+from sim.model.columns import Witness
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.compiler import kernel, optional
-from solvers.dense import clear
+from solvers.compiler import optional
 from solvers.types import Matrix
 
 
 @optional(Slot.REPORT_PAIRS)
 def report_pairs(model: Model, data: Data, out: Matrix) -> None:
-    """The rows of the pairs: impulse on the first body. Those of collisions beyond their reach are zero; zeros that are
-    there are not written, which takes longer than a step.
-    """
-    ground = model.contact_height.shape[0]
-    j, near = 0, 0
-    while j < model.pair_kind.shape[0]:
-        end = end_of(model, j)
-        n = out[ground + j]
-        if near < data.near_count[0] and data.near_first[near] == j:
-            near += 1
-            _report(model, data, j, end, out)
-        elif n[8] * n[8] + n[9] * n[9] + n[10] * n[10] > 0.0:
-            clear(out[ground + j : ground + end])
-        j = end
-
-
-@kernel
-def _report(model: Model, data: Data, first: int, end: int, out: Matrix) -> None:
-    """The rows of the pairs first to end."""
-    for j in range(first, end):
+    """The rows of the pairs: impulse on the first body."""
+    for j in range(model.pair_kind.shape[0]):
         c = model.contact_height.shape[0] + j
         report_contact(model, data, c, data.pair_frame[j], out[c])
-        w = data.pair_share[j, PairShare.PART]
-        for e in range(3):
-            out[c, e] *= w
         if is_absent(data, j):
             out[c, 6] = data.pair_out[j, Witness.GAP]
             for e in range(3):
