@@ -45,6 +45,8 @@ class Randomisation:
     by_row: bool = True
     pushes: tuple[float, ArrayLike] | None = None
 
+    __repr__ = brief_repr
+
     def __post_init__(self) -> None:
         for name, (low, high) in {**self.values, **self.factors}.items():
             if not low <= high:

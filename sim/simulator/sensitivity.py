@@ -160,6 +160,8 @@ def roll_parameters(
                 break
             step = xs[knot], us[knot], wrenches[knot : knot + 1]
             found = step_slopes(engine, request, step, kappa, whole=not quick)
+            if quick and found.report[0] != Status.SOLVED:  # its reason is that of the whole step
+                found = found._replace(report=reports[knot].copy())
             A[knot], B[knot], xs[knot + 1], reports[knot], J[knot] = found
             if reports[knot, 0] == Status.SOLVED and not np.isfinite(J[knot]).all():
                 reports[knot, 0] = Status.NOT_FINITE

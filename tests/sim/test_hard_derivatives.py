@@ -101,8 +101,9 @@ SCENES: dict[str, Callable[[float, float], tuple[dojo.Simulator, np.ndarray]]] =
 
 
 def check(sim: dojo.Simulator, x: np.ndarray) -> float:
-    """A against differences; returns the largest impulse."""
-    return float(np.abs(check_step(sim, x).contacts.impulse).max())
+    """A and B against differences; returns the largest impulse."""
+    # an input of 1 N moves a load of 1000 kg by 1e-6 of an impact: its column has as much of the rounding of the impact
+    return float(np.abs(check_step(sim, x, by_input=1e-5).contacts.impulse).max())
 
 
 @pytest.mark.sweep(6)

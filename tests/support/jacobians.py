@@ -63,7 +63,9 @@ def check_jacobian(
     )
 
 
-def check_step(sim: Simulator, x: Vector, u: Vector | None = None, tolerance: float = 1e-6) -> StepResult:
+def check_step(
+    sim: Simulator, x: Vector, u: Vector | None = None, tolerance: float = 1e-6, by_input: float = 1e-6
+) -> StepResult:
     """A and B of the step from x under u, which is returned; refused steps around it are not used."""
     control = np.zeros(sim.nu) if u is None else u
     result = sim.step(x, control, throw=True)
@@ -79,5 +81,5 @@ def check_step(sim: Simulator, x: Vector, u: Vector | None = None, tolerance: fl
 
     check_jacobian(lambda states: moved(states, control[None]), A, x, sim.integrate, tolerance, rows=True)
     if sim.nu:
-        check_jacobian(lambda controls: moved(x[None], controls), B, control, np.add, tolerance, rows=True)
+        check_jacobian(lambda controls: moved(x[None], controls), B, control, np.add, by_input, rows=True)
     return result
