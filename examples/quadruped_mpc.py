@@ -26,7 +26,7 @@ PUSHES = {"velocity": 0.15, "push": (0.0, 8.0), "payload": (0.0, 3.0), "friction
 
 def main():
     """Run the cases one by one, then all disturbances at once."""
-    seconds, cases = (1.0, list(CASES)[:1]) if QUICK else (6.0, list(CASES))
+    seconds, cases = (2.0, list(CASES)[:1]) if QUICK else (6.0, list(CASES))
     mpc = dojo.tasks.quadruped_mpc(speed=0.2)
     for case in cases:
         loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, 2e-3, **CASES[case]), seconds)

@@ -106,7 +106,8 @@ def test_rollouts(make) -> None:
     for x, u, A, *blocks in zip(xs, us, line.A, *line.parameters.values(), strict=False):
         expected = sim.linearize(x, u, wrt=("state", *line.parameters))
         for block, found in zip(expected.values(), (A, *blocks), strict=True):
-            np.testing.assert_allclose(found, block, rtol=1e-9, atol=1e-11)  # steps of a motion are carried over
+            # solved from another guess, to the tolerance
+            np.testing.assert_allclose(found, block, rtol=1e-6, atol=1e-6 * np.abs(block).max())
     loss = rng.normal(size=(5, sim.ndx))
     got = sim.vjp((xs, us), loss, wrt=(*some, "mass"))
     costate, gradient = loss[-1], {name: 0.0 for name in got}
