@@ -298,13 +298,7 @@ class RowStepping(StateSpace):
         given: Any = X if quick else checks.array(f"{call}(X)", X, (count, self.nx))
         states = self._arguments.states(f"{call}(X)", given)
         steps = checks.whole_number(f"{call}(substeps=...)", substeps)
-        if (
-            count == 1
-            and kappa is None
-            and not parameters
-            and not derivatives
-            and type(self._engine).roll is Engine.roll
-        ):
+        if count == 1 and kappa is None and not parameters and not derivatives and self.has_single_rows:
             return ended(self.single_row(steps).step(states, inputs), throw)
         kappas = np.full(count, np.nan)
         if kappa is not None:
