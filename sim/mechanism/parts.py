@@ -408,7 +408,7 @@ def inertia_of(call: str, body: Body) -> tuple[tuple[float, ...], ...]:
     else:
         matrix = checks.array(f"{call}, inertia=...)", body.inertia, (3,) if np.ndim(body.inertia) == 1 else (3, 3))
         matrix = np.diag(matrix) if matrix.ndim == 1 else matrix
-    if not np.allclose(matrix, matrix.T, rtol=0, atol=1e-9 * np.abs(matrix).max()):
+    if np.abs(matrix - matrix.T).max() > 1e-9 * np.abs(matrix).max():
         raise ValueError(f"{call}, inertia=...): expected a symmetric matrix, got {matrix.tolist()}")
     matrix = 0.5 * (matrix + matrix.T)
     a, b, c = np.linalg.eigvalsh(matrix)

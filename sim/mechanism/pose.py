@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -58,15 +59,15 @@ def quaternion(rotation: Floats) -> tuple[float, ...]:
 
     4 q q^T in terms of R: the row of the largest diagonal entry is q up to its length (Shepperd 1978).
     """
-    R = rotation
-    outer = np.array(
-        [
-            [1 + R[0, 0] + R[1, 1] + R[2, 2], R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
-            [R[2, 1] - R[1, 2], 1 + R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]],
-            [R[0, 2] - R[2, 0], R[0, 1] + R[1, 0], 1 - R[0, 0] + R[1, 1] - R[2, 2], R[1, 2] + R[2, 1]],
-            [R[1, 0] - R[0, 1], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1], 1 - R[0, 0] - R[1, 1] + R[2, 2]],
-        ]
+    (a, b, c), (d, e, f), (g, h, i) = np.asarray(rotation).tolist()  # arrays of three take five times as long
+    wx, wy, wz, xy, xz, yz = h - f, c - g, d - b, d + b, c + g, h + f
+    diagonal = (1.0 + a + e + i, 1.0 + a - e - i, 1.0 - a + e - i, 1.0 - a - e + i)
+    rows = (
+        (diagonal[0], wx, wy, wz),
+        (wx, diagonal[1], xy, xz),
+        (wy, xy, diagonal[2], yz),
+        (wz, xz, yz, diagonal[3]),
     )
-    row = outer[int(np.argmax(np.diag(outer)))]
-    unit = row / np.linalg.norm(row) * (1.0 if row[0] >= 0.0 else -1.0)
-    return tuple(float(c) for c in unit)
+    row = rows[diagonal.index(max(diagonal))]
+    length = sqrt(sum(x * x for x in row)) * (1.0 if row[0] >= 0.0 else -1.0)
+    return tuple(x / length for x in row)

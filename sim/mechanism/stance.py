@@ -24,22 +24,25 @@ def resting(limits: tuple[float, float] | None) -> float:
 
 def gaps(mech: Mechanism, q: Floats) -> Floats:
     """(ncontact,) distance of every contact from its ground [m]."""
+    if not mech.contacts:
+        return np.zeros(0)
     at = poses(mech.joints, q)
     return np.array([float(c.gap(at[c.body].at(c.point))) for c in mech.contacts], dtype=np.float64)
 
 
 def plane_heights(mech: Mechanism, q: Floats) -> list[tuple[float, float]]:
     """(distance [m], upward part of the normal) of every shape of a body from a half-space of the world."""
+    on_planes = [(c, c.shape_b) for c in mech.collisions if c.b == WORLD and isinstance(c.shape_b, HalfSpace)]
+    if not on_planes:
+        return []
     at = poses(mech.joints, q)
     shapes = {body.name: body.shapes for body in mech.bodies}
     out = []
-    for c in mech.collisions:
-        if c.b != WORLD or not isinstance(c.shape_b, HalfSpace):
-            continue
+    for c, plane in on_planes:
         solid = c.shape_a if c.shape_a is not None else shapes[c.a][0]  # the only one, see collision.py
-        n = rotation_matrix(c.shape_b.orientation)[:, 2]
+        n = rotation_matrix(plane.orientation)[:, 2]
         own = (at[c.a].rotation @ rotation_matrix(solid.orientation)).T @ -n
-        arm = at[c.a].at(np.asarray(solid.center)) - np.asarray(c.shape_b.center)
+        arm = at[c.a].at(np.asarray(solid.center)) - np.asarray(plane.center)
         out.append((float(n @ arm) - solid.support(own), float(n[2])))
     return out
 

@@ -27,7 +27,10 @@ def body_shapes(body: MergedLinks, com: Floats) -> tuple[Solid, ...]:
     if found:
         return found
     seen = _solids(body, com, "visuals")
-    return (replace(max(seen, key=lambda shape: shape.volume()), name=""),) if seen else ()
+    if not seen:
+        return ()
+    largest = max(seen, key=lambda shape: shape.volume())
+    return (replace(largest, name="") if largest.name else largest,)
 
 
 def collision_shapes(body: MergedLinks, com: Floats) -> tuple[Solid, ...]:
