@@ -343,7 +343,7 @@ class RowStepping(StateSpace):
     @property
     def has_single_rows(self) -> bool:
         """Whether it has them: steps of order 2 without an accuracy."""
-        return type(self._engine).roll is Engine.roll
+        return self.order == 2
 
     @cached_property
     def _row_models(self) -> RowModels:
