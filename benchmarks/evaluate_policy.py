@@ -2,7 +2,8 @@
 
 python benchmarks/evaluate_policy.py HalfCheetah-v5 policy.npz ...      [--episodes 8] [--finer 5] [--output FILE]
 
-Two columns: the original task, and with `--finer` shorter time steps at the same control rate.
+Two columns: the original task, and with `--finer` shorter time steps at the same control rate. The tasks need
+`pip install "gymnasium[mujoco]"`, which also brings imageio.
 """
 
 from __future__ import annotations
@@ -42,7 +43,10 @@ def load(path: str) -> Callable[[Floats], Floats]:
 
 def returns(task: str, act: Callable[[Floats], Floats], episodes: int, finer: int) -> Floats:
     """(episodes,) returns, with time steps shorter by this factor."""
-    env = gymnasium.make(task, **OPTIONS.get(task, {}))
+    try:
+        env = gymnasium.make(task, **OPTIONS.get(task, {}))
+    except (ImportError, gymnasium.error.DependencyNotInstalled) as error:
+        raise SystemExit(f'{task} needs its libraries: pip install "gymnasium[mujoco]" ({error})') from None
     inner = env.unwrapped
     low, high = env.action_space.low, env.action_space.high
     inner.model.opt.timestep /= finer  # type: ignore[attr-defined]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from time import perf_counter, sleep
 from typing import Any
 
@@ -15,9 +14,7 @@ from dojo_opt.plant.monte_carlo import Sampler
 from dojo_opt.plant.plant import Plant
 from dojo_opt.viewer.live import Live, live
 from sim.mechanism import checks
-from sim.simulator.row_batch import BatchStep
 from sim.simulator.simulator import Simulator
-from solvers.status import Status
 
 try:
     import gymnasium
@@ -29,13 +26,14 @@ Outcome = tuple[Vector, float, bool, bool, dict[str, Any]]
 
 __all__ = ["Environment"]
 
-_SOLVED = int(Status.SOLVED)
 _PICTURE = 4.8  # inches, of 100 pixels
 
 
-def _limited(action: Vector) -> Vector:
-    """Within [-1, 1]; a few numbers are faster than arrays."""
-    return action if all(-1.0 <= a <= 1.0 for a in action.tolist()) else np.clip(action, -1.0, 1.0)
+def _limited(action: Vector, size: int) -> Vector:
+    """An action (size,) within [-1, 1]; a few numbers are faster than arrays."""
+    if action.shape == (size,) and all(-1.0 <= a <= 1.0 for a in action.tolist()):
+        return action
+    return np.clip(checks.array("Environment.step(action)", action, (size,)), -1.0, 1.0)
 
 
 class _TaskEpisode:
@@ -59,25 +57,30 @@ class _TaskEpisode:
         if self._count >= task.steps:
             raise RuntimeError("Environment.step: the episode is over; call reset()")
         given = np.array(action, dtype=np.float64)
-        found = self._step(before, given)
-        self.x = found.x if task.commands == 0 else np.concatenate([found.x, before[:, task.sim.nx :]], axis=1)
+        after, message = self._step(before, given)
+        self.x = after if task.commands == 0 else np.concatenate([after, before[:, task.sim.nx :]], axis=1)
         self._count += 1
         late = self._count >= task.steps
-        if found.status[0] != _SOLVED:
-            return task.observe(self.x)[0][0], 0.0, True, late, {"message": found.message}
+        if message:
+            return task.observe(self.x)[0][0], 0.0, True, late, {"message": message}
         observation, reward, over = task.judge(before[0], given, self.x[0])
         if task.hold is not None:
             task.redraw(self.x, np.array([self._count]), self._rngs)
             observation = task.observe(self.x)[0][0]
         return observation, reward, over, late, {}
 
-    def _step(self, x: Vector, action: Vector) -> BatchStep:
-        """One action; checks of arguments take longer than their question."""
+    def _step(self, x: Vector, action: Vector) -> tuple[Vector, str]:
+        """The state (1, nx) after one action, and why it was not reached; checks of arguments take longer than that."""
         sim, steps = self.sim, self.task.substeps
-        if action.shape != (sim.nu,) or not isfinite(float(action.sum())):
-            raise ValueError(f"Environment.step(action): expected ({sim.nu},) finite numbers, got {action}")
-        inputs = self.task.inputs(_limited(action))[None]
-        return sim.single_row(steps).step(x, inputs) if self._quick else sim.step_batch(x[:, : sim.nx], inputs, steps)
+        inputs = self.task.inputs(_limited(action, sim.nu))
+        if not self._quick:
+            found = sim.step_batch(x[:, : sim.nx], inputs[None], steps)
+        else:
+            row = sim.single_row(steps)
+            if row.advance(x[0, : sim.nx], inputs):
+                return row.end[None].copy(), ""
+            found = row.result(x[:, : sim.nx])
+        return found.x, "" if found.success else found.message
 
     def state(self) -> Vector:
         """The present one, of the simulator."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from dojo_opt.learn.learned import Learned, LearningProgress
 from dojo_opt.learn.task import Task
-from dojo_opt.planning.starts import check_executor
+from dojo_opt.planning.executors import check_executor
 from sim.mechanism import checks
 from solvers.status import Status
 

@@ -29,6 +29,7 @@ from dojo_opt.learn.randomisation import Drawn, Models, Randomisation
 from dojo_opt.learn.shared import Shared
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.training import Training
+from dojo_opt.planning.executors import results_in_order
 from sim.mechanism import checks
 
 Floats = NDArray[np.float64]
@@ -197,16 +198,8 @@ class RandomSearch(WeightSearch):
             given = PairInputs(
                 policy.network, policy.weights, scale, moves, x[part], rows.substeps, rows.kappa, rows.parameters
             )
-            calls.append((given, self.horizon, o.shift))
-        if self.executor is None:
-            return [pair_returns(self.shared, *call) for call in calls]
-        futures = [self.executor.submit(pair_returns, self.shared, *call) for call in calls]
-        try:
-            return [future.result() for future in futures]
-        except KeyboardInterrupt:
-            for future in futures:
-                future.cancel()
-            raise
+            calls.append((self.shared, given, self.horizon, o.shift))
+        return list(results_in_order(pair_returns, calls, self.executor))
 
     @cached_property
     def shared(self) -> Shared:

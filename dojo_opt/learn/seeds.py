@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.task import Task
-from dojo_opt.planning.starts import check_executor
+from dojo_opt.planning.executors import check_executor, results_in_order
 from sim.mechanism import checks
 from solvers.status import Status
 
@@ -47,17 +48,12 @@ def seeds(
         raise TypeError(f"seeds(algorithm): expected a function such as dojo.learn.shac, got {algorithm!r}")
     check_executor("seeds", executor)
     chosen = [checks.whole_number("seeds(numbers)", number, 0) for number in numbers]
-    futures = [] if executor is None else [executor.submit(_run, algorithm, task, k, options) for k in chosen]
     out: list[Learned] = []
-    try:
-        for i, number in enumerate(chosen):
-            found = futures[i].result() if futures else _run(algorithm, task, number, options)
+    with suppress(KeyboardInterrupt):
+        for found in results_in_order(_run, [(algorithm, task, number, options) for number in chosen], executor):
             out.append(replace(found, policy=replace(found.policy, task=task)))
             if found.status == Status.INTERRUPTED:
                 break
-    except KeyboardInterrupt:
-        for future in futures:
-            future.cancel()
     return out
 
 

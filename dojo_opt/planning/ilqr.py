@@ -4,7 +4,7 @@ Read from top to bottom: a solve makes attempts from a guess; an attempt goes th
 stage iterates. One iteration differentiates the time steps along the trajectory, solves the linear-quadratic problem
 around it, and searches along the result:
 
-    ilqr -> Solver.solve -> _attempts -> _descend -> _stage -> _iterate -> _linearize, _gains, _step
+    ilqr -> Solver.solve -> _attempts -> _descend -> _stage -> _iterate -> Subproblem.linearize, Subproblem.gains, _step
 
 `Solver.iterate` is the last part of it alone, for MPC. The derivations are in docs/theory/ilqr.md.
 """
@@ -20,17 +20,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.planning.damping import Damping
-from dojo_opt.planning.ilqr_search import Direction, Iterate, Search
+from dojo_opt.planning.executors import check_executor
+from dojo_opt.planning.ilqr_search import Iterate, Search
 from dojo_opt.planning.ilqr_start import FreeStart, at_rest, fitting_stage, periodic_gains
 from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.plan import History, Plan
 from dojo_opt.planning.problem import Problem
-from dojo_opt.planning.starts import check_executor, multi_start
+from dojo_opt.planning.starts import multi_start
+from dojo_opt.planning.subproblem import Subproblem
 from sim.mechanism import checks
 from sim.simulator.results import Interrupted
-from solvers.riccati import Promise, Quadratic, Regularization, backward, value_hessian, work_size
+from solvers.riccati import Promise
 from solvers.status import MESSAGES, Status
 
 Matrix = NDArray[np.float64]
@@ -175,27 +176,15 @@ class Solver:
     now: Iterate  # the present trajectory
 
     def __init__(self, problem: Problem, options: Options | None = None) -> None:
-        if not isinstance(problem, Problem):
-            raise TypeError(f"ilqr(problem): expected a Problem, got {problem!r}")
-        sim, T = problem.sim, problem.horizon
         self.problem = problem
         self.options = Options() if options is None else options
         self.objective = Objective(problem, self.options)
-        self._horizon = sim.horizon(T, problem.substeps, problem.control_limits)
+        self._horizon = problem.sim.horizon(problem.horizon, problem.substeps, problem.control_limits)
         self._search = Search(problem, self._horizon, self.objective, self.options)
-        self._start = None if problem.free_start is None else FreeStart(problem)
+        start = None if problem.free_start is None else FreeStart(problem)
+        self._subproblem = Subproblem(problem, self._horizon, self.objective, self.options, start)
         self._history = History(self.options)
-        self._damping = Damping(self.options)
         self._begun = False  # whether `now` belongs to the present solve
-        self._detail = ""  # place and cause of a failure, in addition to the status
-        self._K, self._k = np.zeros((T, sim.nu, sim.ndx)), np.zeros((T, sim.nu))
-        self._linear: Any = None  # derivatives of the dynamics; they belong to `now` when `_expanded_at` is `now`
-        self._expanded_at: Iterate | None = None
-        self._apart: tuple[float, Matrix] | None = None  # another smoothing, and by how much its steps end elsewhere
-        self._unit = np.ones(sim.nu)  # of the regularisation
-        self._free, self._buffer = np.zeros(sim.nu, dtype=np.int64), np.zeros(work_size(sim.ndx, sim.nu))
-        self._no_gaps = np.zeros((T + 1, sim.ndx))
-        self._no_limits = np.full((T, sim.nu), -np.inf), np.full((T, sim.nu), np.inf)
 
     # ---- single iterations ------------------------------------------------------------------------------------------
 
@@ -206,16 +195,13 @@ class Solver:
             multipliers: one (m, d) array per constraint, as in `Plan.multipliers`; zero by default.
             penalties: likewise, as in `Plan.penalties`.
         """
-        self._damping.reset()
-        self._detail = ""
-        self._K.fill(0.0)
-        self._k.fill(0.0)
+        self._subproblem.reset()
         self.objective.reset(multipliers, penalties)
 
     @property
     def regularization(self) -> float:
         """The present regularisation, in units of the mean control weight."""
-        return self._damping.mu
+        return self._subproblem.damping.mu
 
     def states(self, call: str, xs: ArrayLike) -> Matrix:
         """A copy of the states xs (..., nx) with unit quaternions; a ValueError names the call."""
@@ -248,14 +234,15 @@ class Solver:
             The trajectory that was reached, with its gains. K and k are buffers, overwritten by the next call.
         """
         self._history.reset(began)
+        local = self._subproblem
         if K is not None:
-            self._K[:] = K
-        self._k.fill(0.0)
-        self._detail = ""
+            local.K[:] = K
+        local.k.fill(0.0)
+        local.detail = ""
         self._begin(now)
         status = self._iterate(self.options.stages[0])
-        message = MESSAGES[status] + ("" if status == Status.SOLVED else self._detail)
-        return Iteration(status, message, self.now, self._K, self._k, self._history.records)
+        message = MESSAGES[status] + ("" if status == Status.SOLVED else local.detail)
+        return Iteration(status, message, self.now, local.K, local.k, self._history.records)
 
     def update_multipliers(self, now: Iterate) -> None:
         """Update the multipliers and penalties of the constraints by their violation at `now`."""
@@ -307,7 +294,8 @@ class Solver:
         """Start from another trajectory."""
         self._search.forget()
         self._begun = True
-        self.now, self._expanded_at = now, None
+        self._subproblem.forget()
+        self.now = now
 
     def _attempts(self, duals: tuple[Sequence[Matrix], ...]) -> tuple[Status, str]:
         """Attempts from the guess, each beginning at a stage, until one is good; else that with the least violation.
@@ -328,11 +316,11 @@ class Solver:
             status = self._descend(first)
             ends.append(self._ended(status))
             if status not in FAILED or ends[-1].mismatch <= self.options.violation:
-                return status, "" if status == Status.SOLVED else self._detail
+                return status, "" if status == Status.SOLVED else self._subproblem.detail
         best = min(ends, key=lambda end: end.mismatch)
         if best is not ends[-1]:
             self._begin(best.now)
-            self._K[:] = best.K
+            self._subproblem.K[:] = best.K
             for term, slope, weight in zip(self.objective.constraints, best.slopes, best.weights, strict=True):
                 term.slope[:], term.weight[:] = slope, weight
         return best.status, best.detail
@@ -343,7 +331,7 @@ class Solver:
         lost = now.gaps is not None or status == Status.SIMULATION_FAILED or not np.isfinite(now.merit)
         mismatch = np.inf if lost else self.objective.mismatch(now.x, now.u)
         slopes, weights = [term.slope.copy() for term in constraints], [term.weight.copy() for term in constraints]
-        return _Attempt(status, self._detail, mismatch, now, self._K.copy(), slopes, weights)
+        return _Attempt(status, self._subproblem.detail, mismatch, now, self._subproblem.K.copy(), slopes, weights)
 
     def _first_stages(self) -> list[int]:
         """The stages to begin with: one, and then those for when the ones before fail; see `fitting_stage`."""
@@ -391,10 +379,10 @@ class Solver:
                     index, softened = last - 1, softened + 1
                     continue
             self.update_multipliers(now)
-            fresh, (cost, merit) = self._expanded_at is now, self.objective.evaluate(now.x, now.u)
+            fresh, (cost, merit) = self._subproblem.is_at(now), self.objective.evaluate(now.x, now.u)
             self.now = now._replace(cost=cost, merit=merit)
             if fresh:
-                self._expand(self._linear)
+                self._subproblem.expand(self.now, self._subproblem.linear)
             index = min(index + 1, last)
         return Status.INFEASIBLE
 
@@ -428,11 +416,11 @@ class Solver:
         closed = float(np.abs(gaps).max()) <= self.options.gap
         self.now = self.now._replace(gaps=None if closed else gaps, kappa=stage.kappa_eval)
         if stage.kappa_grad == stage.kappa_eval:
-            self._expand(linear)
+            self._subproblem.expand(self.now, linear)
 
     def _roll_out(self, kappa: float) -> bool:
         """Replace the trajectory by its own closed-loop rollout at `kappa`; False when the simulator cannot."""
-        shot = self._search.rollout(self.now, self._K, kappa)
+        shot = self._search.rollout(self.now, self._subproblem.K, kappa)
         if shot.status == Status.SOLVED:
             self.now = self._search.iterate(shot, None, kappa)
         return bool(shot.status == Status.SOLVED)
@@ -456,17 +444,17 @@ class Solver:
         status = self._enter(stage)
         if status != Status.SOLVED:
             return status
-        rejections, kappa_grad = self.options.rejections, stage.kappa_grad
+        local, rejections, kappa_grad = self._subproblem, self.options.rejections, stage.kappa_grad
         last = stage is self.options.stages[-1]  # it must not leave gaps; others leave them to the stages to come
         rejected = slow = short = 0
         self._search.restart()
         for _ in range(stage.iterations):
             before = self.now
-            if self._expanded_at is not before and self._linearize(kappa_grad, stage.kappa_eval) != Status.SOLVED:
+            if not local.is_at(before) and local.linearize(before, kappa_grad, stage.kappa_eval) != Status.SOLVED:
                 return Status.SIMULATION_FAILED
-            promise, mu = self._gains(), self._damping.mu
+            promise, mu = local.gains(before), local.damping.mu
             if promise.status != Status.SOLVED:
-                return self._fault(promise)
+                return local.fault(before, promise)
             small = stage.decrease * (abs(before.merit) + _SMALL)
             promised = -(promise.d0 + 0.5 * promise.d1)
             if before.gaps is None and mu <= _LIGHT and promised <= small:
@@ -495,9 +483,8 @@ class Solver:
 
     def _step(self, promise: Promise, stage: Stage, kappa_grad: float) -> float:
         """Search along the gains, and adapt the regularisation to the step size, which is 0 if none is accepted."""
-        before, damping, kappa = self.now, self._damping, stage.kappa_eval
-        start = None if self._start is None else self._start.step
-        direction = Direction(self._k, self._K, start, self._linear, promise)
+        before, damping, kappa = self.now, self._subproblem.damping, stage.kappa_eval
+        direction = self._subproblem.direction(promise)
         alpha, self.now = self._search.rollouts(before, direction, kappa)
         linear = None
         if alpha < self.options.shooting and before.gaps is not None:
@@ -513,7 +500,7 @@ class Solver:
         ):
             damping.increase()
         if linear is not None and kappa == kappa_grad:
-            self._expand(linear)
+            self._subproblem.expand(self.now, linear)
         return alpha
 
     def _record(self, promise: Promise, stage: Stage, kappa_grad: float, mu: float, alpha: float) -> bool:
@@ -533,102 +520,21 @@ class Solver:
             return kappa_grad if self._close_gaps(stage) else None
         if kappa_grad <= 1.01 * stage.kappa_eval:  # rounding of the factors is not a level of its own
             return None
-        self._damping.reset()
-        self._expanded_at = None
+        self._subproblem.damping.reset()
+        self._subproblem.forget()
         return max(_SHARPER * kappa_grad, stage.kappa_eval)
 
     def _close_gaps(self, stage: Stage) -> bool:
         """Close the gaps by a rollout; False where that falls over, but the last stage must not leave gaps."""
         # gains without the regularisation of the failures, which leads to open-loop rollouts
-        self._damping.reset()
+        self._subproblem.damping.reset()
         before = self.now
-        if self._gains().status != Status.SOLVED or not self._roll_out(stage.kappa_eval):
+        if self._subproblem.gains(before).status != Status.SOLVED or not self._roll_out(stage.kappa_eval):
             return False
         if stage is self.options.stages[-1] or self.now.merit <= _FALLEN * before.merit:
             return True
         self.now = before
         return False
-
-    # ---- the linear-quadratic problem around a trajectory -----------------------------------------------------------
-
-    def _linearize(self, kappa: float, kappa_eval: float) -> Status:
-        """Expand dynamics and objective around `now`, at the first smoothing that solves every knot.
-
-        kappa, ten times that, and at last kappa_eval, where the trajectory itself was solved.
-        """
-        now, status, self._detail = self.now, Status.SOLVED, ""
-        for level in (kappa, 10.0 * kappa, kappa_eval):
-            apart, guess = level != kappa_eval, None
-            if apart and self._apart is not None and self._apart[0] == level:
-                guess = now.x[1:] + self._apart[1]  # next states: as far from the trajectory as the last time
-            linear = self._horizon.linearize(now.x, now.u, level, guess)
-            failed = np.flatnonzero(linear.status)
-            if failed.size == 0:
-                if apart:
-                    self._apart = level, linear.x_next - now.x[1:]
-                self._expand(linear)
-                self._detail = ""
-                return Status.SOLVED
-            status = Status(int(linear.status[failed[0]]))
-            self._detail = f" Derivatives at knot {failed[0]}, {status.name}: {MESSAGES[status]}"
-        return status
-
-    def _expand(self, linear: Any) -> None:
-        """Take derivatives at `now`, expand the objective there, and regularise in units of the mean control weight."""
-        now, n = self.now, self.problem.sim.ndx
-        self._linear, self._expanded_at = linear, now
-        self.objective.at_kappa(now.kappa).expand(now.x, now.u)
-        weight = self.objective.H[:-1].diagonal(axis1=1, axis2=2)[:, n:].mean(axis=0)
-        self._unit = np.where(weight > 0.0, weight, 1.0)
-
-    def _model(self) -> Quadratic:
-        """The linear-quadratic problem around `now`."""
-        now, (lo, hi) = self.now, self._no_limits
-        if self.problem.control_limits is not None:
-            lo, hi = (bound - now.u for bound in self.problem.control_limits)
-        gaps = self._no_gaps if now.gaps is None else now.gaps
-        return Quadratic(self._linear.A, self._linear.B, self.objective.g, self.objective.H, gaps, lo, hi)
-
-    def _gains(self) -> Promise:
-        """K and k at the first regularisation, from the present one upwards, with all Q_uu positive definite."""
-        model, damping, options = self._model(), self._damping, self.options
-        while True:
-            added = Regularization(damping.mu, damping.mu * options.value_regularization, self._unit)
-            promise = backward(model, added, self._K, self._k, self._free, self._buffer)
-            if promise.status == Status.SOLVED and self._start is not None:
-                promise = self._free_the_start(self._start, model, promise)
-            if promise.status == Status.SOLVED or damping.mu >= options.regularization_max:
-                return promise
-            damping.increase()
-
-    def _free_the_start(self, start: FreeStart, model: Quadratic, promise: Promise) -> Promise:
-        """Add the step of a free start, once the gaps are closed: before, both together would lead too far."""
-        now, mu = self.now, self._damping.mu
-        if now.gaps is None:
-            k, d0, d1 = start.solve(model, self._K, self._k, mu, self._unit, now.x, now.u)
-            if d0 + 0.5 * d1 < promise.d0 + 0.5 * promise.d1:  # rounding: a fixed start may promise more
-                self._k[:] = k
-                return promise._replace(d0=d0, d1=d1)
-        start.step[:] = 0.0
-        return promise
-
-    def _fault(self, promise: Promise) -> Status:
-        """Why the backward pass at `now` failed with that promise; `_detail` has the knot."""
-        model, knot = self._model(), promise.knot
-        if promise.status == Status.MAX_ITERATIONS:
-            self._detail = f" It is that of the quadratic program of the control limits, at knot {knot}."
-            return promise.status
-        for name, parts in (("dynamics", (model.A, model.B, model.gaps[1:])), ("costs", (model.g, model.H))):
-            knots = [k for part in parts for k in np.flatnonzero(~np.isfinite(part).reshape(len(part), -1).all(axis=1))]
-            if knots:
-                self._detail = f" In the derivatives of the {name}, at knot {min(knots)}."
-                return Status.NOT_FINITE
-        value = value_hessian(self._buffer, self.problem.sim.ndx)
-        if promise.status == Status.NOT_FINITE or not np.all(np.isfinite(value)):
-            self._detail = f" The cost to go grows beyond all numbers, at knot {knot}."
-            return Status.NOT_FINITE
-        self._detail = f" At knot {knot}."
-        return Status.MAX_REGULARIZATION
 
     # ---- the plan ---------------------------------------------------------------------------------------------------
 
@@ -640,23 +546,24 @@ class Solver:
         """
         if self.now.gaps is not None or self.now.kappa != stage.kappa_eval:
             self._roll_out(stage.kappa_eval)
-        fresh = self._expanded_at is self.now
-        if fresh or self._linearize(stage.kappa_grad, stage.kappa_eval) == Status.SOLVED:
-            self._damping.reset(0.0)
-            self._gains()
+        local, now = self._subproblem, self.now
+        if local.is_at(now) or local.linearize(now, stage.kappa_grad, stage.kappa_eval) == Status.SOLVED:
+            local.damping.reset(0.0)
+            local.gains(now)
 
     def _plan(self, status: Status, detail: str) -> Plan:
         """The result, made consistent at the last smoothing, with the gains that belong to it."""
         options, history, constraints = self.options, self._history, self.objective.constraints
         if status not in (Status.SIMULATION_FAILED, Status.INTERRUPTED):
             self._finish(options.stages[-1])
-        now, stride = self.now, None if self._start is None else self._start.stride
+        now, local = self.now, self._subproblem
+        stride = None if local.start is None else local.start.stride
         if stride is not None and status == Status.SOLVED:
-            repeated = periodic_gains(self._model())
+            repeated = periodic_gains(local.model(now))
             if repeated is None:
                 detail = " Its gains are those of a single cycle: the motion repeated for ever has none."
             else:
-                self._K[:] = repeated
+                local.K[:] = repeated
         violation, culprit = self.objective.worst(now.x, now.u)
         if status != Status.SOLVED and violation > options.violation:
             detail += "" if status == Status.INFEASIBLE else " Constraints are not met."
@@ -669,8 +576,8 @@ class Solver:
             fun=now.cost,
             x=now.x,
             u=now.u,
-            K=self._K.copy(),
-            k=self._k.copy(),
+            K=local.K.copy(),
+            k=local.k.copy(),
             violation=violation,
             gap=now.gap,
             seconds=time.perf_counter() - history.began,

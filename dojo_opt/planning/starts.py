@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.planning.executors import results_in_order
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
 from sim.simulator.results import Interrupted
@@ -18,7 +19,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Planner = Callable[..., Plan]
 
-__all__ = ["check_executor", "multi_start"]
+__all__ = ["multi_start"]
 
 _POINTS = 6  # of the splines that are added to a guess
 _SHARE = 0.25  # of the range of a limited input: standard deviation of a point
@@ -27,12 +28,6 @@ _GRAVITY = 9.81  # [m/s^2]
 
 # controls, states and warm start
 Guess = tuple[ArrayLike | None, ArrayLike | None, Plan | None]
-
-
-def check_executor(call: str, executor: Any) -> None:
-    """Refuse what has no submit(); None is no executor."""
-    if executor is not None and not hasattr(executor, "submit"):
-        raise TypeError(f"{call}(executor=...): expected an Executor, with submit(), got {executor!r}")
 
 
 def multi_start(
@@ -73,14 +68,9 @@ def multi_start(
     guesses = [guess, *((_changed(problem, center, spread, child), None, None) for child in children)]
     tasks = [(planner, problem, one, settings) for one in guesses]
     plans: list[Plan] = []
-    futures: list[Any] = []
     try:
-        futures += [] if executor is None else [executor.submit(_run, *task) for task in tasks]
-        for i, task in enumerate(tasks):
-            plans.append(futures[i].result() if futures else _run(*task))
+        plans.extend(results_in_order(_run, tasks, executor))  # those before Ctrl-C stay
     except KeyboardInterrupt as stop:
-        for future in futures:
-            future.cancel()
         begun = getattr(stop, "result", None)
         raise Interrupted(_best(problem, plans, starts) if plans else begun) from None
     return _best(problem, plans, starts)

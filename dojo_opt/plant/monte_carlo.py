@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.planning.starts import check_executor
+from dojo_opt.planning.executors import check_executor, results_in_order
 from dojo_opt.plant.loop import closed_loop
 from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
@@ -163,15 +163,10 @@ def monte_carlo(
     checks.number("monte_carlo(duration)", duration, above=0.0)
     children = np.random.SeedSequence(seed).spawn(count)
     tasks = [(controller, plant, sampler, float(duration), (control_step, components), child) for child in children]
-    futures: list[Any] = []
     outcomes: list[MonteCarloRun] = []
     try:
-        futures += [] if executor is None else [executor.submit(_run, *task) for task in tasks]
-        for i, task in enumerate(tasks):
-            outcomes.append(futures[i].result() if futures else _run(*task))
+        outcomes.extend(results_in_order(_run, tasks, executor))  # those before Ctrl-C stay
     except KeyboardInterrupt:
-        for future in futures:
-            future.cancel()
         raise Interrupted(MonteCarlo(outcomes, float(duration), seed) if outcomes else None) from None
     return MonteCarlo(outcomes, float(duration), seed)
 

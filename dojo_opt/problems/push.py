@@ -77,9 +77,8 @@ def push(
         TypeError: `arm` is neither a mechanism nor a simulator, or `object` no body.
         ValueError: the frame is unknown, the hand cannot reach the object or its goal, or an argument is out of range.
     """
-    mech = arm.mechanism if isinstance(arm, Simulator) else arm
-    if not isinstance(mech, Mechanism):
-        raise TypeError(f"{_CALL}(arm): expected a Mechanism or a Simulator, got {arm!r}")
+    kin = _arm(arm, frame, offset, time_step)
+    alone = kin.sim
     if not isinstance(object, Body):
         raise TypeError(f"{_CALL}(object): expected a Body, got {object!r}")
     way = np.append(checks.array(f"{_CALL}(goal)", goal, (2,)), 0.0)
@@ -88,11 +87,6 @@ def push(
         raise ValueError(f"{_CALL}(goal): expected a displacement along the table, got zero")
     checks.number(f"{_CALL}(radius=...)", radius, above=0.0)
     checks.number(f"{_CALL}(duration=...)", duration, above=0.0)
-    frame = _hand(mech) if frame is None else frame
-    alone = Simulator(replace(mech, contacts=(), collisions=()), time_step=time_step)
-    kin = Kinematics(alone)
-    checks.one_of(f"{_CALL}(frame=...)", frame, kin.frames)
-    kin.add(_TIP, frame, checks.vector(f"{_CALL}(offset=...)", offset, 3))
     q = alone.neutral()[: alone.nq]
     q = q if start is None else np.array(checks.array(f"{_CALL}(start=...)", start, (alone.nq,)))
     below = np.append(kin.pose(_TIP, q)[0][:2], 0.0) if at is None else checks.array(f"{_CALL}(at=...)", at, (3,))
@@ -106,10 +100,7 @@ def push(
     hands = _follow(kin, q, touch + moved[:, None] * forward)
     sim = _scene(kin, object, pose, radius, float(below[2]))
     states = _states(sim, hands, place + np.maximum(moved, 0.0)[:, None] * forward)
-    resting = np.concatenate([hands[1:-1], np.zeros((horizon, alone.nv))], axis=1)
-    held = np.linalg.lstsq(input_map(alone), potential_gradient(alone, resting).T, rcond=None)[0].T
-    limits = tuple(np.asarray(bound, dtype=float) for bound in sim.mechanism.input_limits)
-    held = np.clip(held, *limits)
+    held = _holding(alone, hands[1:-1])
     unit = max(float(np.abs(held).max(initial=0.0)), 1e-3)
     return Problem(
         sim,
@@ -123,6 +114,25 @@ def push(
         controls0=held,
         states0=states,
     )
+
+
+def _arm(arm: Mechanism | Simulator, frame: str | None, offset: ArrayLike, time_step: float) -> Kinematics:
+    """Kinematics of the arm without its contacts, with the frame of the ball."""
+    mech = arm.mechanism if isinstance(arm, Simulator) else arm
+    if not isinstance(mech, Mechanism):
+        raise TypeError(f"{_CALL}(arm): expected a Mechanism or a Simulator, got {arm!r}")
+    frame = _hand(mech) if frame is None else frame
+    kin = Kinematics(Simulator(replace(mech, contacts=(), collisions=()), time_step=time_step))
+    checks.one_of(f"{_CALL}(frame=...)", frame, kin.frames)
+    kin.add(_TIP, frame, checks.vector(f"{_CALL}(offset=...)", offset, 3))
+    return kin
+
+
+def _holding(arm: Simulator, q: Array) -> Array:
+    """(n, nu) inputs within their limits that hold the arm against gravity at coordinates (n, nq) [N m]."""
+    resting = np.concatenate([q, np.zeros((len(q), arm.nv))], axis=1)
+    held = np.linalg.lstsq(input_map(arm), potential_gradient(arm, resting).T, rcond=None)[0].T
+    return np.asarray(np.clip(held, *(np.asarray(bound, dtype=float) for bound in arm.mechanism.input_limits)))
 
 
 def _hand(mech: Mechanism) -> str:

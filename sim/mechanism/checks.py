@@ -41,8 +41,8 @@ def finite(values: Floats) -> bool:
 def array(call: str, value: Any, shape: tuple[int | str | None, ...]) -> Floats:
     """`value` as a finite float64 array of the given shape; None or a letter stands for any length."""
     out = floats(call, value)
-    fits = out.ndim == len(shape) and all(
-        not isinstance(n, int) or n == m for n, m in zip(shape, out.shape, strict=True)
+    fits = out.shape == shape or (
+        out.ndim == len(shape) and all(not isinstance(n, int) or n == m for n, m in zip(shape, out.shape, strict=True))
     )
     if fits and finite(out):
         return out

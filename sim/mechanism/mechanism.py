@@ -138,7 +138,7 @@ class Mechanism:
         """Names of the joints, in tree order."""
         return tuple(j.name for j in self.joints)
 
-    @property
+    @cached_property
     def contact_names(self) -> tuple[str, ...]:
         """Names of the contacts: those with the ground, then the contact points of the collisions."""
         return (*(c.name for c in self.contacts), *(touch.name for touch in self.touches))

@@ -30,7 +30,7 @@ from sim.integrators.tableau import embedded
 from sim.mechanism.mechanism import Mechanism
 from sim.model.model import Model
 from sim.model.pace import pieces
-from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, knot_inputs, refuse
+from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, refuse
 from sim.simulator.knot_engine import KnotEngine
 from sim.simulator.link import link_gradient, link_smooth, link_step
 from sim.simulator.results import Interrupted
@@ -306,26 +306,6 @@ class AdaptiveEngine(KnotEngine):
                 raise KeyboardInterrupt from None
             raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, division)) from None
         return Rolled(knot, xs, reports, contacts, A, B, division)
-
-    def linearize(
-        self,
-        xs: Floats,
-        us: Floats,
-        substeps: int,
-        kappa: float | None,
-        guess: Floats | None = None,
-        wrenches: Cube | None = None,
-    ) -> tuple[Floats, ...]:
-        """As Engine.linearize, on one core; without guess."""
-        self._check_swings()
-        n, external = len(us), self.external(wrenches)
-        A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
-        x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
-        for t in range(n):
-            A[t], B[t], x_next[t], reports[t] = self.linearize_knot(
-                xs[t], knot_inputs(us, external, t, substeps), kappa
-            )
-        return A, B, x_next, reports
 
     def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Vector) -> Floats:
         """(n, nx) nodes of a motion (states, inputs, external wrenches) at times since its beginning, in any order [s].

@@ -55,6 +55,11 @@ def _rows(motion: MotionBuffers, first: int, count: int) -> MotionBuffers:
     )
 
 
+def _divisible(status: Floats | Integers) -> list[int]:
+    """The knots whose status is one of those that shorter steps may solve."""
+    return [int(i) for i in np.flatnonzero(status) if int(status[i]) in DIVISIBLE] if np.count_nonzero(status) else []
+
+
 class DividingEngine(Engine):
     """The kernels of one packed mechanism, with steps of order 2 that are divided where that is necessary."""
 
@@ -226,7 +231,7 @@ class DividingEngine(Engine):
         """As Engine.roll_batch; rollouts with divided steps end on one core."""
         xs, status, knots = super().roll_batch(x0s, us)
         model = self.linked(link_step)
-        for i in np.flatnonzero(np.isin(status, list(DIVISIBLE))):
+        for i in _divisible(status):
             report = np.zeros((1, REPORT))
             report[0, 0] = status[i]
             motion = MotionBuffers(xs[i], us[i], self.no_wrenches, report, self._no_contacts, *self.unknown[:2])
@@ -250,7 +255,7 @@ class DividingEngine(Engine):
         """As Engine.linearize, with division."""
         A, B, x_next, reports = super().linearize(xs, us, substeps, kappa, guess, wrenches)
         external = self.external(wrenches)
-        for t in map(int, np.flatnonzero(np.isin(reports[:, 0], list(DIVISIBLE)))):
+        for t in _divisible(reports[:, 0]):
             A[t], B[t], x_next[t], reports[t] = self.linearize_knot(
                 xs[t], knot_inputs(us, external, t, substeps), kappa
             )

@@ -229,6 +229,10 @@ class Engine:
         """Tables of this thread's Data for a parallel call over `count` items, one per chunk."""
         return self._scratch.chunks(count)
 
+    def _settings_of(self, steps: int, kappa: float | None) -> Vector:
+        """Settings of a call of so many steps: a single one has no deadline, and shares them with others."""
+        return self._settings if steps <= 1 and kappa is None else self.settings.array(kappa)
+
     def external(self, wrenches: Cube | None) -> Cube:
         """External wrenches as kernels take them, (T, nbody, 6), or (0, nbody, 6) where there are none."""
         return self.no_wrenches if wrenches is None else wrenches
@@ -282,7 +286,7 @@ class Engine:
         """
         steps, knot = len(motion.us), 0
         data = self._scratch.table()
-        settings = self._settings if steps <= 1 and kappa is None else self.settings.array(kappa)
+        settings = self._settings_of(steps, kappa)
         try:
             for _ in pieces(settings, steps):
                 knot = int(rollout.roll(model, data, settings, motion, knot))
@@ -371,7 +375,7 @@ class Engine:
             if len(xs) == n:
                 x_next[-1:] = xs[-1:]
         line = rollout.Linearized(xs, us, self.external(wrenches), A, B, x_next, reports)
-        model, settings = self.linked(link_step, link_gradient), self.settings.array(kappa)
+        model, settings = self.linked(link_step, link_gradient), self._settings_of(n * substeps, kappa)
         if n * substeps * self.ndx < _WORTH_THREADS:
             data, step = self._scratch.table(), 0
             for _ in pieces(settings, n * substeps):
@@ -386,7 +390,7 @@ class Engine:
                 rollout.linearize_knots(model, works, settings, substeps, line, done)
                 if np.array_equal(done, ends[1:]):
                     break
-        if reports[:, 0].any() or refuse(reports, n, A, B) < n:
+        if np.count_nonzero(reports[:, 0]) or refuse(reports, n, A, B) < n:
             reports[~(finite_rows(A) & finite_rows(B)) & (reports[:, 0] == Status.SOLVED), 0] = Status.NOT_FINITE
             unsolved = reports[:, 0] != Status.SOLVED
             for array in (A, B, x_next):

@@ -1,4 +1,4 @@
-"""Engines whose closed loops are rollouts of one knot after another."""
+"""Engines whose closed loops and derivatives are those of one knot after another."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from sim.integrators.feedback import FeedbackLaw, Path
 from sim.simulator.engine import REPORT, Floats, interrupted, knot_inputs
 from sim.simulator.high_order_engine import HighOrderEngine
 from sim.simulator.results import Interrupted
-from solvers.types import Vector
+from solvers.types import Cube, Vector
 
 
 class KnotEngine(HighOrderEngine):
@@ -46,3 +46,23 @@ class KnotEngine(HighOrderEngine):
                 path.xs[t + 1] = self.integrate(rolled.xs[-1:], (alpha - 1.0) * policy.gaps[t + 1 : t + 2])[0]
         path.report[1] = total
         return knots, path
+
+    def linearize(
+        self,
+        xs: Floats,
+        us: Floats,
+        substeps: int,
+        kappa: float | None,
+        guess: Floats | None = None,
+        wrenches: Cube | None = None,
+    ) -> tuple[Floats, ...]:
+        """As Engine.linearize, on one core; without guess."""
+        self._check_swings()
+        n, external = len(us), self.external(wrenches)
+        A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
+        x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
+        for t in range(n):
+            A[t], B[t], x_next[t], reports[t] = self.linearize_knot(
+                xs[t], knot_inputs(us, external, t, substeps), kappa
+            )
+        return A, B, x_next, reports

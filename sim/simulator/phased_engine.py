@@ -22,7 +22,7 @@ from sim.integrators.hamilton_gradient import Slopes
 from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.dividing_engine import DividingEngine
-from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, knot_inputs
+from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted
 from sim.simulator.knot_engine import KnotEngine
 from sim.simulator.link import link_smooth, link_step
 from sim.simulator.results import Interrupted
@@ -165,37 +165,21 @@ class PhasedEngine(KnotEngine):
         """As Engine.far; all of them where the step was of higher order."""
         return self._second.far() if self._last.near else np.ones(self.sizes.ncontact, dtype=bool)
 
-    def linearize(
-        self,
-        xs: Floats,
-        us: Floats,
-        substeps: int,
-        kappa: float | None,
-        guess: Floats | None = None,
-        wrenches: Cube | None = None,
-    ) -> tuple[Floats, ...]:
-        """As Engine.linearize, on one core: products of the derivatives of the steps, each by its own order."""
-        self._check_swings()
-        external = self.external(wrenches)
-        n = len(us)
-        A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
-        x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
-        for t in range(n):
-            m = self.march(xs[t], *knot_inputs(us, external, t, substeps), kappa)
-            reports[t] = m.reports[min(m.knot, substeps - 1)]
-            steps = (
-                (self._step_slopes(m, s, (us[t], external[t : t + 1]), kappa) for s in range(substeps))
-                if m.knot == substeps
-                else ()
-            )
-            dx, du = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
-            for dx_dx, dx_du, report in steps:
-                dx, du = dx_dx @ dx, dx_dx @ du + dx_du
-                if report[0] != Status.SOLVED:
-                    reports[t] = report
-            if reports[t, 0] == Status.SOLVED:
-                A[t], B[t], x_next[t] = dx, du, m.xs[-1]
-        return A, B, x_next, reports
+    def linearize_knot(
+        self, x: Vector, given: tuple[Floats, Cube], kappa: float | None
+    ) -> tuple[Floats, Floats, Vector, Vector]:
+        """As Engine.linearize_knot: products of the derivatives of the steps, each by its own order."""
+        us, external = given
+        m = self.march(x, us, external, kappa)
+        A, B, report = np.eye(self.ndx), np.zeros((self.ndx, self.nu)), m.reports[min(m.knot, len(us) - 1)]
+        for s in range(len(us) if m.knot == len(us) else 0):
+            dx, du, found = self._step_slopes(m, s, (us[s], external[s : s + 1]), kappa)
+            A, B = dx @ A, dx @ B + du
+            if found[0] != Status.SOLVED:
+                report = found
+        if report[0] != Status.SOLVED:
+            return np.zeros_like(A), np.zeros_like(B), np.zeros(self.nx), report
+        return A, B, m.xs[-1], report
 
     def _step_slopes(
         self, m: March, s: int, given: tuple[Vector, Cube], kappa: float | None

@@ -566,9 +566,9 @@ def sentence(
 
 def missed(errors: Floats) -> str:
     """A sentence about the largest estimated error (T,) of solved steps beyond the accuracy; empty without one."""
-    worst = int(np.argmax(errors)) if len(errors) else 0
-    if not len(errors) or errors[worst] <= 1.0:
+    if errors.max(initial=0.0) <= 1.0:
         return ""
+    worst = int(np.argmax(errors))
     return (
         f"Solved, but the estimated error of step {worst} is {errors[worst]:.2g} times the one that the accuracy "
         "allows: sub-steps in contact have a shortest length. Ask for less of it, or compare two accuracies."

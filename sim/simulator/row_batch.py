@@ -232,6 +232,23 @@ class SingleRow:
         self._motion = MotionBuffers(xs, us, engine.external(None), reports, *engine.unkept)
         self._division = Division.none(steps)
         self._none = np.zeros((0, engine.ndx, engine.ndx)), np.zeros((0, engine.ndx, engine.nu))
+        self._start, self.end, self._knot = xs[0], xs[-1], 0
+
+    def advance(self, x: Floats, u: Floats) -> bool:
+        """Take the steps of a knot; `end` (nx,) is the state after them until the next call.
+
+        Args:
+            x: (nx,) finite state.
+            u: (nu,) finite input [N, N m].
+
+        Returns:
+            Whether all steps were solved; `result` says why not.
+        """
+        motion = self._motion
+        self._start[:], motion.us[:] = x, u
+        motion.reports.fill(0.0)
+        self._knot = self._engine.take_steps(self._engine.linked(link_step), motion, None, self._division)
+        return self._knot == self._steps
 
     def step(self, states: Floats, inputs: Floats) -> BatchStep:
         """The knot of a row.
@@ -243,17 +260,19 @@ class SingleRow:
         Returns:
             BatchStep without derivatives.
         """
-        xs, us, _, reports, *_ = self._motion
-        xs[0], us[:], reports[:] = states[0, : xs.shape[1]], inputs[0], 0.0
-        knot = self._engine.take_steps(self._engine.linked(link_step), self._motion, None, self._division)
-        last = reports[min(knot, self._steps - 1)]
+        states = states[:, : self._engine.nx]
+        self.advance(states[0], inputs[0])
+        return self.result(states)
+
+    def result(self, states: Floats) -> BatchStep:
+        """How the knot ended that began at these states (1, nx), which a row keeps that was not solved."""
+        solved = self._knot == self._steps
+        last = self._motion.reports[-1 if solved else self._knot]
         status, iterations = last[:2].astype(np.int64)[:, None]
-        if knot == self._steps:
-            return BatchStep(xs[-1:].copy(), status, iterations, *self._none)
-        reason = MESSAGES[Status(int(status[0]))]
-        return BatchStep(
-            states[:, : xs.shape[1]], status, iterations, *self._none, f"Simulator.step_batch: row 0: {reason}"
-        )
+        if solved:
+            return BatchStep(self.end[None].copy(), status, iterations, *self._none)
+        detail = f"Simulator.step_batch: row 0: {MESSAGES[Status(int(status[0]))]}"
+        return BatchStep(states, status, iterations, *self._none, detail)
 
 
 class RowStepping(StateSpace):
@@ -343,7 +362,7 @@ class RowStepping(StateSpace):
     @property
     def has_single_rows(self) -> bool:
         """Whether it has them: steps of order 2 without an accuracy."""
-        return type(self._engine).roll is Engine.roll
+        return self.order == 2
 
     @cached_property
     def _row_models(self) -> RowModels:

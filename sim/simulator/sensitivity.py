@@ -94,30 +94,39 @@ class StepSlopes(NamedTuple):
 
 
 def step_slopes(
-    engine: Engine, request: Request, step: tuple[Vector, Vector, Floats], kappa: float | None, *, whole: bool = True
+    engine: Engine, request: Request, step: tuple[Vector, Vector, Floats], kappa: float | None
 ) -> StepSlopes:
-    """Derivatives of the step (state, input, external wrenches (1 or 0, nbody, 6)), divided where necessary.
+    """Derivatives of the step (state, input, external wrenches (1 or 0, nbody, 6)), divided where necessary."""
+    x, u, external = step
+    A, B, x_next, reports = Engine.linearize(engine, x[None], u[None], 1, kappa, None, external)
+    if reports[0, 0] != Status.SOLVED:
+        return divided_slopes(engine, request, step, reports[0], kappa)
+    J = parameter_columns(engine, request.mechanism, (x, u), A[0], request.plan)
+    return StepSlopes(A[0], B[0], x_next[0], reports[0], J)
 
-    whole: whether to try it as a whole.
+
+def divided_slopes(
+    engine: Engine,
+    request: Request,
+    step: tuple[Vector, Vector, Floats],
+    report: Vector,
+    kappa: float | None,
+) -> StepSlopes:
+    """Derivatives of a step that could not be solved as a whole, for the reason in `report` (6,).
+
+    Where division does not solve it either, the report stays and the derivatives are zero.
     """
     x, u, external = step
-    J = np.zeros((engine.ndx, request.plan.size))
-    if whole:
-        A, B, x_next, reports = Engine.linearize(engine, x[None], u[None], 1, kappa, None, external)
-        out = StepSlopes(A[0], B[0], x_next[0], reports[0], J)
-        if out.report[0] == Status.SOLVED:
-            return out._replace(J=parameter_columns(engine, request.mechanism, (x, u), out.A, request.plan))
-        if int(out.report[0]) not in DIVISIBLE:
-            return out
-    else:
-        unsolved = np.zeros(REPORT)
-        unsolved[0] = Status.NO_PROGRESS
-        out = StepSlopes(np.zeros((engine.ndx, engine.ndx)), np.zeros((engine.ndx, engine.nu)), x, unsolved, J)
-    divided = engine.divide(x, u, external, kappa, derivatives=True)
-    return out if divided is None else _divided_slopes(engine, request, (x, u, external), divided, kappa)
+    divided = None
+    if int(report[0]) in DIVISIBLE:
+        divided = engine.divide(x, u, external, kappa, derivatives=True)
+    if divided is not None:
+        return _products(engine, request, step, divided, kappa)
+    A, B = np.zeros((engine.ndx, engine.ndx)), np.zeros((engine.ndx, engine.nu))
+    return StepSlopes(A, B, x, report, np.zeros((engine.ndx, request.plan.size)))
 
 
-def _divided_slopes(
+def _products(
     engine: Engine, request: Request, step: tuple[Vector, Vector, Floats], divided: Divided, kappa: float | None
 ) -> StepSlopes:
     """Of a divided step: the products of those of its parts and of the conversions at both ends."""
@@ -148,26 +157,26 @@ def roll_parameters(
     A, B = np.zeros((n, engine.ndx, engine.ndx)), np.zeros((n, engine.ndx, engine.nu))
     J = np.zeros((n, engine.ndx, request.plan.size))
     xs[0], knot = x, 0
-    quick = type(engine).roll is Engine.roll and not len(request.plan.heights)
+    in_one_loop = not len(request.plan.heights)  # their columns are made in Python
     while knot < n:
-        if quick:
+        if in_one_loop:
             motion = MotionBuffers(
                 xs[knot:], us[knot:], wrenches[knot:], reports[knot:], engine.unkept[0], A[knot:], B[knot:]
             )
             knot += _whole_steps(engine, request.plan, motion, J[knot:], kappa)
-        if knot < n:
-            if quick and int(reports[knot, 0]) not in DIVISIBLE:
+            if knot == n:
                 break
-            step = xs[knot], us[knot], wrenches[knot : knot + 1]
-            found = step_slopes(engine, request, step, kappa, whole=not quick)
-            if quick and found.report[0] != Status.SOLVED:  # its reason is that of the whole step
-                found = found._replace(report=reports[knot].copy())
-            A[knot], B[knot], xs[knot + 1], reports[knot], J[knot] = found
-            if reports[knot, 0] == Status.SOLVED and not np.isfinite(J[knot]).all():
-                reports[knot, 0] = Status.NOT_FINITE
-            if reports[knot, 0] != Status.SOLVED:
-                break
-            knot += 1
+        step = xs[knot], us[knot], wrenches[knot : knot + 1]
+        if in_one_loop:
+            found = divided_slopes(engine, request, step, reports[knot], kappa)
+        else:
+            found = step_slopes(engine, request, step, kappa)
+        A[knot], B[knot], xs[knot + 1], reports[knot], J[knot] = found
+        if reports[knot, 0] == Status.SOLVED and not np.isfinite(J[knot]).all():
+            reports[knot, 0] = Status.NOT_FINITE
+        if reports[knot, 0] != Status.SOLVED:
+            break
+        knot += 1
     contacts = np.zeros((0, engine.sizes.ncontact, CONTACT))
     return Rolled(knot, xs, reports, contacts, A, B, Division.none(n)), J
 
@@ -245,10 +254,8 @@ def adjoint_sweep(
 
 def _sweep_divided(engine: Engine, request: Request, line: Sweep, kappa: float | None, t: int) -> bool:
     """The sweep over step t, which could not be solved as a whole; False where division does not solve it."""
-    if int(line.report[0, 0]) not in DIVISIBLE:
-        return False
     step = line.xs[t], line.us[t], line.wrenches[t : t + 1]
-    slopes = step_slopes(engine, request, step, kappa, whole=False)
+    slopes = divided_slopes(engine, request, step, line.report[0], kappa)
     if slopes.report[0] != Status.SOLVED:
         return False
     line.report[0] = 0.0

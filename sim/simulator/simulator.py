@@ -422,11 +422,12 @@ class Simulator(RowStepping):
             rolled, J = self._by_parameters.roll(state, us[None], selected[1:], level, external)
             (A,), (B,), x_next, report = rolled.A, rolled.B, rolled.xs[1], rolled.reports[0]
             blocks = {"state": A, "input": B} | {name: J[0][:, rows] for name, rows in selected[1].rows.items()}
-        if selected is not None and report[0] == Status.SOLVED:
+        status, detail = STATUSES[int(report[0])], ""
+        if status != Status.SOLVED:
+            detail = sentence(self.mechanism, call, report, self.tolerance)
+        elif selected is not None:
             blocks = {name: blocks[name] for name in selected[0]}
-        detail = "" if report[0] == Status.SOLVED else sentence(self.mechanism, call, report, self.tolerance)
-        status, accuracy = Status(int(report[0])), float(report[5])
-        return ended(Jacobian(blocks, x_next, status, accuracy, detail, wrt is not None), throw)
+        return ended(Jacobian(blocks, x_next, status, float(report[5]), detail, wrt is not None), throw)
 
     def linearize_rollout(
         self,

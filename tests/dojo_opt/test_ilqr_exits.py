@@ -136,7 +136,7 @@ def test_derivatives_that_cannot_be_had_are_said():
 
 def test_a_box_qp_that_does_not_end(monkeypatch):
     unfinished = Promise(Status.MAX_ITERATIONS, 3, 0.0, 0.0, 0.0)
-    monkeypatch.setattr("dojo_opt.planning.ilqr.backward", lambda *arguments: unfinished)
+    monkeypatch.setattr("dojo_opt.planning.subproblem.backward", lambda *arguments: unfinished)
     plan = ilqr(lqr())
     assert plan.status == Status.MAX_ITERATIONS
     assert "quadratic program of the control limits, at knot 3" in plan.message

@@ -34,6 +34,42 @@ _ARM = (1.57, 2.0, 0.0, 4.4, 0.0, 2.4, 0.0)  # [rad]
 _START, _GOAL = (0.6, 0.27, 0.06), (0.6, 0.0, 0.06)  # [m] of the ball
 _HALF = 0.5**0.5
 _HEAVY = 1.0  # [kg m^2] of links 4 and 7, as the publication's file has them
+_LONG, _THIN = 0.00247074, 0.000380115  # [kg m^2]
+_STUB = 0.001 * -0.06 / 0.011  # [m] centre of mass of the last link with its stub
+# mass [kg], centre of mass [m] and moments of inertia [kg m^2] of each link; its place and quaternion on the one before
+_LINKS = (
+    (
+        0.7477,
+        (0.0, -0.002, -0.0605),
+        (0.00152032, 0.00152032, 0.00059816),
+        (0.0, 0.27, 0.26675),
+        (0.0, -_HALF, _HALF, 0.0),
+    ),
+    (0.8447, (0.0, -0.103563, 0.0), (_LONG, _THIN, _LONG), (0.0, 0.0016, -0.11875), (0.0, 0.0, -_HALF, _HALF)),
+    (0.8447, (0.0, 0.0, -0.102245), (_LONG, _LONG, _THIN), (0.0, -0.205, 0.0), (_HALF, -_HALF, 0.0, 0.0)),
+    (0.6763, (0.0, 0.081, -0.0086), (_HEAVY, _HEAVY, _HEAVY), (0.0, 0.0, -0.205), (0.0, 0.0, -_HALF, -_HALF)),
+    (
+        0.463,
+        (0.0, 0.002885, -0.054193),
+        (0.000432132, 0.000432132, 9.26e-5),
+        (0.0, 0.2073, -0.0114),
+        (0.0, 0.0, _HALF, -_HALF),
+    ),
+    (
+        0.463,
+        (0.0, 0.049721, -0.002856),
+        (0.000432132, 9.26e-5, 0.000432132),
+        (0.0, 0.0, -0.10375),
+        (0.0, 0.0, -_HALF, -_HALF),
+    ),
+    (
+        0.011,
+        (0.0, 0.0, _STUB),
+        (_HEAVY + 1.03e-4, _HEAVY + 1.03e-4, _HEAVY + 1e-4),
+        (0.0, 0.10375, 0.0),
+        (0.0, 0.0, _HALF, -_HALF),
+    ),
+)
 _EFFORT = (40.0, 80.0, 40.0, 40.0, 20.0, 20.0, 20.0)  # [N m]
 _SPHERES = (("link_6", (0.0, 0.0, 0.0), 0.048), ("link_7", (0.0, 0.0, 0.0), 0.03275))
 _NUB = ("link_7", (0.0, 0.0, -0.055), 0.03275)
@@ -45,72 +81,9 @@ def arm() -> list[FileLink]:
     Returns:
         Seven links.
     """
-    long, thin = 0.00247074, 0.000380115
-    nub = 0.001 * -0.06 / 0.011  # [m] centre of mass of the last link with its stub
     return [
-        FileLink(
-            "link_1",
-            None,
-            0.7477,
-            (0.0, -0.002, -0.0605),
-            (0.00152032, 0.00152032, 0.00059816),
-            pos=(0.0, 0.27, 0.26675),
-            quat=(0.0, -_HALF, _HALF, 0.0),
-        ),
-        FileLink(
-            "link_2",
-            "link_1",
-            0.8447,
-            (0.0, -0.103563, 0.0),
-            (long, thin, long),
-            pos=(0.0, 0.0016, -0.11875),
-            quat=(0.0, 0.0, -_HALF, _HALF),
-        ),
-        FileLink(
-            "link_3",
-            "link_2",
-            0.8447,
-            (0.0, 0.0, -0.102245),
-            (long, long, thin),
-            pos=(0.0, -0.205, 0.0),
-            quat=(_HALF, -_HALF, 0.0, 0.0),
-        ),
-        FileLink(
-            "link_4",
-            "link_3",
-            0.6763,
-            (0.0, 0.081, -0.0086),
-            (_HEAVY, _HEAVY, _HEAVY),
-            pos=(0.0, 0.0, -0.205),
-            quat=(0.0, 0.0, -_HALF, -_HALF),
-        ),
-        FileLink(
-            "link_5",
-            "link_4",
-            0.463,
-            (0.0, 0.002885, -0.054193),
-            (0.000432132, 0.000432132, 9.26e-5),
-            pos=(0.0, 0.2073, -0.0114),
-            quat=(0.0, 0.0, _HALF, -_HALF),
-        ),
-        FileLink(
-            "link_6",
-            "link_5",
-            0.463,
-            (0.0, 0.049721, -0.002856),
-            (0.000432132, 9.26e-5, 0.000432132),
-            pos=(0.0, 0.0, -0.10375),
-            quat=(0.0, 0.0, -_HALF, -_HALF),
-        ),
-        FileLink(
-            "link_7",
-            "link_6",
-            0.011,
-            (0.0, 0.0, nub),
-            (_HEAVY + 1.03e-4, _HEAVY + 1.03e-4, _HEAVY + 1e-4),
-            pos=(0.0, 0.10375, 0.0),
-            quat=(0.0, 0.0, _HALF, -_HALF),
-        ),
+        FileLink(f"link_{k}", f"link_{k - 1}" if k > 1 else None, mass, com, inertia, pos=pos, quat=quat)
+        for k, (mass, com, inertia, pos, quat) in enumerate(_LINKS, 1)
     ]
 
 

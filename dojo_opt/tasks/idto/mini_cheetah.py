@@ -27,16 +27,8 @@ _SERVO = 50.0, 2.0  # [N m/rad], [N m s/rad]
 _LEGS = {"fl": (1.0, 1.0), "fr": (1.0, -1.0), "hl": (-1.0, 1.0), "hr": (-1.0, -1.0)}
 
 
-def mechanism(friction: float, terrain: Terrain | None = None) -> Mechanism:
-    """The robot of 8.25 kg with feet of 17.5 mm: masses of the publication's Python variant, which are mirrored.
-
-    Args:
-        friction: coefficient of friction of the feet.
-        terrain: the ground (default None: level).
-
-    Returns:
-        The mechanism, which stands.
-    """
+def _links() -> list[FileLink]:
+    """The trunk and the three links of each leg."""
     links = [FileLink("trunk", None, 3.3, (0.0, 0.0, 0.0), (0.012677, 0.017298, 0.024475), "floating")]
     for leg, (front, left) in _LEGS.items():
         turn = front * left  # of both diagonals
@@ -76,6 +68,20 @@ def mechanism(friction: float, terrain: Terrain | None = None) -> Mechanism:
                 limits=limits,
             ),
         ]
+    return links
+
+
+def mechanism(friction: float, terrain: Terrain | None = None) -> Mechanism:
+    """The robot of 8.25 kg with feet of 17.5 mm: masses of the publication's Python variant, which are mirrored.
+
+    Args:
+        friction: coefficient of friction of the feet.
+        terrain: the ground (default None: level).
+
+    Returns:
+        The mechanism, which stands.
+    """
+    links = _links()
     bodies, joints = assembled(links)
     feet = [
         Contact(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sim.io.contact_choices import contact_choices
 from sim.io.mjcf.collisions import find_collisions, find_on_planes
 from sim.io.mjcf.contacts import find_contacts
 from sim.io.mjcf.drives import find_inputs, left_out, with_friction
@@ -19,8 +20,7 @@ from sim.io.mjcf.joints import BALL, FREE, carry
 from sim.io.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
 from sim.io.urdf.report import OVERLAPPING, LinkFrame, Notes
 from sim.mechanism import checks
-from sim.mechanism.checks import whole_number
-from sim.mechanism.parts import LAWS, Body, Joint
+from sim.mechanism.parts import Body, Joint
 from sim.mechanism.pose import Pose
 from sim.mechanism.stance import gaps, lifted, plane_heights
 
@@ -70,7 +70,7 @@ def load_mjcf(
     if not isinstance(collisions, bool):
         checks.one_of("load_mjcf(collisions=...)", collisions, ("self",))
     model, file = _compile(source)
-    touching = _touching(friction, law, rim_points)
+    touching = contact_choices("load_mjcf", friction, law, rim_points)
     notes = Notes()
     groups, where = find_groups(model)
     bodies, joints, homes = _tree(model, groups, merge, notes)
@@ -104,15 +104,6 @@ def load_mjcf(
     report = MjcfReport(file, notes.close(), _frames(model, where), known, gear, low, high)
     _warn(report)
     return replace(mech, report=report)
-
-
-def _touching(friction: float | None, law: str, rim_points: int) -> tuple[float | None, str, int]:
-    """The choices that all contacts share, checked."""
-    return (
-        None if friction is None else checks.number("load_mjcf(friction=...)", friction, at_least=0.0),
-        checks.one_of("load_mjcf(law=...)", law, LAWS),
-        whole_number("load_mjcf(rim_points=...)", rim_points, 3),
-    )
 
 
 def _warn(report: MjcfReport) -> None:

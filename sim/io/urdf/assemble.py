@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim.io.contact_choices import ContactChoices
 from sim.io.urdf.contacts import find_contacts
 from sim.io.urdf.inertia import RigidInertia, combined, fault, repaired
 from sim.io.urdf.loops import UrdfLoop, closing_joint, zero_poses
@@ -51,9 +52,7 @@ class Choices:
     position: tuple[float, ...]
     actuated: tuple[str, ...] | None
     contacts: Sequence[str | Contact] | None
-    friction: float | None
-    law: str
-    rim_points: int
+    touching: ContactChoices
     gravity: tuple[float, ...]
     collisions: str | None
     joint_friction: bool
@@ -82,7 +81,7 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
         checks.one_of("load_urdf(neutral=...): joint", name, known)
     if not any(joint.nv for joint in joints):
         raise UrdfError(f"load_urdf: {choices.file}: no joint is free to move")
-    found = find_contacts(places, coms, choices.contacts, (choices.friction, choices.law, choices.rim_points), notes)
+    found = find_contacts(places, coms, choices.contacts, choices.touching, notes)
     neutral: dict[str, ArrayLike] = {j.name: _neutral(robot, choices, j.name) for j in joints if j.nv == 1}
     neutral |= {j.name: choices.neutral[j.name] for j in joints if j.nv > 1 and j.name in choices.neutral}
     mech = UrdfMechanism(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
+from sim.io.contact_choices import contact_choices
 from sim.io.meshes.hull import CORNERS
 from sim.io.urdf.assemble import Choices, assemble
 from sim.io.urdf.collision_meshes import mesh_choices, with_shapes
@@ -17,7 +18,7 @@ from sim.io.urdf.robot import Robot, read_robot
 from sim.io.urdf.xml import parse
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
-from sim.mechanism.parts import LAWS, Contact
+from sim.mechanism.parts import Contact
 
 MIMIC = ("auto", "free", "locked", "gear")
 
@@ -113,9 +114,7 @@ def load_urdf(
         position=checks.vector("load_urdf(position=...)", position, 3),
         actuated=None if actuated is None else tuple(actuated),
         contacts=(contacts if ground else ()),
-        friction=None if friction is None else checks.number("load_urdf(friction=...)", friction, at_least=0.0),
-        law=checks.one_of("load_urdf(law=...)", law, LAWS),
-        rim_points=whole_number("load_urdf(rim_points=...)", rim_points, 3),
+        touching=contact_choices("load_urdf", friction, law, rim_points),
         gravity=checks.vector("load_urdf(gravity=...)", gravity, 3),
         collisions=None if collisions is None else checks.one_of("load_urdf(collisions=...)", collisions, ("self",)),
         joint_friction=joint_friction,
