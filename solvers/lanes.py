@@ -39,6 +39,7 @@ __all__ = [
     "six",
     "spread",
     "store",
+    "total",
     "whole",
     "zeros",
 ]
@@ -116,6 +117,17 @@ def _keep(typing: Any, bits: Any, x: Any) -> Any:
 
 
 @intrinsic
+def _total(typing: Any, x: Any) -> Any:
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        lanes = [builder.extract_element(args[0], ir.Constant(ir.IntType(32), k)) for k in range(LANES)]
+        while len(lanes) > 1:
+            lanes = [builder.fadd(a, b) for a, b in zip(lanes[::2], lanes[1::2], strict=True)]
+        return lanes[0]
+
+    return types.float64(_LANES), lower
+
+
+@intrinsic
 def _spread_number(typing: Any, number: Any) -> Any:
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return _spread(builder, args[0])
@@ -144,6 +156,11 @@ def spread(number: float) -> Lanes:
     return np.full(LANES, number)
 
 
+def total(x: Lanes) -> float:
+    """The sum of the lanes, in pairs."""
+    return float(x.reshape(-1, 2).sum(axis=1).reshape(-1, 2).sum(axis=1).sum())
+
+
 @overload(load, strict=False)
 def _compiled_load(A: Any, i: Any, j: Any) -> Any:
     return lambda A, i, j: _load(A, i, j)
@@ -162,6 +179,11 @@ def _compiled_keep(bits: Any, x: Any) -> Any:
 @overload(spread, strict=False)
 def _compiled_spread(number: Any) -> Any:
     return lambda number: _spread_number(number)
+
+
+@overload(total, strict=False)
+def _compiled_total(x: Any) -> Any:
+    return lambda x: _total(x)
 
 
 def _operator(function: Any, instruction: str) -> None:

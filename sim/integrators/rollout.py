@@ -26,6 +26,7 @@ from sim.model.pace import DEADLINE, is_due, start_pace
 from sim.step import step
 from solvers.compiler import Table, kernel, parallel_kernel, prange, seconds
 from solvers.dense import clear, copy_vector
+from solvers.lanes import LANES, load, spread, total
 from solvers.status import Status
 from solvers.types import Cube, Integers, Matrix, Vector
 
@@ -90,6 +91,25 @@ def is_finite(row: Vector) -> bool:
     for k in range(row.shape[0]):
         total += 0.0 * row[k]
     return total == 0.0
+
+
+@kernel
+def is_finite_matrix(M: Matrix) -> bool:
+    """Whether all numbers of a matrix, C order, are: here it is in the cache of the processor, later no more.
+
+    The last lanes of a row may repeat some before.
+    """
+    n = M.shape[1]
+    if n < LANES:
+        for i in range(M.shape[0]):
+            if not is_finite(M[i]):
+                return False
+        return True
+    found = spread(0.0)
+    for i in range(M.shape[0]):
+        for k in range(0, n, LANES):
+            found = found + 0.0 * load(M, i, min(k, n - LANES))
+    return total(found) == 0.0
 
 
 @kernel
@@ -211,6 +231,9 @@ def linearize(
             report[5] = max(report[5], ACCURACY * data.contact_hard[0])
             if s > 0:
                 _chain(data, A, B)
+            if not (is_finite_matrix(A) and is_finite_matrix(B)):
+                report[0] = _NOT_FINITE
+                break
             if is_due(data, report[1] + A.shape[0]):
                 return t * substeps + s + 1
     return knots[2] * substeps

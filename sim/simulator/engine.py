@@ -390,8 +390,7 @@ class Engine:
                 rollout.linearize_knots(model, works, settings, substeps, line, done)
                 if np.array_equal(done, ends[1:]):
                     break
-        if np.count_nonzero(reports[:, 0]) or refuse(reports, n, A, B) < n:
-            reports[~(finite_rows(A) & finite_rows(B)) & (reports[:, 0] == Status.SOLVED), 0] = Status.NOT_FINITE
+        if np.count_nonzero(reports[:, 0]):
             unsolved = reports[:, 0] != Status.SOLVED
             for array in (A, B, x_next):
                 array[unsolved] = 0.0

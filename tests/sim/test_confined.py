@@ -10,9 +10,11 @@ import pytest
 from naive import rotation as rot
 
 import dojo_opt as dojo
+from sim.integrators.rollout import is_finite_matrix
 from sim.mechanism.confined import IDLE, SUNK
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.engine import REPORT, refuse
+from solvers.compiler import local_kernel
 from support.scenes import random_state
 
 SUNKEN = dojo.Status.CONTACT_SUNK
@@ -237,6 +239,18 @@ def test_a_number_that_is_not_finite_is_seen() -> None:
             rows[1, 2, 0] = wrong
             assert refuse(reports, count, rows) == 1
             assert list(np.flatnonzero(reports[:, 0] == dojo.Status.NOT_FINITE)) == [1]
+
+
+def test_a_matrix_that_is_not_finite_is_seen(rng: np.random.Generator) -> None:
+    """In any place, whatever its size; large numbers are numbers."""
+    seen = local_kernel(lambda M: is_finite_matrix(M))
+    for shape in [(m, n) for m in (0, 1, 5) for n in (0, 1, 7, 8, 9, 36)]:
+        M = rng.normal(size=shape) * 1e300
+        assert seen(M) and is_finite_matrix(M)
+        for place in range(M.size):
+            spoilt = M.copy()
+            spoilt.flat[place] = (np.nan, np.inf, -np.inf)[place % 3]
+            assert not seen(spoilt), (shape, place)
 
 
 def test_a_mechanism_spoilt_afterwards_gets_a_status() -> None:
