@@ -98,7 +98,7 @@ def touching(a: Solid, b: Solid, gap: float, kappa: float = 1e-4, restitution: f
     n = np.array([0.0, 0.0, 1.0]) if fixed else np.array([0.6, -0.48, 0.64])
     turns = [turned(0.5 * rng.normal(size=3)) for _ in bodies]
     v = np.concatenate([np.r_[-sign * n, rng.normal(size=3)] for sign in (1.0, -1.0)])[: 6 * len(bodies)]
-    still = Simulator(mech, time_step=0.01, kappa=1e-12)
+    still = Simulator(mech, time_step=0.01, kappa=1e-12, divide=False)
 
     def state(distance: float, velocity: Floats) -> Floats:
         ends = (distance * n, np.zeros(3))

@@ -20,10 +20,14 @@ GOOD = 1e-8
 ONE_SIDED = ("spring", "damper", "armature", "friction", "contact_radius", "restitution")  # not below zero
 
 
-def error(case: Case, kind: str) -> float:
-    """Largest error of the derivative along the direction, relative to its size."""
+def error(case: Case, *kinds: str) -> float:
+    """Largest error of the derivative along a direction of all parameters of these kinds, relative to its size.
+
+    Several kinds have one formula for their directions.
+    """
     sim, x, u = case
-    names = [name for name in sim.parameters().names if kind_of(name) == kind]
+    kind = kinds[0]
+    names = [name for name in sim.parameters().names if kind_of(name) in kinds]
     values = sim.parameters(names).values
     direction = _direction(kind, values, sim.time_step)
     blocks = sim.linearize(x, u, wrt=names)
