@@ -199,13 +199,13 @@ HOSTILE = "</title></script><script>hit('{}')</script><img src=x onerror=\"hit('
 NAMES = ["constructor", "__proto__", "<object>", "a/b", "//", "$\\frac{", *(HOSTILE.format(*3 * [k]) for k in "mbjco")]
 
 
-def hostile(names):
-    """A mechanism with all its names from these."""
-    m, b, j, c, o = names
-    ball = dojo.Body(b, 1.0, shape=dojo.Sphere(0.1))
-    wall = dojo.Collision(b, shape_b=dojo.Box(0.2, 1.0, 1.0, center=(1, 0, 0)), name=o)
-    contact = dojo.Contact(b, radius=0.1, name=c)
-    return dojo.Mechanism([ball], [dojo.Joint("floating", None, b, j)], [contact], name=m, collisions=[wall])
+def hostile(name, names):
+    """A mechanism with this name; every part with each of the others, which a part shares with its neighbours."""
+    balls = [dojo.Body(n, 1.0, shape=dojo.Sphere(0.1)) for n in names]
+    joints = [dojo.Joint("floating", None, n, n) for n in names]
+    walls = [dojo.Collision(n, shape_b=dojo.Box(0.2, 1.0, 1.0, center=(1, 0, 0)), name=n) for n in names]
+    contacts = [dojo.Contact(n, radius=0.1, name=n) for n in names]
+    return dojo.Mechanism(balls, joints, contacts, name=name, collisions=walls)
 
 
 def opened(page, path):
@@ -223,17 +223,18 @@ def opened(page, path):
     return wrong + page.evaluate("window.hits")
 
 
-@pytest.mark.parametrize("names", [[name] * 5 for name in NAMES[:6]] + [NAMES[6:]], ids=[*map(str, range(6)), "html"])
-def test_names_of_a_user_are_text_in_the_page(page, tmp_path, names):
-    sim = dojo.Simulator(hostile(names), time_step=0.01)
+@pytest.mark.parametrize("name", ["<object>", NAMES[-1]], ids=["object", "html"])
+def test_names_of_a_user_are_text_in_the_page(page, tmp_path, name):
+    sim = dojo.Simulator(hostile(name, NAMES[:-1]), time_step=0.01)
     x = sim.neutral()
-    x[2] = 1.0
+    x[2 : sim.nq : 7] = 1.0 + np.arange(len(NAMES) - 1)
     motion_of = sim.rollout(x, np.zeros((3, sim.nu)))
     path = dojo.viewer.save_html(motion_of, tmp_path / "a.html")
     assert opened(page, path) == []
-    assert page.title() == " ".join(names[0].split())
-    assert page.locator("#bar b").inner_text() == names[0]
-    assert page.evaluate("Object.keys(viewer.scene_tree.find(['meshcat', 'bodies']).children).length") == 1
+    assert page.title() == " ".join(name.split())
+    assert page.locator("#bar b").inner_text() == name
+    bodies = "Object.keys(viewer.scene_tree.find(['meshcat', 'bodies']).children).length"
+    assert page.evaluate(bodies) == len(NAMES) - 1
     dojo.plots.trajectory(motion_of).savefig(tmp_path / "a.png")
 
 

@@ -10,7 +10,7 @@ import pytest
 import dojo_opt as dojo
 from support.urdf_files import inertial, joint, link, write
 
-LINKS, FEWER = 4000, 1000
+LINKS, FEWER = 2000, 500
 LINEAR = LINKS / FEWER
 
 
@@ -30,7 +30,7 @@ def loaded(folder: Path, links: int, above) -> tuple[float, dojo.Mechanism, dojo
 def test_the_time_of_loading_grows_as_the_number_of_links(tmp_path: Path, above) -> None:
     few, _, _ = loaded(tmp_path, FEWER, above)
     many, mech, sim = loaded(tmp_path, LINKS, above)
-    assert many < 2.0 * LINEAR * few  # more than three times LINEAR when every joint was looked up in a list
+    assert many < 2.0 * LINEAR * few  # 2.5 times LINEAR or more when every joint was looked up in a list
     assert (sim.nbody, sim.nv) == (LINKS, LINKS + 5)
     ends = [mech.v_slice(name).stop for name in mech.joint_names]
     assert ends == list(range(6, LINKS + 6))
