@@ -19,6 +19,7 @@ import pytest
 
 from solvers.compiler import targets
 from solvers.compiler.shipped import SUFFIX, Shipped, write_shipped
+from support.fork_server import forked
 from support.programs import HOME, PACKAGES, python
 
 TARGET = (targets.runnable() or ("none",))[0]
@@ -58,6 +59,7 @@ from pathlib import Path
 from solvers.compiler.cache import ship
 ship(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3])
 """
+CALL_ONE = CALL.replace("total(np.ones(3))", "3.0 * one(1.0)")  # the loop over threads takes longest to compile
 NUMBERS = [4.0, 12.0]
 HEAD = 17 + 32 + 8  # bytes before the index: a magic text, its digest and its length
 
@@ -80,12 +82,13 @@ class Package:
         head = data[: HEAD - 40] + hashlib.sha256(text).digest() + len(text).to_bytes(8, "little")
         self.file.write_bytes(head + text + data[HEAD + int.from_bytes(data[HEAD - 8 : HEAD], "little") :])
 
-    def call(self, **environment: str) -> tuple[list[float], int, str, list[str]]:
+    def call(self, program: str = CALL, **environment: str) -> tuple[list[float], int, str, list[str]]:
         """(results, functions compiled, why shipped code is not used, warnings) with an empty cache."""
         cache = self.root / "cache"
         shutil.rmtree(cache, ignore_errors=True)
+        run = forked if all(name.startswith("DOJO_OPT_") for name in environment) else python
         given = {"NUMBA_CACHE_DIR": str(cache), **environment}
-        numbers, count, why, told = json.loads(python(CALL, home=self.root, **given))
+        numbers, count, why, told = json.loads(run(program, home=self.root, **given))
         return numbers, count, why, told
 
     def compiles(self, **environment: str) -> tuple[str, list[str]]:
@@ -194,7 +197,7 @@ DAMAGE: dict[str, Callable[[Path], object]] = {
 @pytest.mark.parametrize("kind", DAMAGE)
 def test_a_damaged_file_is_not_used(package: Package, kind: str) -> None:
     DAMAGE[kind](package.file)
-    numbers, count, why, told = package.call()
+    numbers, count, why, told = package.call(CALL if kind == "cut" else CALL_ONE)  # the loop is the last entry
     assert numbers == NUMBERS and count > 0
     assert why or told
 
