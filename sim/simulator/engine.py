@@ -436,7 +436,7 @@ class Engine:
             raise Interrupted((xs, status.astype(np.int64), knots)) from None
         return xs, status.astype(np.int64), knots
 
-    def far(self) -> NDArray[np.bool_]:
+    def inactive(self) -> NDArray[np.bool_]:
         """Whether each contact was inactive in the last step of this thread, (ncontact,)."""
         out = np.ones(self.sizes.ncontact, dtype=bool)
         data = self.last()

@@ -161,9 +161,9 @@ class PhasedEngine(KnotEngine):
             A, B, *_ = self.linearize(m.xs[:-1], us, 1, kappa, None, wrenches)
         return Rolled(m.knot, m.xs, m.reports, m.contacts, A, B, Division.none(len(us)))
 
-    def far(self) -> NDArray[np.bool_]:
-        """As Engine.far; all of them where the step was of higher order."""
-        return self._second.far() if self._last.near else np.ones(self.sizes.ncontact, dtype=bool)
+    def inactive(self) -> NDArray[np.bool_]:
+        """As Engine.inactive; all of them where the step was of higher order."""
+        return self._second.inactive() if self._last.near else np.ones(self.sizes.ncontact, dtype=bool)
 
     def linearize_knot(
         self, x: Vector, given: tuple[Floats, Cube], kappa: float | None

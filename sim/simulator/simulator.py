@@ -359,7 +359,7 @@ class Simulator(RowStepping):
             SimulationError: the step is not solved.
         """
         self.step(x, u, throw=True)
-        return tuple(name for name, far in zip(self.mechanism.contact_names, self._engine.far(), strict=True) if far)
+        return tuple(self.mechanism.contact_names[c] for c in np.flatnonzero(self._engine.inactive()))
 
     def horizon(self, knots: int, substeps: int = 1, limits: tuple[ArrayLike, ArrayLike] | None = None) -> Horizon:
         """Rollouts and derivatives of many trajectories of one length, for a planner: see horizon.py.
