@@ -332,8 +332,8 @@ class AdaptiveEngine(KnotEngine):
                 out[i] = self.part(path.starts[k], held, rest - begin, int(path.orders[k]))
         return out
 
-    def far(self) -> NDArray[np.bool_]:
-        """As Engine.far: contacts that carried nothing in the last step of this thread."""
+    def inactive(self) -> NDArray[np.bool_]:
+        """As Engine.inactive: contacts that carried nothing in the last step of this thread."""
         carried: Floats = self._kept.contacts
         return np.asarray(np.linalg.norm(carried[:, :3], axis=1) <= self.settings.tolerance)
 

@@ -143,7 +143,7 @@ def refuse(reports: Floats, count: int, *arrays: Floats) -> int:
 
 
 def interrupted(reports: Floats, knot: int) -> Floats:
-    """The reports (T, 5), with that of the step `knot`, if there is one, saying that it was not tried."""
+    """The reports (T, 6), with that of the step `knot`, if there is one, saying that it was not tried."""
     reports[knot : knot + 1, :REPORT] = Status.INTERRUPTED, 0.0, 0.0, 0.0, -1.0, 0.0
     return reports
 
@@ -436,7 +436,7 @@ class Engine:
             raise Interrupted((xs, status.astype(np.int64), knots)) from None
         return xs, status.astype(np.int64), knots
 
-    def far(self) -> NDArray[np.bool_]:
+    def inactive(self) -> NDArray[np.bool_]:
         """Whether each contact was inactive in the last step of this thread, (ncontact,)."""
         out = np.ones(self.sizes.ncontact, dtype=bool)
         data = self.last()

@@ -23,6 +23,7 @@ from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.dividing_engine import DividingEngine
 from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted
+from sim.simulator.high_order_engine import HighOrderEngine
 from sim.simulator.knot_engine import KnotEngine
 from sim.simulator.link import link_smooth, link_step
 from sim.simulator.results import Interrupted
@@ -161,9 +162,9 @@ class PhasedEngine(KnotEngine):
             A, B, *_ = self.linearize(m.xs[:-1], us, 1, kappa, None, wrenches)
         return Rolled(m.knot, m.xs, m.reports, m.contacts, A, B, Division.none(len(us)))
 
-    def far(self) -> NDArray[np.bool_]:
-        """As Engine.far; all of them where the step was of higher order."""
-        return self._second.far() if self._last.near else np.ones(self.sizes.ncontact, dtype=bool)
+    def inactive(self) -> NDArray[np.bool_]:
+        """As Engine.inactive; all of them where the step was of higher order."""
+        return self._second.inactive() if self._last.near else np.ones(self.sizes.ncontact, dtype=bool)
 
     def linearize_knot(
         self, x: Vector, given: tuple[Floats, Cube], kappa: float | None
@@ -187,7 +188,7 @@ class PhasedEngine(KnotEngine):
         """(d(next state)/d(state), by the input, report) of step s; given: input, external wrenches (1, nbody, 6)."""
         u, external = given
         if not m.near[s]:
-            A, B, _, report = super().linearize(m.xs[s : s + 1], u[None], 1, kappa, None, external)
+            A, B, _, report = HighOrderEngine.linearize(self, m.xs[s : s + 1], u[None], 1, kappa, None, external)
             return A[0], B[0], report[0]
         A, B, x_next, report = self._second.linearize(m.means[s : s + 1], u[None], 1, kappa, None, external)
         after = self._node_slopes(x_next[0])

@@ -359,7 +359,7 @@ class Simulator(RowStepping):
             SimulationError: the step is not solved.
         """
         self.step(x, u, throw=True)
-        return tuple(name for name, far in zip(self.mechanism.contact_names, self._engine.far(), strict=True) if far)
+        return tuple(self.mechanism.contact_names[c] for c in np.flatnonzero(self._engine.inactive()))
 
     def horizon(self, knots: int, substeps: int = 1, limits: tuple[ArrayLike, ArrayLike] | None = None) -> Horizon:
         """Rollouts and derivatives of many trajectories of one length, for a planner: see horizon.py.
@@ -422,10 +422,9 @@ class Simulator(RowStepping):
             rolled, J = self._by_parameters.roll(state, us[None], selected[1:], level, external)
             (A,), (B,), x_next, report = rolled.A, rolled.B, rolled.xs[1], rolled.reports[0]
             blocks = {"state": A, "input": B} | {name: J[0][:, rows] for name, rows in selected[1].rows.items()}
-        status, detail = STATUSES[int(report[0])], ""
-        if status != Status.SOLVED:
-            detail = sentence(self.mechanism, call, report, self.tolerance)
-        elif selected is not None:
+        status = STATUSES[int(report[0])]
+        detail = "" if status == Status.SOLVED else sentence(self.mechanism, call, report, self.tolerance)
+        if selected is not None and status == Status.SOLVED:
             blocks = {name: blocks[name] for name in selected[0]}
         return ended(Jacobian(blocks, x_next, status, float(report[5]), detail, wrt is not None), throw)
 

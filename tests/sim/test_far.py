@@ -23,7 +23,7 @@ EXACT = 1e-13
 
 def far(sim):
     """Number of contacts that the last step of this thread omitted from the interior-point problem."""
-    return int(sim._engine.far().sum())
+    return int(sim._engine.inactive().sum())
 
 
 def pair(mech, time_step=0.02, kappa=1e-6):
