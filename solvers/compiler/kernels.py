@@ -13,7 +13,7 @@ from numba import types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.errors import NumbaError as CompilationError
 from numba.core.event import trigger_event
-from numba.core.registry import CPUDispatcher
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.serialize import custom_reduce
 from numba.core.sigutils import normalize_signature
 from numba.core.types.misc import unliteral
@@ -29,6 +29,7 @@ __all__ = [
     "compiled_signatures",
     "inlined",
     "inner_kernel",
+    "is_kept",
     "kernel",
     "local_kernel",
     "reduced",
@@ -178,6 +179,11 @@ def entry(func: Callable[..., Any], signature: tuple[Any, ...]) -> Any:
     form = registered(cached(_Form(func, EntryCompiler, no_cpython_wrapper=True)))
     form.compile(signature)
     return form.overloads[signature]
+
+
+def is_kept(func: Callable[..., Any], signature: tuple[Any, ...]) -> bool:
+    """Whether an `entry` for these types was shipped, or is on disk."""
+    return KernelCache(func, "entry").holds(signature, cpu_target.target_context.codegen())
 
 
 def local_kernel(func: F) -> F:
