@@ -10,6 +10,7 @@ import pytest
 sys.path.append(str(Path(__file__).parent.parent))  # benchmarks; at the end, so that an installed dojo_opt is tested
 # threads of a worker that wait do not take the cores from the other workers: half the processor time of batches
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+os.environ.setdefault("DOJO_OPT_JOBS", "1")  # workers of pytest-xdist share the cores already
 os.environ["PYTHONSAFEPATH"] = "1"  # nor do processes that tests start import the folder they run in: it has no kernels
 
 

@@ -19,13 +19,13 @@ from typing import NamedTuple
 
 from dojo_opt.prebuild.tasks import run
 from solvers.compiler import compiled
+from solvers.compiler.helper import end_with
 from solvers.compiler.targets import build_environment
 
 __all__ = ["BuildError", "Done", "compile_tasks", "work"]
 
 _ROOT = str(Path(__file__).resolve().parents[2])
 _ANSWER = "done"
-_LOOK = 0.5  # [s] between two looks for the process that started a worker
 
 
 class BuildError(RuntimeError):
@@ -42,7 +42,7 @@ class Done(NamedTuple):
 
 def work() -> int:
     """Carry out tasks, named line by line at the standard input, until it ends."""
-    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+    threading.Thread(target=end_with, args=(os.getppid(),), daemon=True).start()
     for line in sys.stdin:
         begin, before = time.perf_counter(), len(compiled())
         run(line.strip())
@@ -50,18 +50,12 @@ def work() -> int:
     return 0
 
 
-def _end_with(parent: int) -> None:
-    """End this process, in the middle of a task, when the one that started it is gone. Files are written atomically."""
-    while os.getppid() == parent:
-        time.sleep(_LOOK)
-    os._exit(1)
-
-
 def _environment(target: str, cache: Path) -> dict[str, str]:
     """Of a worker: Numba's variables, and no code but its own."""
     inherited = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "DOJO_OPT_"))}
     path = os.pathsep.join([_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
     own = {"PYTHONPATH": path, "NUMBA_CACHE_DIR": str(cache), "DOJO_OPT_SHIPPED": "0", "OPENBLAS_NUM_THREADS": "1"}
+    own["DOJO_OPT_JOBS"] = "1"  # a worker has no helper
     return {**inherited, **own, **build_environment(target)}
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from sim.simulator.link import link_gradient, link_nodes, link_poses, link_step
 from sim.simulator.results import Interrupted, SimulationError
 from sim.simulator.settings import Settings
 from sim.solve import start_velocity
-from solvers.compiler import Table
+from solvers.compiler import Table, link
 from solvers.status import MESSAGES, Status
 from solvers.types import Cube, Integers, Vector
 
@@ -211,11 +211,18 @@ class Engine:
 
     def linked(self, *needs: Callable[[Model], None]) -> Table:
         """Table of the Model, with the optional kernels linked that a call needs."""
-        for link in needs:
-            if link not in self._linked:
-                link(self.model)
-                self._linked.add(link)
+        new = [need for need in needs if need not in self._linked]
+        if new:
+            kernels: Any = []  # of all needs at once, so that two processes can compile them
+            for need in new:
+                need(self.model._replace(optional=kernels))
+            link(self.model.optional, *kernels)
+            self._linked.update(new)
         return self._model
+
+    def prepare(self) -> None:
+        """Link what rollouts and their derivatives need, at once: two processes can then compile it."""
+        self.linked(link_step, link_gradient)
 
     def tables(self, *needs: Callable[[Model], None]) -> tuple[Table, Table]:
         """Tables of the Model, linked for derivatives and further needs of a call, and of this thread's first Data."""

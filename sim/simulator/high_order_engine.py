@@ -43,6 +43,10 @@ class HighOrderEngine(Engine):
         scratch = (*(np.zeros(nv) for _ in range(3)), *(np.zeros((s, nv)) for _ in range(2)))
         return runge_kutta.Scheme(a, b, free_roots(self.model), *scratch)
 
+    def prepare(self) -> None:
+        """Link what rollouts and their derivatives need."""
+        self.linked(link_smooth)
+
     def _tables(self) -> tuple[Integers, Integers, Vector]:
         """Tables of the Model and of this thread's first Data, and settings."""
         return self.linked(link_smooth), self._scratch.table(), self.settings.array()

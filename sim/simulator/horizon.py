@@ -49,6 +49,7 @@ class Horizon:
         self, engine: Engine, arguments: Arguments, knots: int, substeps: int, limits: tuple[Floats, Floats]
     ) -> None:
         self._engine, self._arguments, self._substeps, self._limits = engine, arguments, substeps, limits
+        engine.prepare()
         self._k = np.zeros((knots, engine.nu))
         self._K = np.zeros((knots, engine.nu, engine.ndx))
         self._gaps = np.zeros((knots + 1, engine.ndx))

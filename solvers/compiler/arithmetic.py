@@ -1,8 +1,8 @@
 """Operators of two numbers of one type in kernels: their types, and LLVM's instructions.
 
 Numba asks NumPy's and half a dozen other libraries' rules for the type of every `+`, and looks through as many
-implementations. Kernels do not ask. Nothing is registered with Numba: other functions of the process are compiled as
-ever.
+implementations. Kernels do not ask, and ask about any other function once per process. Nothing is registered with
+Numba: other functions of the process are compiled as ever.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 from numba import types
 from numba.core.typing import Context
-from numba.core.typing.templates import signature
+from numba.core.typing.templates import Signature, signature
 
 __all__ = ["ARITHMETIC", "KernelTyping"]
 
@@ -37,9 +37,12 @@ def _arithmetic() -> dict[Any, Callable[..., Any]]:
 
 ARITHMETIC = _arithmetic()
 
+# Numba asks all of these rules anew in every function that it compiles, for most of the same few hundred calls
+_CALLS: dict[tuple[types.Type, tuple[types.Type, ...]], Signature] = {}
+
 
 class KernelTyping(Context):
-    """Numba's typing context, with a short cut to the types of these operators.
+    """Numba's typing context, with a short cut to the types of these operators and of calls that it has met.
 
     It shares all that the other knows, and equals it: implementations of functions are kept by context.
     """
@@ -58,10 +61,18 @@ class KernelTyping(Context):
 
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
         """The signature of a call."""
-        if isinstance(func, types.Function) and len(args) == 2 and not kws:
+        if not isinstance(func, types.Function) or kws:
+            return super().resolve_function_type(func, args, kws)
+        if len(args) == 2:
             left, right = map(types.unliteral, args)
             op = func.typing_key
             if left is right and (op, left) in ARITHMETIC:
                 func._impl_keys.setdefault((left, left), op)  # where lowering looks for calls of operator.add(x, y)
                 return signature(types.boolean if op in _COMPARED else left, left, left)
-        return super().resolve_function_type(func, args, kws)
+        call = func, tuple(args)
+        found = _CALLS.get(call)
+        if found is None:
+            found = super().resolve_function_type(func, args, kws)
+            if found is not None and all(kind.is_precise() for kind in args):
+                _CALLS[call] = found
+        return found

@@ -153,6 +153,10 @@ class Store:
         """Those of all files, apart from drafts."""
         return sorted(path.name for path in self.folder.glob("*.nbc")) if self.folder else []
 
+    def holds(self, name: str) -> bool:
+        """Whether anything is stored under this name."""
+        return self.folder is not None and (self.folder / name).exists()
+
     def read(self, name: str) -> bytes:
         """The contents stored under this name.  OSError, ValueError: missing or damaged."""
         if self.folder is None:
@@ -315,6 +319,12 @@ class KernelCache(FunctionCache):
             pass
         STORE.drop(name)
         return None
+
+    def holds(self, sig: Any, codegen: Any) -> bool:
+        """Whether there is a file for this signature, of use or not."""
+        if len(shipped()) and self._key(sig, _Named(codegen, str(shipped().target)))[1] in shipped():
+            return True
+        return STORE.holds(self._key(sig, codegen)[1])
 
     def _load_shipped(self, sig: Any, target_context: Any) -> Any:
         """The compile result that was shipped; None where there is none."""

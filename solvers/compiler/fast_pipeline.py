@@ -14,10 +14,13 @@ from contextlib import contextmanager
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core import typed_passes, untyped_passes
+from numba.core import transforms, typed_passes, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
-from numba.core.compiler_machinery import PassManager
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.ir_utils import build_definitions
+from numba.core.rewrites import rewrite_registry
+from numba.core.ssa import reconstruct_ssa
 
 from solvers.compiler.arithmetic import KernelTyping
 from solvers.compiler.lowering import KernelLowering
@@ -105,6 +108,82 @@ _IDLE = (  # features that kernels do not use: closures, array expressions, lite
 )
 
 
+def _tidy(func_ir: Any) -> None:
+    """Order the blocks. After each of the four passes below, Numba also computes where every variable lives, which only
+    generators, lifted loops and Python's objects need: a twentieth of a cold start.
+    """
+    func_ir.blocks = transforms.canonicalize_cfg(func_ir.blocks)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Processing(untyped_passes.IRProcessing):
+    """Numba's pass, without lifetimes."""
+
+    _name = "kernel_ir_processing"
+
+    def run_pass(self, state: Any) -> bool:
+        """Order the blocks."""
+        _tidy(state.func_ir)
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Rewrites(untyped_passes.GenericRewrites):
+    """Numba's pass, without lifetimes."""
+
+    _name = "kernel_rewrites"
+
+    def run_pass(self, state: Any) -> bool:
+        """Apply each rewrite to each block until it matches no more."""
+        blocks = state.func_ir.blocks
+        for make in rewrite_registry.rewrites["before-inference"]:
+            rewrite, left = make(state), list(blocks.items())
+            while left:
+                key, block = left.pop()
+                if rewrite.match(state.func_ir, block, state.typemap, state.calltypes):
+                    blocks[key] = rewrite.apply()
+                    blocks[key].verify()
+                    left.append((key, blocks[key]))
+        _tidy(state.func_ir)
+        return True
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _SingleAssignment(untyped_passes.ReconstructSSA):
+    """Numba's pass, without lifetimes."""
+
+    _name = "kernel_ssa"
+
+    def run_pass(self, state: Any) -> bool:
+        """Give every assignment a variable of its own."""
+        state.func_ir = reconstruct_ssa(state.func_ir)
+        self._patch_locals(state)
+        state.func_ir._definitions = build_definitions(state.func_ir.blocks)
+        _tidy(state.func_ir)
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _StripPhis(typed_passes.PreLowerStripPhis):
+    """Numba's pass, without lifetimes."""
+
+    _name = "kernel_strip_phis"
+
+    def run_pass(self, state: Any) -> bool:
+        """Replace phi nodes by assignments in the blocks before."""
+        state.func_ir = self._strip_phi_nodes(state.func_ir)
+        state.func_ir._definitions = build_definitions(state.func_ir.blocks)
+        _tidy(state.func_ir)
+        return True
+
+
+_REPLACED = {
+    untyped_passes.IRProcessing: _Processing,
+    untyped_passes.GenericRewrites: _Rewrites,
+    untyped_passes.ReconstructSSA: _SingleAssignment,
+    typed_passes.PreLowerStripPhis: _StripPhis,
+    typed_passes.NativeLowering: KernelLowering,
+}
 _SELDOM = (50_000, 20, 100)  # thresholds of the garbage collector
 
 
@@ -134,12 +213,7 @@ class _Compiler(Compiler):
         """Which passes, in which order."""
         (default,) = super().define_pipelines()
         chosen = PassManager(default.pipeline_name)
-        lowering = typed_passes.NativeLowering
-        chosen.passes = [
-            (KernelLowering, said) if kind is lowering else (kind, said)
-            for kind, said in default.passes
-            if kind not in _IDLE
-        ]
+        chosen.passes = [(_REPLACED.get(kind, kind), said) for kind, said in default.passes if kind not in _IDLE]
         chosen.finalize()
         return [chosen]
 

@@ -10,9 +10,12 @@ from typing import Any, TypeVar, cast
 
 import numba
 from numba import types
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.errors import NumbaError as CompilationError
-from numba.core.registry import CPUDispatcher
+from numba.core.event import trigger_event
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.serialize import custom_reduce
+from numba.core.sigutils import normalize_signature
 from numba.core.types.misc import unliteral
 
 from solvers.compiler.cache import INNER, STORE, KernelCache, cache_folder, prepare, shipped
@@ -26,6 +29,7 @@ __all__ = [
     "compiled_signatures",
     "inlined",
     "inner_kernel",
+    "is_kept",
     "kernel",
     "local_kernel",
     "reduced",
@@ -61,12 +65,33 @@ class _Form(CPUDispatcher):
         """
         if not isinstance(self._cache, KernelCache):
             prepare()
-        compiled = super().compile(sig)
+        compiled = self._compiled(sig)
         for found in () if self.targetoptions.get("no_cpython_wrapper") else self.overloads.values():
             if not _is_plain(kind := found.signature.return_type):
                 name = self.py_func.__qualname__
                 raise TypeError(f"kernel {name}: expected to return numbers and plain tuples to Python, got {kind}")
         return compiled
+
+    def _compiled(self, sig: Any) -> Any:
+        """Numba's `compile` without its clocks: one per function that waits for its callees, each of which is told of
+        every call of LLVM.
+        """
+        with global_compiler_lock, self._compiling_counter:
+            args, result = normalize_signature(sig)
+            if tuple(args) in self.overloads:
+                return self.overloads[tuple(args)].entry_point
+            code = self._cache.load_overload(sig, self.targetctx)
+            if code is not None:
+                self._cache_hits[sig] += 1
+                self.targetctx.insert_user_function(code.entry_point, code.fndesc, [code.library])
+                self.add_overload(code)
+                return code.entry_point
+            self._cache_misses[sig] += 1
+            with trigger_event("numba:compile", data={"dispatcher": self, "args": args, "return_type": result}):
+                code = self._compiler.compile(args, result)
+                self.add_overload(code)
+            self._cache.save_overload(sig, code)
+            return code.entry_point
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """How kernels see it: a constant argument is a number like any other, not a reason to compile anew."""
@@ -154,6 +179,11 @@ def entry(func: Callable[..., Any], signature: tuple[Any, ...]) -> Any:
     form = registered(cached(_Form(func, EntryCompiler, no_cpython_wrapper=True)))
     form.compile(signature)
     return form.overloads[signature]
+
+
+def is_kept(func: Callable[..., Any], signature: tuple[Any, ...]) -> bool:
+    """Whether an `entry` for these types was shipped, or is on disk."""
+    return KernelCache(func, "entry").holds(signature, cpu_target.target_context.codegen())
 
 
 def local_kernel(func: F) -> F:

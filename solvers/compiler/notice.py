@@ -91,12 +91,11 @@ def because(reason: str) -> None:
     _CLOCK.reason = f": {reason}"
 
 
-def parts(items: Iterable[T]) -> Iterator[T]:
+def parts(items: Iterable[T], count: int) -> Iterator[T]:
     """The items, as parts of a task that may compile each of them."""
-    every = list(items)
     try:
-        for k, item in enumerate(every):
-            _CLOCK.part = f", part {k + 1} of {len(every)}" if len(every) > 1 else ""
+        for k, item in enumerate(items):
+            _CLOCK.part = f", part {k + 1} of {count}" if count > 1 else ""
             yield item
     finally:
         _CLOCK.part = ""

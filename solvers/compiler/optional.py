@@ -20,6 +20,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Callable, Iterable
+from contextlib import closing
 from functools import cached_property
 from types import GenericAlias
 from typing import Any, TypeVar, cast
@@ -33,7 +34,8 @@ from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from solvers.compiler.kernels import entry
+from solvers.compiler.helper import divided
+from solvers.compiler.kernels import entry, is_kept
 from solvers.compiler.notice import parts
 from solvers.compiler.records import RECORDS, load_word
 
@@ -113,6 +115,10 @@ class OptionalKernel:
         *arguments, result = (type_of(text, self.func.__globals__) for text in self.func.__annotations__.values())
         return result(*arguments)
 
+    def at_hand(self) -> bool:
+        """Whether it is loaded, or can be."""
+        return self.compiled or is_kept(self.func, self.signature().args)
+
     def address(self) -> int:
         """Where the compiled kernel is, in this process; uncompiled, its number, from 1."""
         if numba.config.DISABLE_JIT:
@@ -170,15 +176,23 @@ def optional_kernels() -> list[OptionalKernel]:
     return list(_EVERY)
 
 
-def link(table: NDArray[np.int64], *kernels: Callable[..., Any]) -> None:
+def link(table: NDArray[np.int64] | list[Callable[..., Any]], *kernels: Callable[..., Any]) -> None:
     """Write the addresses of optional kernels into their slots; compile them, or load them, the first time.
 
     Args:
-        table: (slots,) addresses; overwritten in place.
+        table: (slots,) addresses; overwritten in place. A list collects the kernels instead: those of one call divide
+            the work of compilation among two processes (helper.py).
         kernels: functions decorated by `optional`.
     """
-    for kernel in parts(kernels):
-        found = cast(OptionalKernel, kernel)
+    if isinstance(table, list):
+        table += kernels
+        return
+    every = cast("list[OptionalKernel]", list(dict.fromkeys(kernels)))
+    left = [] if numba.config.DISABLE_JIT else [kernel for kernel in every if not kernel.compiled]
+    with closing(divided(left)) as queue:
+        for found in parts(queue, len(left)):
+            found.address()
+    for found in every:
         table[found.slot] = found.address()
 
 

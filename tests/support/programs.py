@@ -18,7 +18,7 @@ def python(program: str, *, cwd: Path | None = None, home: Path = HOME, **enviro
     path = os.pathsep.join([str(home)] if cwd is None else [str(cwd), str(home)])
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", program],
-        env={**os.environ, "PYTHONPATH": path, "PYTHONSAFEPATH": "1", **environment},
+        env={**os.environ, "PYTHONPATH": path, "PYTHONSAFEPATH": "1", "DOJO_OPT_JOBS": "1", **environment},
         cwd=cwd,
         capture_output=True,
         text=True,

@@ -37,7 +37,11 @@ def new_process(feature: str, *, cold: bool) -> dict[str, Any]:
     """
     with tempfile.TemporaryDirectory() if cold else nullcontext(None) as folder:
         path = os.pathsep.join(filter(None, sys.path))  # of the checkout, too
-        cache = {"NUMBA_CACHE_DIR": folder, "DOJO_OPT_CACHE": "1", "DOJO_OPT_SHIPPED": "0"} if folder else {}
+        cache = (
+            {"NUMBA_CACHE_DIR": folder, "DOJO_OPT_CACHE": "1", "DOJO_OPT_SHIPPED": "0", "DOJO_OPT_JOBS": "1"}
+            if folder
+            else {}
+        )
         environment = {**os.environ, "PYTHONPATH": path, **cache}
         command = [sys.executable, "-c", _PROGRAM, feature, *HEAVY]
         done = subprocess.run(command, env=environment, capture_output=True, text=True)
