@@ -14,6 +14,7 @@ from sim.dynamics.elimination import factor_of
 from sim.dynamics.elimination_panel import solve_panel
 from sim.dynamics.external_forces import input_wrench
 from sim.dynamics.joints.limits import add_limit_derivatives
+from sim.dynamics.joints.servo_gradient import add_drive_derivatives, add_drive_inputs
 from sim.dynamics.joints.terms import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.dynamics.kinematics import velocity_columns
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling_panel
@@ -52,8 +53,10 @@ def gradient(model: Model, data: Data, h: float, kappa: float, q: Vector, v: Vec
     if not factor_coupling(model, data):
         return False
     add_spring_derivatives(model, data, h, q, v)
+    add_drive_derivatives(model, data, h)
     _joint_columns(model, data, h, v)
     _input_columns(model, data, h)
+    add_drive_inputs(model, data, h)
     solve_panel(model, data)
     solve_coupling_panel(model, data)
     _next_state(model, data, h, A, B)

@@ -14,7 +14,7 @@ from sim.mechanism.pack_clusters import pack_clusters
 from sim.mechanism.pack_collisions import pack_collisions
 from sim.mechanism.parts import WORLD, Contact, Joint
 from sim.mechanism.seen_inertia import seen_inertias
-from sim.mechanism.servos import with_servos
+from sim.mechanism.servos import is_limited, limited_servos, with_servos
 from sim.mechanism.shapes import rotation_matrix
 from sim.mechanism.terrain import Terrain
 from sim.model.layout import Sizes, allocate_model
@@ -46,7 +46,7 @@ def mechanism_sizes(mech: Mechanism) -> Sizes:
         ngear=len(mech.gears),
         nterrain=len(fields),
         nheight=sum(f.coefficients.size for f in fields),
-        ndry=sum(int(np.count_nonzero(j.friction)) for j in mech.joints),
+        ndry=sum(int(np.count_nonzero(j.friction)) for j in mech.joints) + len(limited_servos(mech.inputs or ())),
     )
 
 
@@ -56,7 +56,7 @@ def pack(mech: Mechanism) -> Model:
     _pack_tree(mech, model)
     _pack_joints(with_servos(mech.joints, mech.inputs or ()), model)
     model.dof_seen[:] = seen_inertias(model)
-    _pack_dry(mech.joints, model)
+    _pack_dry(mech, model)
     _pack_branches(model)
     _pack_terrain(mech, model)
     _pack_contacts(mech, model)
@@ -138,11 +138,18 @@ def _pack_joints(joints: Sequence[Joint], model: Model) -> None:
             limit += 1
 
 
-def _pack_dry(joints: Sequence[Joint], model: Model) -> None:
-    """Degrees of freedom with dry friction."""
-    forces = np.concatenate([np.asarray(joint.friction, dtype=np.float64) for joint in joints])
-    model.dry_dof[:] = np.flatnonzero(forces)
-    model.dry_force[:] = forces[forces > 0.0]
+def _pack_dry(mech: Mechanism, model: Model) -> None:
+    """Degrees of freedom with dry friction, then servos whose force has limits."""
+    forces = np.concatenate([np.asarray(joint.friction, dtype=np.float64) for joint in mech.joints])
+    count = int(np.count_nonzero(forces))
+    model.dry_dof[:count], model.dry_input[:count] = np.flatnonzero(forces), -1
+    model.dry_force[:count] = forces[forces > 0.0]
+    joints = _numbers(mech.joint_names)
+    for k, (j, part) in enumerate(limited_servos(mech.inputs or ()), start=count):
+        low, high = part.force_limits
+        model.dry_dof[k], model.dry_input[k] = model.body_vadr[joints[part.joint or ""]] + part.dof, j
+        model.dry_force[k], model.dry_middle[k] = 0.5 * (high - low), 0.5 * (high + low)
+        model.dry_gain[k] = part.gain, part.stiffness, part.damping
 
 
 def _bounds(joint: Joint) -> list[tuple[int, float, float]]:
@@ -232,7 +239,7 @@ def _pack_inputs(mech: Mechanism, model: Model) -> None:
         if part.joint is not None:
             model.input_kind[k] = InputKind.JOINT
             model.input_index[k] = model.body_vadr[joints[part.joint]] + part.dof
-            model.input_wrench[k, 0] = part.gain
+            model.input_wrench[k, 0] = 0.0 if is_limited(part) else part.gain  # else _pack_dry has it
         else:
             model.input_kind[k] = InputKind.WORLD if part.frame == "world" else InputKind.BODY
             model.input_index[k] = bodies[part.body or ""]

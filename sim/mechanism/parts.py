@@ -305,8 +305,9 @@ class Input:
         Input("wheel", servo="velocity", damping=5)                 u is the rate it turns at [rad/s]
 
     A servo makes the force kp (u - q) - kd v, or kd (u - v). Springs and dampers of a step are implicit, so are those
-    of a servo: it is stable for every gain. It counts as a spring at rest at zero in energies, and does not know a
-    largest force.
+    of a servo: it is stable for every gain. It counts as a spring at rest at zero in energies. With `force_limits` its
+    force stays between them, as exactly as contacts hold, and counts as a drive's in energies; its damper is then of
+    first order in the time step.
 
     Attributes:
         joint: name of the joint (default None: the input acts on a body).
@@ -324,6 +325,7 @@ class Input:
         servo: "position" or "velocity": the input is what its joint is driven to (default None: a force or torque).
         stiffness: kp of a position servo [N/m, N m/rad] (default 0).
         damping: kd of a servo [N s/m, N m s/rad] (default 0).
+        force_limits: (lo, hi) of the force of a servo, both finite [N, N m] (default inf: it has none).
 
     Raises:
         ValueError: for both a joint and a body or neither, a servo without its gain, or a value out of range.
@@ -341,6 +343,7 @@ class Input:
     servo: str | None = None
     stiffness: float = 0.0
     damping: float = 0.0
+    force_limits: tuple[float, float] = (-np.inf, np.inf)
 
     def __post_init__(self) -> None:
         if (self.joint is None) == (self.body is None):
@@ -373,7 +376,13 @@ def check_servo(call: str, part: Input) -> None:
     for field in ("stiffness", "damping"):
         value = checks.number(f"{call}, {field}=...)", getattr(part, field), at_least=0.0)
         object.__setattr__(part, field, value)
+    limits = bounds(f"{call}, force_limits=...)", part.force_limits)
+    object.__setattr__(part, "force_limits", limits)
+    if np.isfinite(limits[0]) != np.isfinite(limits[1]):
+        raise ValueError(f"{call}, force_limits=...): expected two finite numbers, got {part.force_limits!r}")
     if part.servo is None:
+        if np.isfinite(limits[0]):
+            raise ValueError(f"{call}, force_limits=...): they are those of a servo; a force has limits=...")
         if part.stiffness or part.damping:
             raise ValueError(f'{call}): stiffness and damping are those of a servo; give servo="position", too')
         return

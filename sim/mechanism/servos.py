@@ -13,11 +13,28 @@ from sim.mechanism.parts import Input, Joint
 if TYPE_CHECKING:
     from sim.mechanism.mechanism import Mechanism
 
-__all__ = ["passive", "with_servos"]
+__all__ = ["is_limited", "limited_servos", "passive", "with_servos"]
+
+
+def is_limited(part: Input) -> bool:
+    """Whether an input is a servo whose force has limits."""
+    return bool(np.all(np.isfinite(part.force_limits)))
+
+
+def limited_servos(inputs: Iterable[Input]) -> list[tuple[int, Input]]:
+    """The servos whose force has limits, with their numbers among the inputs: springs and dampers of joints have none.
+
+    Args:
+        inputs: the inputs.
+
+    Returns:
+        (number, input) of each.
+    """
+    return [(k, part) for k, part in enumerate(inputs) if is_limited(part)]
 
 
 def with_servos(joints: Sequence[Joint], inputs: Iterable[Input]) -> tuple[Joint, ...]:
-    """The joints with the springs and dampers of the servos that drive them.
+    """The joints with the springs and dampers of the servos that drive them, but for those with limits of their force.
 
     A servo's spring is at rest at zero, where its force for a target of zero is zero: two springs on one coordinate are
     one, at rest between them.
@@ -31,7 +48,7 @@ def with_servos(joints: Sequence[Joint], inputs: Iterable[Input]) -> tuple[Joint
     """
     by_joint: dict[str, list[Input]] = {}
     for part in inputs:
-        if part.joint is not None and part.servo is not None:
+        if part.joint is not None and part.servo is not None and not is_limited(part):
             by_joint.setdefault(part.joint, []).append(part)
     return tuple(_driven(joint, by_joint[joint.name]) if joint.name in by_joint else joint for joint in joints)
 
@@ -59,14 +76,16 @@ def passive(mech: Mechanism) -> Mechanism:
 
     Returns:
         A mechanism that moves in the same way under u times the gains of the servos; `mech` itself without a servo.
+        Servos with limits of their force stay what they are.
     """
     inputs = mech.inputs or ()
     if all(part.servo is None for part in inputs):
         return mech
-    plain = [replace(p, servo=None, stiffness=0.0, damping=0.0, limits=_force_limits(p)) for p in inputs]
+    plain = [p if is_limited(p) else _as_force(p) for p in inputs]
     return replace(mech, joints=with_servos(mech.joints, inputs), inputs=plain)
 
 
-def _force_limits(part: Input) -> tuple[float, float]:
-    """Limits of the force u times the gain."""
-    return part.gain * part.limits[0], part.gain * part.limits[1]
+def _as_force(part: Input) -> Input:
+    """The input as a force, with the limits of the force u times the gain."""
+    limits = (part.gain * part.limits[0], part.gain * part.limits[1])
+    return replace(part, servo=None, stiffness=0.0, damping=0.0, limits=limits)

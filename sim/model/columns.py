@@ -24,12 +24,28 @@ class Kin(IntEnum):
 
 
 class Dry(IntEnum):
-    """dry, dry_step and dry_trial: variables of the dry friction of a joint."""
+    """dry, dry_step and dry_trial: variables of the dry friction of a joint, or of a servo with limits of its force."""
 
     FORWARD = 0  # motion forward
     LEFT_FORWARD = 1  # F + lambda
     BACKWARD = 2
     LEFT_BACKWARD = 3  # F - lambda
+
+
+class Drive(IntEnum):
+    """dry_drive: the servo of an element in this step (joints/limited_servo.py), zero of dry friction."""
+
+    REST = 0  # r
+    COMPLIANCE = 1  # e
+    MEAN = 2  # M
+
+
+class Gain(IntEnum):
+    """dry_gain: those of a servo with limits of its force."""
+
+    INPUT = 0  # force per unit of its input
+    STIFFNESS = 1
+    DAMPING = 2
 
 
 class PairFrame(IntEnum):

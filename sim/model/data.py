@@ -157,6 +157,7 @@ class Data(NamedTuple):
     dry: Matrix  # (ndry, 4) Dry
     dry_trial: Matrix  # (ndry, 4)
     dry_move: Matrix  # (ndry, 2) motion h v25, bound of the impulse
+    dry_drive: Matrix  # (ndry, 3) Drive
     dry_w: Matrix  # (ndry, 3) constant parts of the steps of the impulse and of the motions
     bound_row: Matrix  # (nlimit, 6) of a cone: torque per unit of impulse, and d(gap)/d(v25); by rotation
     bound_gap: Vector  # (nlimit,)

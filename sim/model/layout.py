@@ -36,7 +36,7 @@ MODEL_INTS = _shapes(
     contact_terrain nground, contact_hold nground, terrain_size nterrain 3,
     pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
     loop_ntrans nloop, loop_nrot nloop, gear_dof ngear 2,
-    limit_dof nlimit, limit_cone nlimit, dry_dof ndry, input_kind nu, input_index nu
+    limit_dof nlimit, limit_cone nlimit, dry_dof ndry, dry_input ndry, input_kind nu, input_index nu
     """
 )
 
@@ -49,7 +49,8 @@ MODEL_FLOATS = _shapes(
     contact_frame nground 9, terrain_place nterrain 8, terrain_heights nheight, terrain_rates nheight,
     contact_height nground, cluster nground 8, pair_sizes npair 8, pair_place 2npair 12, pair_far npair 7,
     body_reach nbody, hull nhull 4, loop_point nloop 6, loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9,
-    gear_ratio ngear, gear_offset ngear, limit_sign nlimit, limit_bound nlimit, dry_force ndry,
+    gear_ratio ngear, gear_offset ngear, limit_sign nlimit, limit_bound nlimit, dry_force ndry, dry_middle ndry,
+    dry_gain ndry 3,
     input_wrench nu 6, gravity 3
     """
 )
@@ -86,7 +87,7 @@ DATA_FLOATS = CARRY_FLOATS | _shapes(
     contact_kin ncontact 27, contact_frame nground 9,
     contact_turn nground 18, bounce ncontact 22, bounce_share 1,
     contact_W ncontact 9, contact_hard 1, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
-     bound_trial nlimit 2, dry ndry 4, dry_trial ndry 4, dry_move ndry 2, dry_w ndry 3,
+     bound_trial nlimit 2, dry ndry 4, dry_trial ndry 4, dry_move ndry 2, dry_w ndry 3, dry_drive ndry 3,
     bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
     shape_pos 2npair 3, shape_rot 2npair 9, pair_relative npair 12, pair_out npair 43,
     pair_frame npair 12, pair_trial 1 43,
@@ -129,7 +130,7 @@ class Sizes(NamedTuple):
     ngear: int = 0
     nterrain: int = 0  # height fields: one per terrain and radius of its contacts
     nheight: int = 0  # their coefficients
-    ndry: int = 0  # degrees of freedom with dry friction
+    ndry: int = 0  # dry friction of degrees of freedom, and servos with limits of their force
 
 
 def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:

@@ -70,7 +70,8 @@ class Model(NamedTuple):
     loop_nrot: Integers  # (nloop,) free rotations
     gear_dof: IntegerMatrix  # (ngear, 2) the degree of freedom that follows, and the one that leads
     limit_dof: Integers  # (nlimit,) a scalar degree of freedom; of a cone, the first of its three rotations
-    dry_dof: Integers  # (ndry,) degrees of freedom with dry friction
+    dry_dof: Integers  # (ndry,) degrees of freedom with dry friction, or with a servo that has limits of its force
+    dry_input: Integers  # (ndry,) the input of the servo, -1 of dry friction
     limit_cone: Integers  # (nlimit,) 1 where the angle between the axes of parent and child is limited
     input_kind: Integers  # (nu,) InputKind
     input_index: Integers  # (nu,) degree of freedom, or body
@@ -112,7 +113,9 @@ class Model(NamedTuple):
     gear_ratio: Vector  # (ngear,)
     gear_offset: Vector  # (ngear,) [m, rad]
     limit_sign: Vector  # (nlimit,) +1 for a lower, -1 for an upper bound
-    dry_force: Vector  # (ndry,) its largest force [N, N m]
+    dry_force: Vector  # (ndry,) its largest force, or half the range of a servo's [N, N m]
+    dry_middle: Vector  # (ndry,) middle of that range [N, N m]
+    dry_gain: Matrix  # (ndry, 3) Gain
     limit_bound: Vector  # (nlimit,) [m, rad]; of a cone, its half angle
     input_wrench: Matrix  # (nu, 6) force and torque per unit of a WORLD or BODY input; gain of a JOINT input, first
     gravity: Vector  # (3,) [m/s^2]

@@ -189,3 +189,7 @@ class Slot(IntEnum):
     DRY_PRODUCTS_AHEAD = 156
     DRY_BOUNDARY = 157
     ADD_DRY_TIME_STEP = 158
+    # servos whose force has limits
+    APPLY_FRICTION = 159
+    ADD_DRIVE_DERIVATIVES = 160
+    ADD_DRIVE_INPUTS = 161

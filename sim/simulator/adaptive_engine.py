@@ -28,6 +28,7 @@ from sim.integrators.runge_kutta import Scheme
 from sim.integrators.stretch import Clock, Embedded, Stretch
 from sim.integrators.tableau import embedded
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.servos import limited_servos
 from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, refuse
@@ -361,9 +362,10 @@ def check_adaptive(mechanism: Mechanism, accuracy: float) -> None:
         )
     names = [("loop joint", j.name) for j in mechanism.loops] + [("gear", g.name) for g in mechanism.gears]
     names += [("dry friction of", j.name) for j in mechanism.joints if np.any(j.friction)]
+    names += [("limited servo", part.name) for _, part in limited_servos(mechanism.inputs or ())]
     if names:
         what, name = names[0]
         raise ValueError(
             f"Simulator(accuracy=...): {mechanism.name!r} has the {what} {name!r}; steps of a given accuracy are for "
-            "trees without dry friction: use a time step"
+            "trees without dry friction and limits of servos: use a time step"
         )

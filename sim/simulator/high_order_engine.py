@@ -14,6 +14,7 @@ from sim.integrators.rollout import Linearized, MotionBuffers
 from sim.integrators.tableau import stable, tableau
 from sim.integrators.tangents import Tangents
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.servos import limited_servos
 from sim.model.model import InputKind, Model
 from sim.model.pace import pieces
 from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, follow, interrupted
@@ -252,12 +253,14 @@ def check(mechanism: Mechanism, settings: Settings) -> None:
     """Refuse mechanisms that only steps of order 2 can move."""
     collisions = [c.name for c in mechanism.collisions]
     loops, gears = [j.name for j in mechanism.loops], [g.name for g in mechanism.gears]
-    dry = [j.name for j in mechanism.joints if np.any(j.friction)]
-    for what, names in (("collision", collisions), ("loop joint", loops), ("gear", gears), ("dry friction of", dry)):
+    parts = [("collision", collisions), ("loop joint", loops), ("gear", gears)]
+    parts.append(("dry friction of", [j.name for j in mechanism.joints if np.any(j.friction)]))
+    parts.append(("limited servo", [part.name for _, part in limited_servos(mechanism.inputs or ())]))
+    for what, names in parts:
         if names:
             more = f" and {len(names) - 1} more" if len(names) > 1 else ""
             raise ValueError(
                 f"Simulator(order={settings.order}): {mechanism.name!r} has the {what} {names[0]!r}{more}; steps of "
-                f"higher order are for trees without collisions of their bodies and without dry friction: use order=2, "
-                f"or leave them out"
+                "higher order are for trees without collisions of their bodies, dry friction and limits of servos: use "
+                "order=2, or leave them out"
             )

@@ -69,6 +69,7 @@ from sim.dynamics.joints.dry_friction import (
     add_dry_blocks,
     add_dry_time_step,
     apply_dry,
+    apply_friction,
     dry_boundary,
     dry_constants,
     dry_error,
@@ -85,6 +86,7 @@ from sim.dynamics.joints.dry_friction import (
     start_dry,
 )
 from sim.dynamics.joints.limits import add_limit_derivatives
+from sim.dynamics.joints.servo_gradient import add_drive_derivatives, add_drive_inputs
 from sim.dynamics.joints.swing import swing_curvature, swing_pose, swing_turn
 from sim.dynamics.loops.branch_motion import (
     is_farther,
@@ -143,6 +145,7 @@ _CONTACTS = (
 _DRY = (
     add_dry_blocks,
     apply_dry,
+    apply_friction,
     dry_boundary,
     dry_constants,
     dry_error,
@@ -315,6 +318,8 @@ def link_gradient(model: Model) -> None:
         link(model.optional, add_slip_jacobians)
     if len(model.limit_dof):
         link(model.optional, add_limit_derivatives)
+    if np.any(model.dry_input >= 0):
+        link(model.optional, add_drive_derivatives, add_drive_inputs)
     if np.any(model.limit_cone):
         link(model.optional, cone_derivative)
     if np.any(model.joint_nrot == 2):

@@ -43,7 +43,7 @@ from sim.dynamics.energy import (
     spatial_inertia,
 )
 from sim.dynamics.joints.damper import damper_impulse, node_damping
-from sim.dynamics.joints.dry_friction import apply_dry
+from sim.dynamics.joints.dry_friction import apply_friction
 from sim.dynamics.joints.terms import add_limit_impulse
 from sim.dynamics.loops.loop_work import loop_slack
 from sim.dynamics.mass import eliminate_mass, mass_velocities
@@ -165,7 +165,7 @@ def work_at_node(model: Model, data: Data, h: float, v: Vector, u: Vector) -> tu
         f[d] += damper_impulse(model, h, d, data.nu[d], v[d])
     for k in range(model.limit_dof.shape[0]):
         add_limit_impulse(model, data, k, -data.bound[k, Bound.IMPULSE], f)
-    apply_dry(model, data, f)
+    apply_friction(model, data, f)
     for d in range(v.shape[0]):
         part = 0.5 * f[d] * (v[d] + data.nu[d])
         total, size = total + part, size + abs(part)

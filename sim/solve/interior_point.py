@@ -227,7 +227,7 @@ def interior_point(
     begin_pairs(model, data, options)
     choose_active(model, data, options)
     find_impacts(model, data, options.h)
-    fit_dry(model, data, options.h)
+    fit_dry(model, data, options.h, q, v, u)
     while True:
         out = solve_active(model, data, options, (q, v, u), guess, out)
         if has_activated(model, data):

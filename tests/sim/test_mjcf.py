@@ -177,7 +177,8 @@ def test_joints_in_a_row_with_references_springs_and_a_ball() -> None:
 
 
 SERVOS = """<mujoco><worldbody><body><joint name="j" axis="0 1 0"/><geom size="0.1"/></body></worldbody><actuator>
-  <position joint="j" gear="2" kp="10" kv="0.5" ctrlrange="-1 2" ctrllimited="true"/><velocity joint="j" kv="3"/>
+  <position joint="j" gear="2" kp="10" kv="0.5" ctrlrange="-1 2" ctrllimited="true"
+   forcerange="-1 3" forcelimited="true"/><velocity joint="j" kv="3"/>
   <general joint="j" gear="3" gainprm="4" biastype="affine" biasprm="0 -4 -1"/>
   <general name="other" joint="j" gainprm="4" biastype="affine" biasprm="0 -5 -1"/></actuator></mujoco>"""
 
@@ -188,12 +189,16 @@ def test_actuators_that_are_servos_are_read_as_servos() -> None:
         mech = load_mjcf(SERVOS)
     assert [part.servo for part in mech.inputs] == ["position", "velocity", "position", None]
     np.testing.assert_allclose(mech.inputs[0].limits, (-0.5, 1.0))
+    assert mech.inputs[0].force_limits == (-2.0, 6.0)
     model = mujoco.MjModel.from_xml_string(SERVOS)
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:], data.ctrl[:] = 0.3, -0.7, (0.4, 0.5, -0.6, 0.0)
     mujoco.mj_forward(model, data)
     u = mech.report.gear * data.ctrl
-    forces = [p.gain * x - p.stiffness * 0.3 + p.damping * 0.7 for p, x in zip(mech.inputs[:3], u, strict=False)]
+    parts = mech.inputs[:3]
+    forces = [p.gain * x - p.stiffness * 0.3 + p.damping * 0.7 for p, x in zip(parts, u, strict=False)]
+    forces = [np.clip(force, *p.force_limits) for p, force in zip(parts, forces, strict=True)]
+    assert forces[0] == -2.0
     np.testing.assert_allclose(forces, data.actuator_force[:3] * model.actuator_gear[:3, 0], atol=1e-12)
 
 

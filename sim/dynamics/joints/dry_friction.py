@@ -6,12 +6,17 @@ f and b are the motion forward and backward in the step. As kappa -> 0 a joint t
 that rests by any impulse below it: a cone of one dimension whose radius is given. Power is never gained, lambda nu < 0.
 The variables of a joint are f, F + lambda, b and F - lambda (columns Dry); lambda and b, f are eliminated for nu:
 
-    d lambda = w - (h/c) d nu,    c = f/(F + lambda) + b/(F - lambda)
+    d lambda = w - (h/c) d nu,    c = f/(F + lambda) + b/(F - lambda) + e
+
+A servo whose force has limits is the same element, with a spring in series: T = M + lambda, between h times its limits
+M - F and M + F, and f - b = h nu - r + e T with the compliance e and rest r of joints/limited_servo.py; dry friction
+has M = e = r = 0.
 """
 
 from __future__ import annotations
 
-from sim.model.columns import Dry
+from sim.dynamics.joints.limited_servo import begin_drive, drive_by_time_step
+from sim.model.columns import Drive, Dry
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import NewtonTarget
@@ -26,15 +31,16 @@ _HELD = 0.01  # least share of its bound by which an impulse that is kept stays 
 
 @kernel
 def dry_impulse(data: Data, k: int) -> float:
-    """lambda of element k."""
-    return 0.5 * (data.dry[k, Dry.LEFT_FORWARD] - data.dry[k, Dry.LEFT_BACKWARD])
+    """lambda of element k, or T of a servo."""
+    return data.dry_drive[k, Drive.MEAN] + 0.5 * (data.dry[k, Dry.LEFT_FORWARD] - data.dry[k, Dry.LEFT_BACKWARD])
 
 
 @kernel
 def dry_compliance(data: Data, k: int) -> float:
     """c of element k, -d(h nu)/d(lambda)."""
     z = data.dry[k]
-    return z[Dry.FORWARD] / z[Dry.LEFT_FORWARD] + z[Dry.BACKWARD] / z[Dry.LEFT_BACKWARD]
+    own = data.dry_drive[k, Drive.COMPLIANCE]
+    return z[Dry.FORWARD] / z[Dry.LEFT_FORWARD] + z[Dry.BACKWARD] / z[Dry.LEFT_BACKWARD] + own
 
 
 @kernel
@@ -53,18 +59,56 @@ def onto_dry_path(z: Vector, x: float, bound: float, kappa: float) -> None:
     z[Dry.BACKWARD] = kappa / z[Dry.LEFT_BACKWARD]
 
 
+@kernel
+def onto_servo_path(z: Vector, x: float, e: float, bound: float, kappa: float) -> None:
+    """z = the point of the central path of a servo at f - b = x + e lambda, lambda between -bound and bound.
+
+    The difference of both sides falls with lambda, from infinity to minus infinity: Newton's method, or the middle.
+    """
+    low, high = -bound, bound
+    y = min(max(-x / e, -0.999 * bound), 0.999 * bound)
+    for _ in range(100):
+        p, r = bound + y, bound - y
+        g = kappa / p - kappa / r - x - e * y
+        if g > 0.0:
+            low = y
+        else:
+            high = y
+        step = g / (kappa / (p * p) + kappa / (r * r) + e)
+        y = y + step if low < y + step < high else 0.5 * (low + high)
+        if abs(step) <= 1e-14 * min(p, r):
+            break
+    p, r = max(bound + y, 1e-15 * bound), max(bound - y, 1e-15 * bound)
+    z[Dry.LEFT_FORWARD], z[Dry.LEFT_BACKWARD] = p, r
+    z[Dry.FORWARD], z[Dry.BACKWARD] = kappa / p, kappa / r
+
+
+@kernel
+def _onto_path(data: Data, k: int, kappa: float) -> None:
+    """Element k on the central path of kappa, at the present motion."""
+    x, bound, own = data.dry_move[k, 0], data.dry_move[k, 1], data.dry_drive[k]
+    if own[Drive.COMPLIANCE] > 0.0:
+        x += own[Drive.COMPLIANCE] * own[Drive.MEAN]
+        onto_servo_path(data.dry[k], x, own[Drive.COMPLIANCE], bound, kappa)
+    else:
+        onto_dry_path(data.dry[k], x, bound, kappa)
+
+
 @optional(Slot.DRY_KINEMATICS)
 def dry_kinematics(model: Model, data: Data, h: float) -> None:
     """The motion h nu and the bound h f of every element."""
     for k in range(model.dry_dof.shape[0]):
-        data.dry_move[k, 0] = h * data.nu[model.dry_dof[k]]
+        data.dry_move[k, 0] = h * data.nu[model.dry_dof[k]] - data.dry_drive[k, Drive.REST]
         data.dry_move[k, 1] = h * model.dry_force[k]
 
 
 @optional(Slot.FIT_DRY)
-def fit_dry(model: Model, data: Data, h: float) -> None:
-    """The variables of the last step, which may have had another length, with the sum 2 F, and the same products."""
+def fit_dry(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vector) -> None:
+    """The variables of the last step, which may have had another length, with the sum 2 F, and the same products; and
+    the drives of servos in this step.
+    """
     for k in range(model.dry_dof.shape[0]):
+        begin_drive(model, data, h, k, q, v, u)
         z = data.dry[k]
         total = z[Dry.LEFT_FORWARD] + z[Dry.LEFT_BACKWARD]
         if total > 0.0:
@@ -79,7 +123,7 @@ def fit_dry(model: Model, data: Data, h: float) -> None:
 def start_dry(model: Model, data: Data, kappa: float) -> None:
     """All elements on the central path of kappa, at the present motion."""
     for k in range(model.dry_dof.shape[0]):
-        onto_dry_path(data.dry[k], data.dry_move[k, 0], data.dry_move[k, 1], kappa)
+        _onto_path(data, k, kappa)
 
 
 @optional(Slot.RESUME_DRY)
@@ -92,8 +136,8 @@ def resume_dry(model: Model, data: Data, kappa: float, predicted: bool) -> None:
         x, bound = data.dry_move[k, 0], data.dry_move[k, 1]
         z = data.dry[k]
         left = z[Dry.LEFT_FORWARD] if predicted else data.dry_trial[k, Dry.LEFT_FORWARD]
-        if bound * abs(x) > kappa or not left > 0.0:
-            onto_dry_path(z, x, bound, kappa)
+        if bound * abs(x) > kappa or not left > 0.0 or data.dry_drive[k, Drive.COMPLIANCE] > 0.0:
+            _onto_path(data, k, kappa)
             continue
         left = min(max(left, _HELD * bound), (2.0 - _HELD) * bound)
         z[Dry.LEFT_FORWARD], z[Dry.LEFT_BACKWARD] = left, 2.0 * bound - left
@@ -108,16 +152,24 @@ def return_dry(model: Model, data: Data, kappa: float) -> None:
         for j in range(4):
             left = left or data.dry[k, j] <= _LEFT * data.dry_trial[k, j]
         if left:
-            onto_dry_path(data.dry[k], data.dry_move[k, 0], data.dry_move[k, 1], kappa)
+            _onto_path(data, k, kappa)
 
 
 @optional(Slot.DRY_ERROR, default=0.0)
 def dry_error(model: Model, data: Data) -> float:
-    """Largest |f - b - h nu|."""
+    """Largest |f - b - h nu|, of a servo |f - b - h nu + r - e T|."""
     r = 0.0
     for k in range(model.dry_dof.shape[0]):
-        r = max(r, abs(data.dry[k, Dry.FORWARD] - data.dry[k, Dry.BACKWARD] - data.dry_move[k, 0]))
+        r = max(r, abs(_gap(data, k)))
     return r
+
+
+@kernel
+def _gap(data: Data, k: int) -> float:
+    """f - b - h nu + r - e T of element k."""
+    z = data.dry[k]
+    own = data.dry_drive[k, Drive.COMPLIANCE] * dry_impulse(data, k)
+    return z[Dry.FORWARD] - z[Dry.BACKWARD] - data.dry_move[k, 0] - own
 
 
 @optional(Slot.DRY_LOAD, default=0.0)
@@ -157,8 +209,7 @@ def dry_constants(model: Model, data: Data, target: NewtonTarget) -> None:
             a, p = z[2 * side], z[2 * side + 1]
             r = target.kappa - a * p - target.corrected * step[2 * side] * step[2 * side + 1]
             parts[1 + side] = r / p
-        e = z[Dry.FORWARD] - z[Dry.BACKWARD] - data.dry_move[k, 0]
-        parts[0] = (parts[1] - parts[2] + target.share * e) / dry_compliance(data, k)
+        parts[0] = (parts[1] - parts[2] + target.share * _gap(data, k)) / dry_compliance(data, k)
         data.dnu[model.dry_dof[k]] += parts[0]
 
 
@@ -223,9 +274,23 @@ def dry_boundary(model: Model, data: Data) -> float:
 
 
 @optional(Slot.ADD_DRY_TIME_STEP)
-def add_dry_time_step(model: Model, data: Data, w: float, col: int) -> None:
-    """columns += w d lambda/dh where h nu stays:  dF = f dh,  c d lambda = (b/(F - lambda) - f/(F + lambda)) dF."""
+def add_dry_time_step(model: Model, data: Data, h: float, v: Vector, w: float, col: int) -> None:
+    """columns += w d lambda/dh where h nu and h v stay, F and M in proportion to h:
+
+    c d lambda = b/(F - lambda) d(M + F) + f/(F + lambda) d(M - F) + the change of the drive
+    """
     for k in range(model.dry_dof.shape[0]):
         z = data.dry[k]
-        slope = z[Dry.BACKWARD] / z[Dry.LEFT_BACKWARD] - z[Dry.FORWARD] / z[Dry.LEFT_FORWARD]
-        data.columns[model.dry_dof[k], col] += w * slope / dry_compliance(data, k) * model.dry_force[k]
+        force, middle = model.dry_force[k], model.dry_middle[k]
+        change = z[Dry.BACKWARD] / z[Dry.LEFT_BACKWARD] * (middle + force)
+        change += z[Dry.FORWARD] / z[Dry.LEFT_FORWARD] * (middle - force)
+        change += drive_by_time_step(model, data, h, k, v, dry_impulse(data, k))
+        data.columns[model.dry_dof[k], col] += w * change / dry_compliance(data, k)
+
+
+@optional(Slot.APPLY_FRICTION)
+def apply_friction(model: Model, data: Data, out: Vector) -> None:
+    """out -= lambda of dry friction, without servos, whose work is that of drives.   out: (nv,)."""
+    for k in range(model.dry_dof.shape[0]):
+        if model.dry_input[k] < 0:
+            out[model.dry_dof[k]] -= dry_impulse(data, k)

@@ -40,10 +40,11 @@ def find_inputs(
         if servo is not None:
             part, ratio = replace(servo, joint=homes[j][0], dof=homes[j][1], name=name), 1.0 / model.actuator_gear[a, 0]
             low, high = _ctrl_bounds(model, a, ratio)
+            if model.actuator_forcelimited[a]:
+                ends = sorted(float(x * model.actuator_gear[a, 0]) for x in model.actuator_forcerange[a])
+                part = replace(part, force_limits=(ends[0], ends[1]))
             inputs.append(replace(part, limits=(low, high)) if low < high else part)
             rows.append((ratio, low, high))
-            if model.actuator_forcelimited[a]:
-                notes.add("force ranges of servos are not held", [name], warn=True)
             continue
         plain = model.actuator_gaintype[a] == _FIXED_GAIN and model.actuator_biastype[a] == _NO_BIAS
         if not plain or model.actuator_dyntype[a] != _NO_DYNAMICS:
