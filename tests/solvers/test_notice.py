@@ -63,7 +63,7 @@ def test_compiling_for_longer_than_a_second_is_announced(clock: list[float], ter
 
 
 def test_parts_of_a_task_are_counted(clock: list[float], terminal: io.StringIO) -> None:
-    for _ in notice.parts("abc"):
+    for _ in notice.parts("abc", 3):
         compile_for(clock, 0.7)
     assert "part 2 of 3)" in terminal.getvalue()
     before = len(terminal.getvalue())
