@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from dojo_opt.learn import environment
 
 gymnasium = pytest.importorskip("gymnasium")
 pytest.importorskip("mujoco")
@@ -33,11 +32,15 @@ def test_people_watch_in_the_browser(monkeypatch):
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)
     env = gymnasium.make("dojo_opt.learn:dojo/Pendulum-v0", render_mode="human")
+    now = [100.0]  # [s] of a clock that runs while the program sleeps, and 10 ms per action
+    monkeypatch.setattr(environment, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(environment, "sleep", lambda seconds: now.append(now.pop() + seconds))
     env.reset(seed=0)
-    began = time.perf_counter()
+    assert now == [100.0]
     for _ in range(3):
+        now[0] += 0.01
         env.step(np.zeros(1, dtype=np.float32))
-    assert time.perf_counter() - began > 2 * 0.05  # [s] of an action
+    assert now == pytest.approx([100.0 + 3 * 0.05])  # [s] of an action
     view = env.unwrapped.view
     assert opened == [view.url]
     env.close()

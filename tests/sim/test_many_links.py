@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from support.urdf_files import inertial, joint, link, write
 
 LINKS, FEWER = 2000, 500
 LINEAR = LINKS / FEWER
+TRIES = 4  # a slow loader fails in each of them, a busy machine does not
 
 
 def loaded(folder: Path, links: int, above) -> tuple[float, dojo.Mechanism, dojo.Simulator]:
@@ -19,18 +21,25 @@ def loaded(folder: Path, links: int, above) -> tuple[float, dojo.Mechanism, dojo
     names = [f"l{k}" for k in range(links)]
     joints = [joint(f"j{k}", names[above(k)], names[k]) for k in range(1, links)]
     path = write(folder, *(link(name, inertial()) for name in names), *joints)
-    begin = time.process_time()
-    mech = dojo.load_urdf(path, ground=False)
-    sim = dojo.Simulator(mech, time_step=0.01)
-    return time.process_time() - begin, mech, sim
+    gc.disable()  # its time is that of all objects of the process
+    try:
+        begin = time.process_time()
+        mech = dojo.load_urdf(path, ground=False)
+        sim = dojo.Simulator(mech, time_step=0.01)
+        return time.process_time() - begin, mech, sim
+    finally:
+        gc.enable()
 
 
 @pytest.mark.sweep(3)
 @pytest.mark.parametrize("above", [lambda k: k - 1, lambda k: 0, lambda k: k // 2], ids=["chain", "star", "tree"])
 def test_the_time_of_loading_grows_as_the_number_of_links(tmp_path: Path, above) -> None:
-    few, _, _ = loaded(tmp_path, FEWER, above)
-    many, mech, sim = loaded(tmp_path, LINKS, above)
-    assert many < 2.0 * LINEAR * few  # 2.5 times LINEAR or more when every joint was looked up in a list
+    growth = []
+    while not growth or (growth[-1] > 2.0 * LINEAR and len(growth) < TRIES):
+        few, _, _ = loaded(tmp_path, FEWER, above)
+        many, mech, sim = loaded(tmp_path, LINKS, above)
+        growth.append(many / few)
+    assert growth[-1] < 2.0 * LINEAR, growth  # 2.5 times LINEAR or more when every joint was looked up in a list
     assert (sim.nbody, sim.nv) == (LINKS, LINKS + 5)
     ends = [mech.v_slice(name).stop for name in mech.joint_names]
     assert ends == list(range(6, LINKS + 6))
