@@ -22,6 +22,7 @@ from sim.dynamics import coordinates, coordinates_jacobian, energy, state, veloc
 from sim.integrators import rollout
 from sim.integrators.feedback import BoundedLaw, FeedbackLaw, Path, closed_loop
 from sim.integrators.rollout import MotionBuffers
+from sim.model.columns import Inactive
 from sim.model.data import Data
 from sim.model.layout import data_view, sizes_of, table
 from sim.model.model import Model
@@ -444,10 +445,13 @@ class Engine:
         return xs, status.astype(np.int64), knots
 
     def inactive(self) -> NDArray[np.bool_]:
-        """Whether each contact was inactive in the last step of this thread, (ncontact,)."""
+        """Whether each contact was inactive in the last step of this thread, in its derivatives, too, (ncontact,)."""
         out = np.ones(self.sizes.ncontact, dtype=bool)
         data = self.last()
         out[data.active[: data.active_count[0]]] = False
+        for first in data.inactive_first[: data.inactive_count[0]]:
+            if data.inactive[first, Inactive.STIFF] > 0.0:
+                out[first : self.model.cluster_end[first]] = False
         return out
 
     def last(self) -> Data:
