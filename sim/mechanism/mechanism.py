@@ -149,14 +149,6 @@ class Mechanism:
         return tuple(touches(f"Mechanism({self.name!r})", self.bodies, self.joints, self.collisions))
 
     @cached_property
-    def contact_firsts(self) -> NDArray[np.int64]:
-        """(ncontact,) number of the first contact point of the collision of each; its own for the ground."""
-        features = np.array([0] * len(self.contacts) + [touch.feature for touch in self.touches], dtype=np.int64)
-        out = np.maximum.accumulate(np.where(features == 0, np.arange(len(features)), 0))
-        out.flags.writeable = False
-        return out
-
-    @cached_property
     def contact_normals(self) -> NDArray[np.float64]:
         """(ncontact, 3) outward normals of the ground at the contacts, world axes."""
         out = np.array([np.asarray(c.normal) for c in self.contacts], dtype=np.float64).reshape(-1, 3)

@@ -91,7 +91,8 @@ class Divided(NamedTuple):
         points, normals = (np.einsum("tc,tcj->cj", share, parts[..., k : k + 3]) for k in (3, 8))
         out[pressed, 3:6] = points[pressed] / total[pressed, None]
         length = np.linalg.norm(normals, axis=1)
-        out[length > 0.0, 8:11] = normals[length > 0.0] / length[length > 0.0, None]
+        turned = (length > 0.0) & out[:, 8:11].any(axis=1)  # without a normal, it is beyond its reach at the end
+        out[turned, 8:11] = normals[turned] / length[turned, None]
         return np.asarray(out)
 
 

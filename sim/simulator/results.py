@@ -134,13 +134,15 @@ class Contacts:
     slip: Floats
 
     def __getattr__(self, name: str) -> Floats:
-        """`gap` where it waits until somebody asks (`contacts_of`): the first contact of a collision beyond its reach
-        tells of all.
+        """`gap` where it waits until somebody asks (`contacts_of`): where a step has a report, a collision without a
+        normal is beyond its reach.
         """
         if name != "gap" or "rows" not in vars(self):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        firsts, gap = vars(self)["rows"]
-        object.__setattr__(self, "gap", np.where(gap[..., firsts] == BEYOND, ABSENT, gap))
+        ground, gap = vars(self)["rows"]
+        seen = self.normals.any(axis=-1)
+        told = seen[..., ground, None] | (gap[..., ground, None] == BEYOND)
+        object.__setattr__(self, "gap", np.where(told & ~seen, ABSENT, gap))
         return self.gap
 
     def __repr__(self) -> str:
@@ -545,7 +547,7 @@ def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
     parts = (rows[..., 8:11], time_step, rows[..., :3], rows[..., 3:6], rows[..., 6], rows[..., 7])
     contacts = Contacts(mech.contact_names, *parts)
     if any(c.reach is not None for c in mech.collisions):  # to look through thousands takes longer than a step
-        vars(contacts)["rows"] = mech.contact_firsts, vars(contacts).pop("gap")
+        vars(contacts)["rows"] = len(mech.contacts), vars(contacts).pop("gap")
     return contacts
 
 

@@ -32,6 +32,9 @@ from sim.contact.pairs.reach import (
     follow_ways,
     is_beyond,
     keep_distance,
+    leave_beyond,
+    sort_pairs,
+    stay_beyond,
 )
 from sim.dynamics.displacements import third_quaternion
 from sim.model.columns import PairBound, RelativePose, Witness
@@ -67,14 +70,15 @@ def begin_pairs(model: Model, data: Data, options: StepOptions) -> None:
     """Which collisions are active, and the poses of their shapes at configuration 2, where the step begins."""
     change = 0.0
     follow_ways(model, data)
-    j = 0
-    while j < model.pair_kind.shape[0]:
+    if not stay_beyond(data):
+        sort_pairs(model, data)
+    for m in range(data.near_count[0]):
+        j = data.near_first[m]
         a = FAR if is_beyond(model, data, j) else _begin_pair(model, data, options, j)
         data.pair_activation[j] = a
         if a > 0.0:
             change += _change(model, data, options, j, a)
-        j = end_of(model, j)
-    enlist_near(model, data)
+    leave_beyond(model, data)
     data.pair_travel[0] = options.tolerance / change if change > 0.0 else 1e300
     data.pair_evaluated[0] = 0.0
     data.pair_change[0] = change
@@ -236,6 +240,8 @@ def _came_within_reach(model: Model, data: Data) -> bool:
     """Whether a collision that was beyond its reach is within it at configuration 3; it is active from now on."""
     found = False
     follow_step(model, data)
+    if stay_beyond(data):
+        return False
     j = 0
     while j < model.pair_kind.shape[0]:
         if data.pair_activation[j] == FAR and not is_beyond(model, data, j):

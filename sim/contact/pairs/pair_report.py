@@ -10,7 +10,7 @@ from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
-from solvers.dense import clear, is_finite
+from solvers.dense import is_finite
 from solvers.types import Matrix
 
 
@@ -28,30 +28,16 @@ def pairs_finite(model: Model, data: Data, rows: Matrix) -> bool:
 
 @optional(Slot.REPORT_PAIRS)
 def report_pairs(model: Model, data: Data, out: Matrix) -> None:
-    """The rows of the pairs: impulse on the first body. Those of collisions beyond their reach are zero, but for the
-    gap of the first, which is BEYOND: to write the others takes longer than a step.
+    """The rows of the pairs: impulse on the first body. Rows are new and zero; those of collisions beyond their reach
+    stay so, but for a gap BEYOND in the first of all, which says that there is a report: to write, or read, as many as
+    a robot has takes longer than a step.
     """
     ground = model.contact_height.shape[0]
-    j, near = 0, 0
-    while j < model.pair_kind.shape[0]:
-        end = end_of(model, j)
-        if near < data.near_count[0] and data.near_first[near] == j:
-            near += 1
-            _report(model, data, j, end, out)
-        else:
-            _report_beyond(out[ground + j : ground + end])
-        j = end
-
-
-@kernel
-def _report_beyond(rows: Matrix) -> None:
-    """The rows of a collision beyond its reach; new rows are zero already."""
-    n = rows[0]
-    if n[6] == BEYOND:
-        return
-    if n[6] != 0.0 or n[8] != 0.0 or n[9] != 0.0 or n[10] != 0.0:
-        clear(rows)
-    n[6] = BEYOND
+    for m in range(data.near_count[0]):
+        first = data.near_first[m]
+        _report(model, data, first, end_of(model, first), out)
+    if data.near_count[0] == 0 or data.near_first[0] > 0:
+        out[ground, 6] = BEYOND
 
 
 @kernel
