@@ -140,7 +140,7 @@ class Contacts:
         if name != "gap" or "rows" not in vars(self):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         ground, gap = vars(self)["rows"]
-        seen = self.normals.any(axis=-1)
+        seen = np.asarray(self.normals.any(axis=-1))
         told = seen[..., ground, None] | (gap[..., ground, None] == BEYOND)
         object.__setattr__(self, "gap", np.where(told & ~seen, ABSENT, gap))
         return self.gap
