@@ -11,6 +11,7 @@ import dojo_opt as dojo
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Input, Joint
 from sim.mechanism.shapes import Box, Capsule, Sphere
+from sim.simulator.results import contacts_of
 from support.case import Case
 from support.encounters import two
 from support.jacobians import check_jacobian
@@ -75,6 +76,14 @@ def test_shapes_that_come_from_beyond_the_reach_within_a_step_do_not_enter() -> 
     motion = sim.rollout(x, np.vstack([u, np.zeros((20, 1))]))
     assert motion.success, motion.message
     assert motion.contacts.gap.min() > -1e-6
+
+
+def test_rows_without_a_report_are_not_beyond_the_reach() -> None:
+    """Those of a step that was not solved, and of other engines."""
+    mech = within(0.02)
+    rows = np.zeros((2, len(mech.contact_names), 11))
+    rows[1, :, 6], rows[1, :, 10] = 0.1, 1.0
+    np.testing.assert_array_equal(contacts_of(mech, 0.01, rows).gap, rows[..., 6])
 
 
 def test_a_reach_is_a_length_and_none_of_a_string() -> None:
