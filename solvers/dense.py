@@ -23,6 +23,15 @@ def copy(A: Matrix, out: Matrix) -> None:
 
 
 @kernel
+def is_finite(row: Vector) -> bool:
+    """Whether all numbers are."""
+    total = 0.0
+    for k in range(row.shape[0]):
+        total += 0.0 * row[k]
+    return total == 0.0
+
+
+@kernel
 def clear(A: Matrix) -> None:
     """A = 0"""
     for i in range(A.shape[0]):

@@ -44,7 +44,8 @@ def report_contacts(model: Model, data: Data, h: float, out: Matrix) -> None:
     for m in range(data.inactive_count[0]):
         first = data.inactive_first[m]
         for c in range(first, model.cluster_end[first]):
-            contact_kinematics(model, data, h, c)
+            if data.contact_out[c] == 1:
+                contact_kinematics(model, data, h, c)
     for c in range(model.contact_height.shape[0]):
         if model.contact_hold[c] != 0:
             contact_kinematics(model, data, h, c)

@@ -5,7 +5,12 @@ large gap that force hardly changes within a step. Such a contact is inactive: i
 (inactive_impulses.py); it is not a variable of the interior point nor in its matrix. Contacts of one body against
 one direction are a cluster, tested as one ball.
 
-A cluster is inactive when its stiffness, relative to the inertia behind it, is below the tolerance of the step:
+Of a cluster that is near, as the corners of a foot, those contacts are inactive whose e, for the n contacts of their
+body, is at most 1e-2: the matrix may omit it, as Newton's method converges all the same. Derivatives may not; they
+take these contacts as active (`all_stiff`).
+
+As a whole, a cluster is inactive when its stiffness, relative to the inertia behind it, is below the tolerance of the
+step:
 
     e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) <= 1000 tolerance
 
@@ -26,7 +31,10 @@ Columns of `inactive` and `cluster`: Inactive and Cluster of sim/model/columns.p
 
 from __future__ import annotations
 
-from sim.contact.pairs.inactive_pairs import enlist_pairs, pairs_came_near
+from math import sqrt
+
+from sim.contact.ground_contact import contact_kinematics
+from sim.contact.pairs.inactive_pairs import COUPLED, all_near, enlist_pairs, pairs_came_near
 from sim.contact.terrain_contact import terrain_gap
 from sim.mechanism.confined import SUNK
 from sim.mechanism.pack_clusters import STIFFNESS
@@ -37,6 +45,7 @@ from sim.model.options import StepOptions
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import rotate, three
+from solvers.types import Matrix
 
 
 @kernel
@@ -96,8 +105,13 @@ def choose_active(model: Model, data: Data, options: StepOptions) -> None:
             a = _half_gap_ahead(model, data, c)
             if not (a > 0.0 and _stiffness(model, options.h, c, a) <= least * a * a):
                 a = 0.0
+        for k in range(c, model.cluster_end[c]):
+            data.contact_out[k] = 1 if a > 0.0 else 0
+        data.inactive[c, Inactive.STIFF] = 0.0
+        if a == 0.0 and model.contact_terrain[c] == 0:
+            a = _leave_out(model, data, options, c)
         data.inactive[c, Inactive.ACTIVATION] = a
-        if a == 0.0 or not known:
+        if data.inactive[c, Inactive.STIFF] > 0.0 or a == 0.0 or not known:
             data.inactive[c, Inactive.LEAST_GAP] = 0.0
         _enlist(model, data, c)
         c = model.cluster_end[c]
@@ -107,31 +121,68 @@ def choose_active(model: Model, data: Data, options: StepOptions) -> None:
 
 
 @kernel
+def _leave_out(model: Model, data: Data, options: StepOptions, c: int) -> float:
+    """contact_out of the contacts of a cluster that hardly slow Newton's method down; half their least gap, or 0."""
+    p = model.cluster[c]
+    mu, h = p[Cluster.FRICTION], options.h
+    n = p[Cluster.CONTACTS] * options.kappa / COUPLED
+    b = 0.5 * n * h * (1.0 + mu) * p[Cluster.TURNING]
+    a = b + sqrt(b * b + n * (mu * mu + h * (1.0 + mu)) * p[Cluster.MOBILITY])
+    least = 2.0 * a + _travel(model, data, c)
+    found = False
+    for k in range(c, model.cluster_end[c]):
+        if contact_gap(model, data.pos2, data.rot2, k) > least:
+            data.contact_out[k] = 1
+            found = True
+    if not found or not a < 1e300:
+        return 0.0
+    data.inactive[c, Inactive.STIFF] = 1.0
+    return a
+
+
+@kernel
+def contact_gap(model: Model, pos: Matrix, rot: Matrix, c: int) -> float:
+    """Gap of contact c, not on terrain, at the poses pos (nbody, 3), rot (nbody, 9)."""
+    i, n = model.contact_body[c], model.contact_frame[c]
+    x, y, z = rotate(rot, i, *three(model.contact_point[c], 0))
+    gap = n[0] * (pos[i, 0] + x) + n[1] * (pos[i, 1] + y) + n[2] * (pos[i, 2] + z)
+    return gap - model.contact_height[c] - model.contact_radius[c]
+
+
+@kernel
 def _enlist(model: Model, data: Data, c: int) -> None:
-    """Append a cluster to inactive_first, or its contacts to `active`; contacts that cannot move are in neither."""
+    """Append a cluster to inactive_first, and its active contacts to `active`; contacts that cannot move are in
+    neither.
+    """
     if model.contact_hold[c] != 0:
         return
     if data.inactive[c, Inactive.ACTIVATION] > 0.0:
         data.inactive_first[data.inactive_count[0]] = c
         data.inactive_count[0] += 1
-        return
     n = data.active_ground_count[0]
     for k in range(c, model.cluster_end[c]):
-        data.active[n] = k
-        n += 1
+        if data.contact_out[k] == 0:
+            data.active[n] = k
+            n += 1
     data.active_ground_count[0] = n
+
+
+@kernel
+def _travel(model: Model, data: Data, c: int) -> float:
+    """How far the contacts of a cluster moved in the step before, at most."""
+    i = model.contact_body[c]
+    travel = 0.0
+    for k in range(3):
+        travel += abs(data.move_in[i, k]) + 2.0 * model.cluster[c, Cluster.ARM] * abs(data.turn_in[i, 1 + k])
+    return travel
 
 
 @kernel
 def _half_gap_ahead(model: Model, data: Data, c: int) -> float:
     """Half the gap that a cluster has after one more step like the last one, or less."""
-    i = model.contact_body[c]
-    travel = 0.0
-    for k in range(3):
-        travel += abs(data.move_in[i, k]) + 2.0 * model.cluster[c, Cluster.ARM] * abs(data.turn_in[i, 1 + k])
     height = highest(model, c)
     data.inactive[c, Inactive.HEIGHT] = height
-    return 0.5 * (cluster_gap(model, data, c, height, False) - travel)
+    return 0.5 * (cluster_gap(model, data, c, height, False) - _travel(model, data, c))
 
 
 @kernel
@@ -147,17 +198,60 @@ def has_activated(model: Model, data: Data) -> bool:
     """Whether an inactive cluster has become active at configuration 3; it is active from now on."""
     found = pairs_came_near(model, data)
     for m in range(data.inactive_count[0]):
+        if _came_near(model, data, data.inactive_first[m]):
+            found = True
+    if found:
+        _enlist_all(model, data)
+    return found
+
+
+@kernel
+def _came_near(model: Model, data: Data, c: int) -> bool:
+    """Whether contacts of the inactive cluster c have become active at configuration 3; they are from now on."""
+    row = data.inactive[c]
+    found = False
+    if row[Inactive.STIFF] == 0.0:
+        found = cluster_gap(model, data, c, row[Inactive.HEIGHT], True) < row[Inactive.ACTIVATION]
+    for k in range(c, model.cluster_end[c]):
+        if row[Inactive.STIFF] > 0.0 and data.contact_out[k] == 1:
+            if not contact_gap(model, data.pos3, data.rot3, k) < row[Inactive.ACTIVATION]:
+                continue
+            found = True
+            data.contact_out[k] = 0
+        elif found:
+            data.contact_out[k] = 0
+    if found:
+        row[Inactive.LEAST_GAP] = 0.0
+        if row[Inactive.STIFF] == 0.0:
+            row[Inactive.ACTIVATION] = 0.0
+    return found
+
+
+@kernel
+def _enlist_all(model: Model, data: Data) -> None:
+    """`active` and inactive_first anew."""
+    data.active_ground_count[0] = 0
+    data.inactive_count[0] = 0
+    for c in range(model.contact_height.shape[0]):
+        if model.cluster_end[c] > 0:
+            _enlist(model, data, c)
+    data.active_count[0] = data.active_ground_count[0]
+    enlist_pairs(model, data)
+
+
+@optional(Slot.ALL_STIFF)
+def all_stiff(model: Model, data: Data, h: float) -> None:
+    """All contacts whose stiffness counts taken as active, for the derivatives of a step that has been solved."""
+    all_near(model, data)
+    found = False
+    for m in range(data.inactive_count[0]):
         c = data.inactive_first[m]
-        if cluster_gap(model, data, c, data.inactive[c, Inactive.HEIGHT], True) < data.inactive[c, Inactive.ACTIVATION]:
+        if data.inactive[c, Inactive.STIFF] > 0.0:
             found = True
             data.inactive[c, Inactive.ACTIVATION] = 0.0
-            data.inactive[c, Inactive.LEAST_GAP] = 0.0
+            for k in range(c, model.cluster_end[c]):
+                if data.contact_out[k] == 1:
+                    data.contact_out[k] = 0
+                    contact_kinematics(model, data, h, k)
     if found:
-        data.active_ground_count[0] = 0
-        data.inactive_count[0] = 0
-        for c in range(model.contact_height.shape[0]):
-            if model.cluster_end[c] > 0:
-                _enlist(model, data, c)
-        data.active_count[0] = data.active_ground_count[0]
-        enlist_pairs(model, data)
-    return found
+        _enlist_all(model, data)

@@ -130,6 +130,8 @@ def _evaluate(model: Model, data: Data, h: float, c: int) -> None:
     kappa = data.inactive_kappa[0]
     least = 1e300
     for k in range(c, model.cluster_end[c]):
+        if data.contact_out[k] == 0:
+            continue
         p = model.contact_point[k]
         rho = model.contact_radius[k]
         gap = max(D - model.contact_height[k] + n0 * p[0] + n1 * p[1] + n2 * p[2] - rho, row[Inactive.ACTIVATION])
@@ -142,7 +144,8 @@ def _evaluate(model: Model, data: Data, h: float, c: int) -> None:
             start_contact(model, data, k, kappa, row[Inactive.ACTIVATION])
             fn, fx, fy = contact_impulse(model, data, k)
         else:
-            fn, fx, fy = _cone_impulse(model.contact_friction[k], kappa, gap, x, y)
+            mu = model.contact_friction[k] if model.contact_law[k] == Law.NONLINEAR else 0.0
+            fn, fx, fy = _cone_impulse(mu, kappa, gap, x, y)
             z = data.cone[k]
             z[Cone.SLACK], z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2] = gap, fn, fx, fy
         N, X, Y = N + fn, X + fx, Y + fy

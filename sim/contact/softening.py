@@ -53,17 +53,26 @@ def speed_before(data: Data, h: float, i: int, x: float, y: float, z: float) -> 
 
 
 @kernel
-def responses(model: Model, data: Data, h: float, c: int) -> tuple[float, float]:
-    """M and G of contact c [m/s per N s]."""
-    k = data.contact_kin[c]
-    a = model.contact_body[c]
-    M = free_response(model, a)
-    x, y, z = speed_before(data, h, a, *three(k, Kin.ARM))
+def contact_response(model: Model, c: int) -> float:
+    """M of contact c [m/s per N s]."""
+    M = free_response(model, model.contact_body[c])
     j = c - model.contact_height.shape[0]
     if j >= 0:
         b = model.coupling_body[model.pair_coupling[j], 1]
         if b >= 0:
             M += free_response(model, b)
+    return M
+
+
+@kernel
+def loaded_response(model: Model, data: Data, h: float, c: int, M: float) -> float:
+    """G of contact c [m/s per N s]."""
+    k = data.contact_kin[c]
+    x, y, z = speed_before(data, h, model.contact_body[c], *three(k, Kin.ARM))
+    j = c - model.contact_height.shape[0]
+    if j >= 0:
+        b = model.coupling_body[model.pair_coupling[j], 1]
+        if b >= 0:
             p, o = data.pair_frame[j], data.pos3[b]
             u, v, w = speed_before(
                 data, h, b, p[PairFrame.POINT] - o[0], p[PairFrame.POINT + 1] - o[1], p[PairFrame.POINT + 2] - o[2]
@@ -71,22 +80,28 @@ def responses(model: Model, data: Data, h: float, c: int) -> tuple[float, float]
             x, y, z = x - u, y - v, z - w
     g = model.gravity
     speed = sqrt(x * x + y * y + z * z) + h * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
-    return M, max(min(M, speed / data.cone[c, Cone.IMPULSE]), _LEAST * M)
+    return max(min(M, speed / data.cone[c, Cone.IMPULSE]), _LEAST * M)
 
 
 @kernel
 def soften(model: Model, data: Data, h: float, c: int) -> None:
-    """W of contact c becomes W'; its derivative by friction (contact_scale) changes with it; contact_hard: M W'."""
+    """W of contact c becomes W'; its derivative by friction (contact_scale) changes with it; contact_hard: M W'.
+
+    D is evaluated only where a contact gives less than the largest, that of G = M.
+    """
     W = data.contact_W[c]
-    q = (
-        data.contact_scale[c, ConeScale.RESIDUAL + 2 : ConeScale.RESIDUAL + 4]
-        if model.contact_law[c] == Law.LINEAR
-        else data.contact_scale[c, ConeScale.GROWTH : ConeScale.RESIDUAL]
-    )
-    M, G = responses(model, data, h, c)
-    d = (_PART if data.bounce[c, Bounce.RESTITUTION] == 0.0 else _PART_OF_IMPACTS) * sqrt(M * G)
-    _compose(W, q, h * d if -h * d * W[0] > 1.0 else 0.0, d if -d * min(W[4], W[8]) > 1.0 else 0.0)
+    M = contact_response(model, c)
+    part = _PART if data.bounce[c, Bounce.RESTITUTION] == 0.0 else _PART_OF_IMPACTS
     hard = max(-h * W[0], -W[4], -W[8])
+    if part * M * hard > 1.0 - 1e-12:
+        d = part * sqrt(M * loaded_response(model, data, h, c, M))
+        q = (
+            data.contact_scale[c, ConeScale.RESIDUAL + 2 : ConeScale.RESIDUAL + 4]
+            if model.contact_law[c] == Law.LINEAR
+            else data.contact_scale[c, ConeScale.GROWTH : ConeScale.RESIDUAL]
+        )
+        _compose(W, q, h * d if -h * d * W[0] > 1.0 else 0.0, d if -d * min(W[4], W[8]) > 1.0 else 0.0)
+        hard = max(-h * W[0], -W[4], -W[8])
     data.contact_hard[0] = max(data.contact_hard[0], M * hard)
 
 

@@ -35,7 +35,8 @@ def add_coupling_composites(model: Model, data: Data, h: float) -> None:
             data.coupling_K2[r, k] = 0.0
     nloop = model.loop_ntrans.shape[0]
     first = model.coupling_body.shape[0] - nloop
-    for j in range(model.pair_kind.shape[0]):
+    for c in range(data.active_ground_count[0], data.active_count[0]):
+        j = data.active[c] - model.contact_height.shape[0]
         k = model.pair_coupling[j]
         if is_absent(data, j):
             continue
@@ -46,6 +47,8 @@ def add_coupling_composites(model: Model, data: Data, h: float) -> None:
         k = first + m
         _take_back(model, data, k, loop_stiffness(model, data, m, data.coupling_K2[2 * k : 2 * k + 2]))
     for k in range(model.coupling_body.shape[0]):
+        if not is_loop(model, k) and data.coupling_live[k] == 0:
+            continue
         for side in range(2):
             i = model.coupling_body[k, side]
             sign = -1.0 if side == 0 else 1.0
@@ -78,7 +81,7 @@ def add_coupling_derivatives(model: Model, data: Data) -> None:
     for k in range(model.coupling_body.shape[0]):
         a = model.coupling_body[k, 0]
         b = model.coupling_body[k, 1]
-        if b < 0:
+        if b < 0 or (not is_loop(model, k) and data.coupling_live[k] == 0):
             continue
         cross_block(model, data, a, b, -1.0, data.coupling_K2[2 * k + 1], data.S2)
         cross_block(model, data, b, a, 1.0, data.coupling_K2[2 * k], data.S2)

@@ -140,6 +140,7 @@ def report_apart(model: Model, data: Data, h: float, out: Matrix) -> None:
         if model.cluster_end[c] > 0:
             data.inactive_first[data.inactive_count[0]] = c
             data.inactive_count[0] += 1
+        data.contact_out[c] = 1
         data.bounce[c, 0] = 0.0
         for k in range(data.cone.shape[1]):
             data.cone[c, k] = 0.0

@@ -15,6 +15,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.contact.contact_report import report_contacts
+from sim.contact.pairs.pair_report import pairs_finite
 from sim.derivatives.step_gradient import gradient
 from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import normalise_state
@@ -25,7 +26,7 @@ from sim.model.options import Guess, StepOptions
 from sim.model.pace import DEADLINE, is_due, start_pace
 from sim.step import step
 from solvers.compiler import Table, kernel, parallel_kernel, prange, seconds
-from solvers.dense import clear, copy_vector
+from solvers.dense import clear, copy_vector, is_finite
 from solvers.lanes import LANES, load, spread, total
 from solvers.status import Status
 from solvers.types import Cube, Integers, Matrix, Vector
@@ -75,6 +76,7 @@ def options_of(data: Data, settings: Vector, begins: bool) -> StepOptions:
 def begin(data: Data) -> None:
     """Forget the motion before: clear all fields of CARRY (sim/model/layout.py)."""
     data.carried_steps[0] = 0
+    data.ways_known[0] = 0
     data.inactive_kappa[0] = 0.0
     clear(data.cone_step)
     clear(data.bound_step)
@@ -82,15 +84,6 @@ def begin(data: Data) -> None:
     clear(data.external)
     for row in range(data.couple_force.shape[0]):
         data.couple_force[row] = 0.0
-
-
-@kernel
-def is_finite(row: Vector) -> bool:
-    """Whether all numbers are."""
-    total = 0.0
-    for k in range(row.shape[0]):
-        total += 0.0 * row[k]
-    return total == 0.0
 
 
 @kernel
@@ -146,10 +139,13 @@ def roll(model_at: Table, data_at: Table, settings: Vector, motion: MotionBuffer
         done = report[1]
         if motion.contacts.shape[0] > 0:
             report_contacts(model, data, options.h, motion.contacts[t])
-            for c in range(motion.contacts.shape[1]):
+            for c in range(model.contact_height.shape[0]):
                 if not is_finite(motion.contacts[t, c]):
                     report[0] = _NOT_FINITE
                     return t
+            if not pairs_finite(model, data, motion.contacts[t]):
+                report[0] = _NOT_FINITE
+                return t
         if motion.A.shape[0] > 0:
             if not gradient(model, data, options.h, options.kappa, x[:nq], x[nq:], motion.A[t], motion.B[t]):
                 report[0] = _SINGULAR

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ class Touch:
     law: str
     restitution: float
     collision: str
+    reach: float  # infinite where there is none
 
 
 def touches(call: str, bodies: Sequence[Body], joints: Sequence[Joint], collisions: Sequence[Collision]) -> list[Touch]:
@@ -118,6 +120,7 @@ def _points(collision: Collision, kind: shape_kinds.Pair, ends: list[End]) -> li
             "impact" if rope else collision.law,
             collision.restitution or 0.0,
             collision.name,
+            inf if collision.reach is None else collision.reach,
         )
         for feature in range(number)
     ]
@@ -136,7 +139,8 @@ def _corners(collision: Collision, solid: tuple[int, Polytope], ground: End) -> 
         where = places.copy()
         where[0, :3] = point
         law = (collision.friction or 0.0, collision.law, collision.restitution or 0.0, collision.name)
-        out.append(Touch(f"{collision.name}_{k}", bodies, kind, 0, np.zeros(8), (), (0.0, np.inf), where, *law))
+        reach = inf if collision.reach is None else collision.reach
+        out.append(Touch(f"{collision.name}_{k}", bodies, kind, 0, np.zeros(8), (), (0.0, np.inf), where, *law, reach))
     return out
 
 

@@ -33,7 +33,9 @@ def pack_clusters(model: Model) -> None:
         mobility = mass + swing * swing + 2.0 * spread * swing * easy
         friction = model.contact_friction[first:end].max()
         model.cluster_end[first] = end
-        model.cluster[first] = *centre, around, arm, mobility, friction, _swing(inertia, points.mean(axis=0)) * easy
+        turn = _swing(inertia, points.mean(axis=0)) * easy
+        several = np.count_nonzero(model.contact_body[:count] == body)
+        model.cluster[first] = *centre, around, arm, mobility, friction, turn, several
 
 
 def _swing(inertia: Floats, p: Floats) -> float:

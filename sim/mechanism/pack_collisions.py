@@ -55,7 +55,7 @@ def _pack_far(found: Sequence[Touch], model: Model) -> None:
             turning += arm / least if free else np.inf
             model.body_reach[i] = max(model.body_reach[i], arm)
         most = max(degree[i] for i in touch.bodies if i >= 0)
-        model.pair_far[j] = sum(touch.radii), *arms, mobility, turning, most, end - j
+        model.pair_far[j] = sum(touch.radii), *arms, mobility, turning, most, end - j, touch.reach
 
 
 def _pack_hulls(found: Sequence[Touch], model: Model) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, product
 
 import numpy as np
@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 __all__ = ["self_collisions"]
 
 _ONE = 1e3  # weight of "the shares of the points of a shape add up to one" beside distances in units of the shapes
+_REACH = 0.01  # of the extent of a robot: its links act on one another from this gap on
 _TOUCHING = 1e-5  # of the size of two shapes: nearer ones overlap
 
 
@@ -39,6 +40,7 @@ def self_collisions(
         (the collisions, the names of the pairs that overlap).
     """
     at, near = poses(joints, q), _neighbours(bodies, joints, loops)
+    reach = _REACH * _extent(bodies, at)
     found, overlapping = [], []
     for a, b in combinations([body for body in bodies if body.shapes], 2):
         if frozenset((a.name, b.name)) in near:
@@ -47,10 +49,20 @@ def self_collisions(
             name = f"{label_a}-{label_b}"
             if _gap(at[a.name], one, at[b.name], other) > 0.0:
                 shapes = (None if len(a.shapes) == 1 else one), (None if len(b.shapes) == 1 else other)
-                found.append(Collision(a.name, b.name, *shapes, name=name))
+                found.append(Collision(a.name, b.name, *shapes, name=name, reach=reach))
             else:
                 overlapping.append(name)
     return found, overlapping
+
+
+def _extent(bodies: Sequence[Body], at: Mapping[str, Pose]) -> float:
+    """Largest side of the box around the shapes of all bodies [m]."""
+    ends = [_points(at[body.name], shape) for body in bodies for shape, _ in _labelled(body)]
+    if not ends:
+        return 1.0
+    low = np.min([points.min(axis=0) - radius for points, radius in ends], axis=0)
+    high = np.max([points.max(axis=0) + radius for points, radius in ends], axis=0)
+    return float((high - low).max())
 
 
 def _labelled(body: Body) -> Iterator[tuple[Solid, str]]:

@@ -109,6 +109,7 @@ class Inactive(IntEnum):
     ARMS = 25  # (3, 3) sums of p times the impulses along n, t1 and t2
     RADIUS_ARMS = 34  # (2,) sums of radius times impulse along t1 and t2
     TURNED = 36  # 1 where only the arms have been turned since the impulses were evaluated
+    STIFF = 37  # 1 where derivatives take it as active
 
 
 class Apart(IntEnum):
@@ -127,6 +128,7 @@ class Cluster(IntEnum):
     MOBILITY = 5  # M of contact/inactive.py
     FRICTION = 6  # largest
     TURNING = 7  # T
+    CONTACTS = 8  # those of its body
 
 
 class Bounce(IntEnum):
@@ -167,6 +169,22 @@ class PairBound(IntEnum):
     TURNING = 4
     COLLISIONS = 5  # that one of its bodies has
     POINTS = 6
+    REACH = 7  # gap from which there is no force, infinite for most
+
+
+class PairShare(IntEnum):
+    """pair_share: the part w of the impulse of a pair that acts within a reach (pairs/reach.py)."""
+
+    PART = 0
+    RATE = 1  # d(log w)/d(gap)
+
+
+class Way(IntEnum):
+    """body_way: how far points of a body with collisions have moved, at most (pairs/reach.py)."""
+
+    BEFORE = 0  # since the motion began, along the configurations where steps began
+    AHEAD = 1  # in this step, if it is like the one before
+    POSE = 2  # (7,) pose where BEFORE ends
 
 
 class Grid(IntEnum):

@@ -17,6 +17,7 @@ class Data(NamedTuple):
 
     # state between steps
     carried_steps: Integers  # (1,) steps of this motion, 0 where configurations have to be computed, see carry_over.py
+    ways_known: Integers  # (1,) whether pair_clear and body_way are those of this motion
     external: Matrix  # (nbody, 6) external force at the centre of mass and torque in this step, world axes [N, N m]
     inactive_kappa: Vector  # (1,) kappa of the impulses of inactive contacts, 0 where none are known
     cone_step: Matrix  # (ncontact, 12) last directions of the cone variables
@@ -79,6 +80,7 @@ class Data(NamedTuple):
     active_ground_count: Integers  # (1,) how many of them are with the ground
     inactive_count: Integers  # (1,) inactive clusters
     inactive_first: Integers  # (nground,) their first contacts
+    contact_out: Integers  # (nground,) 1 for an inactive contact
     pair_sides: Integers  # (npair,) axes that separate the shapes at configuration 2, at the first pair of a collision
     pair_code: Integers  # (npair,) elements that make each contact point, chosen where an attempt starts
     pair_previous: Integers  # (npair,) of the choice before, those that pressed; 0 for the others
@@ -86,10 +88,12 @@ class Data(NamedTuple):
     bifurcation_replaces: Integers  # (1,) 1 where they stand in place of constraints, too
     loop_used: Integers  # (nrow,) scratch
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with active pairs
+    near_count: Integers  # (1,)
+    near_first: Integers  # (npair,) first pairs of the collisions within their reach, see pairs/reach.py
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
     feature_choice: Integers  # (1,) FeatureChoice: when active features of shapes are chosen
     overlap_allowed: Integers  # (1,) 1 where a small overlap in other features is accepted
-    inactive: Matrix  # (nground, 37) Inactive, see contact/inactive.py
+    inactive: Matrix  # (nground, 38) Inactive, see contact/inactive.py
     inactive_share: Vector  # (1,) change of a cluster's impulses below which they stand [N s]
     # contacts
     cone: Matrix  # (ncontact, 12) cone variables: Cone or Pyramid
@@ -109,12 +113,16 @@ class Data(NamedTuple):
     pair_relative: Matrix  # (npair, 12) pose of shape a in the frame of shape b
     pair_out: Matrix  # (npair, 43) result of `collide`: Witness
     pair_before: Matrix  # (npair, 13) pair_relative at configuration 2, and the gap that elements had at least there
-    pair_activation: Vector  # (npair,) at its first pair: half the gap ahead of an inactive collision, or 0
+    pair_activation: Vector  # (npair,) at its first pair: 0 if active, half the gap ahead if inactive, or FAR
     pair_travel: Vector  # (1,) displacement of a body after which inactive collisions are evaluated again [m]
     pair_evaluated: Vector  # (1,) whether they have been in this step
     pair_change: Vector  # (1,) bound of the change of their wrenches per displacement, 0 where there are none
     inactive_pose: Matrix  # (nbody, 7) poses where the inactive collisions were evaluated
     inactive_wrench: Matrix  # (nbody, 6) their wrenches about O
+    pair_share: Matrix  # (npair, 2) PairShare: the part of the impulse that acts
+    pair_clear: Vector  # (npair,) at its first pair: once known distance of the shapes, plus Way.BEFORE then [m]
+    pair_margin: Vector  # (1,) sum of Way of two bodies up to which no other collision comes within its reach [m]
+    body_way: Matrix  # (nbody, 9) Way
     pair_trial: Matrix  # (1, 43) last result of `collide`, of a feature pair that is not kept
     pair_frame: Matrix  # (npair, 12) rows n, t1, t2 and the contact point, world axes
     pair_turn: Matrix  # (npair, 18) rotation of the frame by the relative twist

@@ -47,7 +47,7 @@ MODEL_FLOATS = _shapes(
     dof_spring nv, dof_damper nv, dof_seen nv, dof_armature nv, dof_rest nv,
     contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_restitution ncontact,
     contact_frame nground 9, terrain_place nterrain 8, terrain_heights nheight, terrain_rates nheight,
-    contact_height nground, cluster nground 8, pair_sizes npair 8, pair_place 2npair 12, pair_far npair 7,
+    contact_height nground, cluster nground 9, pair_sizes npair 8, pair_place 2npair 12, pair_far npair 8,
     body_reach nbody, hull nhull 4, loop_point nloop 6, loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9,
     gear_ratio ngear, gear_offset ngear, limit_sign nlimit, limit_bound nlimit, dry_force ndry, dry_middle ndry,
     dry_gain ndry 3,
@@ -56,7 +56,7 @@ MODEL_FLOATS = _shapes(
 )
 
 # state between the steps of a motion: `begin` of integrators/rollout.py clears all of it
-CARRY_INTS = _shapes("carried_steps 1")
+CARRY_INTS = _shapes("carried_steps 1, ways_known 1")
 CARRY_FLOATS = _shapes(
     """
     external nbody 6, inactive_kappa 1, cone_step ncontact 12, bound_step nlimit 2, dry_step ndry 4, couple_force nrow
@@ -67,9 +67,10 @@ CARRY = (*CARRY_INTS, *CARRY_FLOATS)
 DATA_INTS = CARRY_INTS | _shapes(
     """
     active_ground_count 1, active_count 1, inactive_count 1, active ncontact, inactive_first nground,
+    contact_out nground,
     pair_sides npair, pair_code npair, pair_previous npair,
     feature_choice 1, overlap_allowed 1, bifurcation_count 1, bifurcation_replaces 1, loop_used nrow, reach_of nreach,
-    coupling_live ncoupling,
+    coupling_live ncoupling, near_count 1, near_first npair,
     couple_live nrow 2
     """
 )
@@ -92,7 +93,8 @@ DATA_FLOATS = CARRY_FLOATS | _shapes(
     shape_pos 2npair 3, shape_rot 2npair 9, pair_relative npair 12, pair_out npair 43,
     pair_frame npair 12, pair_trial 1 43,
     pair_before npair 13, pair_activation npair, pair_travel 1, pair_evaluated 1, pair_change 1,
-    inactive_pose nbody 7, inactive_wrench nbody 6,
+    inactive_pose nbody 7, inactive_wrench nbody 6, pair_share npair 2, pair_clear npair, pair_margin 1,
+    body_way nbody 9,
     pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
     couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 4,
@@ -104,7 +106,7 @@ DATA_FLOATS = CARRY_FLOATS | _shapes(
     triangles nv nwide, triangle_across 12 nwide,
     dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel,
     step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 6, pace 2,
-    inactive nground 37, inactive_share 1,
+    inactive nground 38, inactive_share 1,
     reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach
     """
 )

@@ -193,3 +193,6 @@ class Slot(IntEnum):
     APPLY_FRICTION = 159
     ADD_DRIVE_DERIVATIVES = 160
     ADD_DRIVE_INPUTS = 161
+    # contacts that only derivatives take as active; rows of pairs
+    ALL_STIFF = 162
+    PAIRS_FINITE = 163

@@ -22,6 +22,7 @@ from sim.dynamics import coordinates, coordinates_jacobian, energy, state, veloc
 from sim.integrators import rollout
 from sim.integrators.feedback import BoundedLaw, FeedbackLaw, Path, closed_loop
 from sim.integrators.rollout import MotionBuffers
+from sim.model.columns import Inactive
 from sim.model.data import Data
 from sim.model.layout import data_view, sizes_of, table
 from sim.model.model import Model
@@ -90,7 +91,8 @@ class Divided(NamedTuple):
         points, normals = (np.einsum("tc,tcj->cj", share, parts[..., k : k + 3]) for k in (3, 8))
         out[pressed, 3:6] = points[pressed] / total[pressed, None]
         length = np.linalg.norm(normals, axis=1)
-        out[length > 0.0, 8:11] = normals[length > 0.0] / length[length > 0.0, None]
+        turned = (length > 0.0) & out[:, 8:11].any(axis=1)  # without a normal, it is beyond its reach at the end
+        out[turned, 8:11] = normals[turned] / length[turned, None]
         return np.asarray(out)
 
 
@@ -444,10 +446,13 @@ class Engine:
         return xs, status.astype(np.int64), knots
 
     def inactive(self) -> NDArray[np.bool_]:
-        """Whether each contact was inactive in the last step of this thread, (ncontact,)."""
+        """Whether each contact was inactive in the last step of this thread, in its derivatives, too, (ncontact,)."""
         out = np.ones(self.sizes.ncontact, dtype=bool)
         data = self.last()
         out[data.active[: data.active_count[0]]] = False
+        for first in data.inactive_first[: data.inactive_count[0]]:
+            if data.inactive[first, Inactive.STIFF] > 0.0:
+                out[first : self.model.cluster_end[first]] = False
         return out
 
     def last(self) -> Data:

@@ -30,7 +30,7 @@ from sim.contact.active_contacts import (
 from sim.contact.collision.pair_kernels import KERNELS
 from sim.contact.contact_law import slip_noise
 from sim.contact.contact_report import report_contacts, worst_contact
-from sim.contact.inactive import choose_active, has_activated, sunk_contact
+from sim.contact.inactive import all_stiff, choose_active, has_activated, sunk_contact
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.contact.pairs.active_features import choose_pairs, overlapping
 from sim.contact.pairs.cylinder_pairs import choose_cylinders, collide_cylinders, cylinder_before, cylinder_distance
@@ -38,7 +38,7 @@ from sim.contact.pairs.inactive_pairs import all_near, begin_pairs, enlist_pairs
 from sim.contact.pairs.pair_contact import pair_kinematics
 from sim.contact.pairs.pair_energy import pair_slack, pairs_gained
 from sim.contact.pairs.pair_jacobian import pair_rate
-from sim.contact.pairs.pair_report import report_pairs
+from sim.contact.pairs.pair_report import pairs_finite, report_pairs
 from sim.contact.pairs.pair_stiffness import apply_pairs, condense_pairs, pair_constants
 from sim.contact.pairs.string import is_taut, pull_from_before, string_arm
 from sim.contact.pairs.string_stiffness import add_string_stiffness, add_string_turn
@@ -193,6 +193,7 @@ _PAIRS = (
     enlist_pairs,
     far_pair_impulses,
     pairs_came_near,
+    pairs_finite,
     pairs_gained,
     pair_slack,
 )
@@ -315,7 +316,7 @@ def link_gradient(model: Model) -> None:
     if len(model.contact_body) + len(model.limit_dof) + len(model.dry_dof):
         link(model.optional, add_stiffness)
     if len(model.contact_body):
-        link(model.optional, add_slip_jacobians)
+        link(model.optional, add_slip_jacobians, all_stiff)
     if len(model.limit_dof):
         link(model.optional, add_limit_derivatives)
     if np.any(model.dry_input >= 0):

@@ -17,6 +17,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.contact.collision.witness import ABSENT
+from sim.contact.pairs.reach import BEYOND
 from sim.integrators.feedback import Path
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr, drawn
@@ -118,7 +120,8 @@ class Contacts:
         time_step: time step [s].
         impulse: (..., ncontact, 3) impulse on the body [N s].
         point: (..., ncontact, 3) its point of action at the end of the step [m].
-        gap: (..., ncontact) distance from the ground at the end of the step [m].
+        gap: (..., ncontact) distance from the ground at the end of the step, 1e9 of what is beyond its reach (see
+            Collision) or does not exist in this configuration [m].
         slip: (..., ncontact) sliding speed [m/s].
     """
 
@@ -129,6 +132,18 @@ class Contacts:
     point: Floats
     gap: Floats
     slip: Floats
+
+    def __getattr__(self, name: str) -> Floats:
+        """`gap` where it waits until somebody asks (`contacts_of`): where a step has a report, a collision without a
+        normal is beyond its reach.
+        """
+        if name != "gap" or "rows" not in vars(self):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        ground, gap = vars(self)["rows"]
+        seen = np.asarray(self.normals.any(axis=-1))
+        told = seen[..., ground, None] | (gap[..., ground, None] == BEYOND)
+        object.__setattr__(self, "gap", np.where(told & ~seen, ABSENT, gap))
+        return self.gap
 
     def __repr__(self) -> str:
         if self.impulse.ndim > 2:
@@ -530,7 +545,10 @@ def carried(call: Callable[[], Any], made: Callable[[Any], Any]) -> Any:
 def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
     """Contacts from the rows (..., ncontact, 11) of a kernel."""
     parts = (rows[..., 8:11], time_step, rows[..., :3], rows[..., 3:6], rows[..., 6], rows[..., 7])
-    return Contacts(mech.contact_names, *parts)
+    contacts = Contacts(mech.contact_names, *parts)
+    if any(c.reach is not None for c in mech.collisions):  # to look through thousands takes longer than a step
+        vars(contacts)["rows"] = len(mech.contacts), vars(contacts).pop("gap")
+    return contacts
 
 
 def path_of(call: str, trajectory: Any) -> tuple[Any, Any]:

@@ -15,6 +15,7 @@ from naive import rotation as rot
 import dojo_opt as dojo
 from sim.model.columns import Inactive
 from sim.simulator.omitted_contacts import reach
+from support.jacobians import check_jacobian
 from support.scenes import LAWS, ball, block, chain, gaps, pendulum
 
 TOLERANCE = 1e-8
@@ -185,6 +186,29 @@ def test_mobility_bounds_the_velocity_per_impulse(rng):
                 t = np.cross(r, f / np.linalg.norm(f))
                 largest = max(largest, 1.0 / model.body_mass[0] + t @ J @ t)
     assert largest <= model.cluster[0, 5] <= 4.0 * largest
+
+
+def test_corners_of_a_body_that_touches_are_inactive_one_by_one(rng):
+    """The law and the balance of momenta hold for all; derivatives take all as active, and are exact."""
+    points = rng.normal(size=(24, 3))
+    points *= 0.05 / np.linalg.norm(points, axis=1)[:, None]
+    contacts = [dojo.Contact("body0", p, friction=0.6, name=str(k)) for k, p in enumerate(points)]
+    mech = dataclasses.replace(chain("floating", 0, gravity=(0.0, 0.0, -9.81)), contacts=contacts)
+    sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-8, tolerance=1e-11)
+    x = sim.neutral()
+    x[2], x[7:] = 1e-4 - points[:, 2].min(), 0.1
+    result = sim.step(x, throw=True)
+    active = int(sim._engine.last().active_ground_count[0])
+    assert 0 < active < 12 and far(sim) == 0
+    np.testing.assert_allclose(result.contacts.impulse[:, 2] * result.contacts.gap, 1e-8, rtol=1e-3)
+    change = sim.momentum(result.x)[0] - sim.momentum(x)[0]
+    weight = -9.81 * 0.01 * sum(body.mass for body in mech.bodies)
+    np.testing.assert_allclose(change, result.contacts.impulse.sum(axis=0) + [0.0, 0.0, weight], atol=1e-9)
+    across = rng.normal(size=(12, 2))
+    A = sim.linearize(x).A @ across
+    check_jacobian(
+        lambda x: sim.difference(sim.step(x, throw=True).x, result.x), A, x, lambda x, s: sim.integrate(x, across @ s)
+    )
 
 
 def test_names_and_distances_of_omitted_contacts():

@@ -68,7 +68,7 @@ def test_momentum_and_energy_across_the_handover() -> None:
     assert 5 < landing < 40 < leaving
     p = np.array([sim.momentum(y)[0] for y in t.x])
     gained = np.diff(p, axis=0) - H * (us + np.array([0.0, 0.0, -9.81]))
-    np.testing.assert_allclose(gained, t.contacts.impulse.sum(axis=1), atol=1e-11)
+    np.testing.assert_allclose(gained, t.contacts.impulse.sum(axis=1), atol=TOLERANCE)
     for x in t.x[[landing, leaving]]:
         mean = second.start(x[: sim.nq], x[sim.nq :])
         np.testing.assert_allclose(second.energy(mean), sim.energy(x), rtol=1e-12)

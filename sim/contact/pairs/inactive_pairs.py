@@ -21,9 +21,21 @@ from __future__ import annotations
 from sim.contact.collision.edge_axes import OPEN
 from sim.contact.contact_law import contact_impulse, start_contact
 from sim.contact.inactive_bounds import ANGLE
-from sim.contact.pairs.active_features import choose_shapes, open_pairs
+from sim.contact.pairs.active_features import choose_shapes, distance, open_pairs
 from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, point_kinematics
 from sim.contact.pairs.pair_pose import place_shapes
+from sim.contact.pairs.reach import (
+    FAR,
+    end_of,
+    enlist_near,
+    follow_step,
+    follow_ways,
+    is_beyond,
+    keep_distance,
+    leave_beyond,
+    sort_pairs,
+    stay_beyond,
+)
 from sim.dynamics.displacements import third_quaternion
 from sim.model.columns import PairBound, RelativePose, Witness
 from sim.model.data import Data
@@ -32,6 +44,7 @@ from sim.model.options import StepOptions
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 
+_STEEPEST = 3.75  # reaches times the largest rate of the part that acts (reach.py)
 COUPLED = 1e-2  # largest sum of e over the inactive collisions of a body
 
 
@@ -42,14 +55,13 @@ def enlist_pairs(model: Model, data: Data) -> None:
     n = data.active_ground_count[0]
     for k in range(model.coupling_body.shape[0]):
         data.coupling_live[k] = 0
-    first = 0
-    for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] == 0:
-            first = j
+    for m in range(data.near_count[0]):
+        first = data.near_first[m]
         if data.pair_activation[first] == 0.0:
             data.coupling_live[model.pair_coupling[first]] = 1
-            data.active[n] = ground + j
-            n += 1
+            for j in range(first, end_of(model, first)):
+                data.active[n] = ground + j
+                n += 1
     data.active_count[0] = n
 
 
@@ -57,25 +69,39 @@ def enlist_pairs(model: Model, data: Data) -> None:
 def begin_pairs(model: Model, data: Data, options: StepOptions) -> None:
     """Which collisions are active, and the poses of their shapes at configuration 2, where the step begins."""
     change = 0.0
-    for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] > 0:
-            continue
-        place_shapes(model, data, j, data.pos2, data.rot2)
-        r = data.pair_relative[j]
-        travel = _travel(model, data, j)
-        apart = (r[9] * r[9] + r[10] * r[10] + r[11] * r[11]) ** 0.5 - model.pair_far[j, PairBound.RADII]
-        a = _far_enough(model, options, j, 0.5 * (apart - travel))
-        if a == 0.0:
-            a = _far_enough(model, options, j, 0.5 * (open_pairs(model, data, j) - travel))
-        else:
-            data.pair_sides[j] = OPEN
-            data.pair_before[j, RelativePose.GAP] = -1e300
+    follow_ways(model, data)
+    if not stay_beyond(data):
+        sort_pairs(model, data)
+    for m in range(data.near_count[0]):
+        j = data.near_first[m]
+        a = FAR if is_beyond(model, data, j) else _begin_pair(model, data, options, j)
         data.pair_activation[j] = a
         if a > 0.0:
             change += _change(model, data, options, j, a)
+    leave_beyond(model, data)
     data.pair_travel[0] = options.tolerance / change if change > 0.0 else 1e300
     data.pair_evaluated[0] = 0.0
     data.pair_change[0] = change
+
+
+@kernel
+def _begin_pair(model: Model, data: Data, options: StepOptions, j: int) -> float:
+    """pair_activation of the collision that begins at pair j."""
+    place_shapes(model, data, j, data.pos2, data.rot2)
+    r = data.pair_relative[j]
+    travel = _travel(model, data, j)
+    apart = (r[9] * r[9] + r[10] * r[10] + r[11] * r[11]) ** 0.5 - model.pair_far[j, PairBound.RADII]
+    keep_distance(model, data, j, apart)
+    if is_beyond(model, data, j):
+        return FAR
+    a = _far_enough(model, options, j, 0.5 * (apart - travel))
+    if a > 0.0:
+        data.pair_sides[j] = OPEN
+        data.pair_before[j, RelativePose.GAP] = -1e300
+        return a
+    apart = open_pairs(model, data, j)
+    keep_distance(model, data, j, apart)
+    return FAR if is_beyond(model, data, j) else _far_enough(model, options, j, 0.5 * (apart - travel))
 
 
 @kernel
@@ -100,6 +126,7 @@ def _far_enough(model: Model, options: StepOptions, j: int, a: float) -> float:
     if not a > 0.0:
         return 0.0
     e = (mu * mu + h * (1.0 + mu)) * f[PairBound.MOBILITY] / a + h * (1.0 + mu) * f[PairBound.TURNING]
+    e += h * (1.0 + mu) * f[PairBound.MOBILITY] * _STEEPEST / f[PairBound.REACH]
     return a if f[PairBound.POINTS] * f[PairBound.COLLISIONS] * options.kappa * e <= COUPLED * a else 0.0
 
 
@@ -116,7 +143,7 @@ def _change(model: Model, data: Data, options: StepOptions, j: int, a: float) ->
             for k in range(3):
                 lever += abs(data.pos2[i, k] - data.origin[k])
     push = f[PairBound.POINTS] * options.kappa / a
-    return 2.0 * lever * push * (1.0 + (1.0 + mu + 2.0 * mu * mu / options.h) / a)
+    return 2.0 * lever * push * (1.0 + (1.0 + mu + 2.0 * mu * mu / options.h) / a + _STEEPEST / f[PairBound.REACH])
 
 
 @optional(Slot.FAR_PAIR_IMPULSES)
@@ -133,18 +160,14 @@ def far_pair_impulses(model: Model, data: Data, h: float, kappa: float) -> None:
             data.inactive_pose[i, 3 + k] = q[k]
         for k in range(6):
             data.inactive_wrench[i, k] = 0.0
-    j = 0
-    while j < model.pair_kind.shape[0]:
+    for k in range(data.near_count[0]):
+        j = data.near_first[k]
         a = data.pair_activation[j]
-        end = j + 1
-        while end < model.pair_kind.shape[0] and model.pair_feature[end] > 0:
-            end += 1
         if a > 0.0:
             place_shapes(model, data, j, data.pos3, data.rot3)
             choose_shapes(model, data, j)
-            for m in range(j, end):
+            for m in range(j, end_of(model, j)):
                 _evaluate(model, data, h, m, kappa, a)
-        j = end
 
 
 @kernel
@@ -193,25 +216,48 @@ def add_inactive_pairs(data: Data) -> None:
 def pairs_came_near(model: Model, data: Data) -> bool:
     """Whether an inactive collision has become active at configuration 3; it is active from now on."""
     found = False
-    j = 0
-    while j < model.pair_kind.shape[0]:
-        least = data.pair_out[j, Witness.GAP]
-        end = j + 1
-        while end < model.pair_kind.shape[0] and model.pair_feature[end] > 0:
-            least = min(least, data.pair_out[end, Witness.GAP])
-            end += 1
+    for m in range(data.near_count[0]):
+        j = data.near_first[m]
+        least = 1e300
+        for k in range(j, end_of(model, j)):
+            least = min(least, data.pair_out[k, Witness.GAP])
         if data.pair_activation[j] > 0.0 and least < data.pair_activation[j]:
             found = True
-            data.pair_activation[j] = 0.0
-            place_shapes(model, data, j, data.pos2, data.rot2)
-            open_pairs(model, data, j)
-        j = end
+            _activate(model, data, j)
+    return _came_within_reach(model, data) or found
+
+
+@kernel
+def _activate(model: Model, data: Data, j: int) -> None:
+    """The collision that begins at pair j is active from now on."""
+    data.pair_activation[j] = 0.0
+    place_shapes(model, data, j, data.pos2, data.rot2)
+    open_pairs(model, data, j)
+
+
+@kernel
+def _came_within_reach(model: Model, data: Data) -> bool:
+    """Whether a collision that was beyond its reach is within it at configuration 3; it is active from now on."""
+    found = False
+    follow_step(model, data)
+    if stay_beyond(data):
+        return False
+    j = 0
+    while j < model.pair_kind.shape[0]:
+        if data.pair_activation[j] == FAR and not is_beyond(model, data, j):
+            place_shapes(model, data, j, data.pos3, data.rot3)
+            if distance(model, data, j) < model.pair_far[j, PairBound.REACH]:
+                found = True
+                _activate(model, data, j)
+        j = end_of(model, j)
+    if found:
+        enlist_near(model, data)
     return found
 
 
 @optional(Slot.ALL_NEAR)
 def all_near(model: Model, data: Data) -> None:
-    """All collisions taken as active, for the derivatives of a step that has been solved."""
-    for j in range(model.pair_kind.shape[0]):
-        data.pair_activation[j] = 0.0
+    """All collisions within their reach taken as active, for the derivatives of a step that has been solved."""
+    for m in range(data.near_count[0]):
+        data.pair_activation[data.near_first[m]] = 0.0
     enlist_pairs(model, data)

@@ -18,6 +18,7 @@ from __future__ import annotations
 from sim.contact.contact_law import contact_impulse
 from sim.contact.pairs.pair_contact import is_absent, pair_arm, pair_force
 from sim.contact.pairs.previous_features import least_size, overlap_before, rounding_of_rims
+from sim.contact.pairs.reach import end_of
 from sim.contact.pairs.string import is_taut
 from sim.contact.restitution import impulse_work
 from sim.dynamics.energy import twice_kinetic
@@ -68,12 +69,13 @@ def _overlapped(model: Model, data: Data, j: int) -> float:
 @optional(Slot.PAIR_SLACK, default=0.0)
 def pair_slack(model: Model, data: Data) -> float:
     """Sum of the normal impulses times the overlaps where the step began, which they may take away [N s m]."""
-    total, overlap = 0.0, 0.0
-    for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] == 0:
-            overlap = _overlapped(model, data, j) + _LEFT * least_size(model, j) + rounding_of_rims(model, j)
-        if not is_absent(data, j):
-            total += data.cone[model.contact_height.shape[0] + j, Cone.IMPULSE] * overlap
+    total = 0.0
+    for m in range(data.near_count[0]):
+        first = data.near_first[m]
+        overlap = _overlapped(model, data, first) + _LEFT * least_size(model, first) + rounding_of_rims(model, first)
+        for j in range(first, end_of(model, first)):
+            if not is_absent(data, j):
+                total += data.cone[model.contact_height.shape[0] + j, Cone.IMPULSE] * overlap
     return total
 
 
@@ -82,23 +84,19 @@ def pairs_gained(model: Model, data: Data, options: StepOptions, v: Vector) -> b
     """Whether the impulses of collisions gave energy in the solved step, of shapes that were apart where it began."""
     h = options.h
     ground = model.contact_height.shape[0]
-    gain, power, allowed, slack = 0.0, 0.0, 0.0, 0.0
-    counts = False
-    for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] == 0:
-            size = least_size(model, j)
-            overlap = _overlapped(model, data, j)
-            slack = overlap + _LEFT * size + rounding_of_rims(model, j) + options.tolerance
-            counts = data.pair_activation[j] == 0.0 and overlap < _THROWN * size
-        if (
-            not counts
-            or is_absent(data, j)
-            or is_taut(model, data, j)
-            or data.bounce[ground + j, Bounce.RESTITUTION] > 0.0
-        ):
+    gain, power, allowed = 0.0, 0.0, 0.0
+    for m in range(data.near_count[0]):
+        first = data.near_first[m]
+        size = least_size(model, first)
+        overlap = _overlapped(model, data, first)
+        slack = overlap + _LEFT * size + rounding_of_rims(model, first) + options.tolerance
+        if data.pair_activation[first] != 0.0 or not overlap < _THROWN * size:
             continue
-        gain += impulse_work(model, data, h, ground + j)
-        power += power_after(model, data, h, j)
-        allowed += (2.0 * options.kappa + data.cone[ground + j, Cone.IMPULSE] * slack) / h
+        for j in range(first, end_of(model, first)):
+            if is_absent(data, j) or is_taut(model, data, j) or data.bounce[ground + j, Bounce.RESTITUTION] > 0.0:
+                continue
+            gain += impulse_work(model, data, h, ground + j)
+            power += power_after(model, data, h, j)
+            allowed += (2.0 * options.kappa + data.cone[ground + j, Cone.IMPULSE] * slack) / h
     least = min(gain, power)
     return least > allowed and least > allowed + 0.5 * _SHARE * twice_kinetic(model, data, h, v)

@@ -11,6 +11,7 @@ from sim.contact.contact_law import condense_contact, contact_constant, contact_
 from sim.contact.pairs.inactive_pairs import add_inactive_pairs
 from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
 from sim.contact.pairs.pair_jacobian import pair_jacobian
+from sim.contact.pairs.reach import with_share
 from sim.contact.pairs.string import is_taut
 from sim.contact.pairs.string_stiffness import add_string_stiffness, add_string_turn
 from sim.contact.pairs.wrench_columns import add_wrench_column, centre_shift, point_shift, unit_vector
@@ -25,15 +26,16 @@ from solvers.types import Matrix, Vector
 
 
 @kernel
-def impulse_rate(data: Data, c: int, C: Vector, k: int) -> Vec3:
-    """W times column k of C (3 x 6)."""
+def impulse_rate(data: Data, c: int, j: int, C: Vector, k: int, p: Vec3) -> Vec3:
+    """W times column k of C (3 x 6), and the change of the part that acts of the impulse p of pair j, contact c."""
     W = data.contact_W[c]
     x, y, z = C[k], C[6 + k], C[12 + k]
-    return (
+    rate = (
         W[0] * x + W[1] * y + W[2] * z,
         W[3] * x + W[4] * y + W[5] * z,
         W[6] * x + W[7] * y + W[8] * z,
     )
+    return with_share(data, j, x, rate, p)
 
 
 @kernel
@@ -46,8 +48,8 @@ def add_pair_stiffness(model: Model, data: Data, j: int, share: float) -> None:
     b = model.coupling_body[model.pair_coupling[j], 1]
     c = model.contact_height.shape[0] + j
     wa, wb = shares(model, j)
-    n, t1, t2 = contact_impulse(model, data, c)
-    f = pair_force(data, j, share * n, share * t1, share * t2)
+    p = contact_impulse(model, data, c)
+    f = pair_force(data, j, share * p[0], share * p[1], share * p[2])
     P = pair_arm(model, data, j)
     Ka = data.coupling_K[2 * model.pair_coupling[j]]
     Kb = data.coupling_K[2 * model.pair_coupling[j] + 1]
@@ -58,7 +60,7 @@ def add_pair_stiffness(model: Model, data: Data, j: int, share: float) -> None:
     for k in range(6):
         turn = (Omega[k], Omega[6 + k], Omega[12 + k])
         shift = (M[k], M[6 + k], M[12 + k])
-        g = impulse_rate(data, c, data.pair_Ca[j], k)
+        g = impulse_rate(data, c, j, data.pair_Ca[j], k, p)
         e = pair_force(data, j, g[0], g[1], g[2])
         r = cross(turn[0], turn[1], turn[2], f[0], f[1], f[2])
         x = centre_shift(data, data.pos3, a, k)
@@ -67,14 +69,14 @@ def add_pair_stiffness(model: Model, data: Data, j: int, share: float) -> None:
         add_wrench_column(Ka, k, f, df, P, dP)
         if b < 0:
             continue
-        g = impulse_rate(data, c, data.pair_Cb[j], k)
+        g = impulse_rate(data, c, j, data.pair_Cb[j], k, p)
         e = pair_force(data, j, g[0], g[1], g[2])
         u = unit_vector(k - 3)
         r = cross(u[0] - turn[0], u[1] - turn[1], u[2] - turn[2], f[0], f[1], f[2])
-        p = point_shift(k, F[PairFrame.POINT] - o[0], F[PairFrame.POINT + 1] - o[1], F[PairFrame.POINT + 2] - o[2])
+        s = point_shift(k, F[PairFrame.POINT] - o[0], F[PairFrame.POINT + 1] - o[1], F[PairFrame.POINT + 2] - o[2])
         x = centre_shift(data, data.pos3, b, k)
         df = (e[0] + r[0], e[1] + r[1], e[2] + r[2])
-        dP = (p[0] - shift[0] - wb * x[0], p[1] - shift[1] - wb * x[1], p[2] - shift[2] - wb * x[2])
+        dP = (s[0] - shift[0] - wb * x[0], s[1] - shift[1] - wb * x[1], s[2] - shift[2] - wb * x[2])
         add_wrench_column(Kb, k, f, df, P, dP)
 
 

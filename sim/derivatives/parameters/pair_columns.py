@@ -5,6 +5,7 @@ from __future__ import annotations
 from sim.contact.collision.witness import NOWHERE, dot
 from sim.contact.contact_law import contact_impulse
 from sim.contact.pairs.pair_contact import POLE, is_absent, pair_force, shape_b
+from sim.contact.pairs.reach import with_share
 from sim.contact.pairs.string import is_taut
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.contact_columns import add_pair, floor_change, impulse_change, is_active, turning
@@ -90,9 +91,11 @@ def add_moved_shape(
         v = (v[0] - t[0], v[1] - t[1], v[2] - t[2])
     x = cross(u[0], u[1], u[2], turn[0], turn[1], turn[2])
     v = (v[0] + x[0], v[1] + x[1], v[2] + x[2])
-    g = impulse_change(data, c, dot(row(F, 0), z) - floor, dot(row(F, 3), v), dot(row(F, 6), v))
-    df = pair_force(data, j, g[0], g[1], g[2])
+    gap = dot(row(F, 0), z)
     q = contact_impulse(model, data, c)
+    g = impulse_change(data, c, gap - floor, dot(row(F, 3), v), dot(row(F, 6), v))
+    g = with_share(data, j, gap, g, q)
+    df = pair_force(data, j, g[0], g[1], g[2])
     f = pair_force(data, j, q[0], q[1], q[2])
     x = cross(turn[0], turn[1], turn[2], f[0], f[1], f[2])
     add_pair(model, data, j, (df[0] + x[0], df[1] + x[1], df[2] + x[2]), dp, w, col)
