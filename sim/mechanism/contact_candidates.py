@@ -14,6 +14,7 @@ from sim.mechanism.collision import Collision
 from sim.mechanism.parts import WORLD, Body, Joint
 from sim.mechanism.polytope import Polytope, hull_table
 from sim.mechanism.shapes import HalfSpace, Solid, String, rotation_matrix
+from sim.mechanism.signed_distance import SignedDistance
 from sim.model import shape_kinds
 
 Floats = NDArray[np.float64]
@@ -90,13 +91,18 @@ def _points(collision: Collision, kind: shape_kinds.Pair, ends: list[End]) -> li
     """The contact points of two shapes in the order of their pair."""
     rope = isinstance(ends[0][1], String)  # which pulls along itself, and does not rub
     sizes = np.zeros(8)
+    values: tuple[float, ...]
     around, corners, tables = [0.0, 0.0], [0, 0], []
     for k, (_, shape) in enumerate(ends):
-        if shape_kinds.tables(kind)[k]:
+        if isinstance(shape, SignedDistance):
+            tables.append(shape.level_set.table)
+            thick = float(np.ptp(shape.outline(), axis=0).min())
+            values, around[k] = (0.0, shape.offset, thick), shape.bounding_radius()
+        elif shape_kinds.tables(kind)[k]:
             table, radius = hull_table(shape)
             points = table[1 : 1 + int(table[0, 0]), :3]
             thick = radius if len(points) < 4 else float(np.ptp(points, axis=0).min())
-            values: tuple[float, ...] = (0.0, radius, thick)
+            values = (0.0, radius, thick)
             around[k], corners[k] = float(np.linalg.norm(points, axis=1).max()) + radius, len(points)
             tables.append(table)
         else:
