@@ -25,10 +25,11 @@ def distances_to_level(solid: LevelSet) -> Floats:
     nearer than the centre of curvature; farther away, to its triangles.
     """
     counts = solid.values.shape
-    points = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3)
-    points = solid.origin + solid.spacing * points
+    nodes = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3)
+    points: Floats = solid.origin + solid.spacing * nodes
     vertices, faces = solid.surface
-    out, start = to_triangles(points, vertices[faces], 2.0 * solid.spacing)
+    corners: Floats = vertices[faces]
+    out, start = to_triangles(points, corners, 2.0 * solid.spacing)
     near = out < _NEAR * solid.spacing
     c, x = points[near], start[near]
     for _ in range(_ROUNDS):
@@ -109,9 +110,7 @@ def _nearest(x: Floats, corners: Floats) -> tuple[Floats, Floats]:
     return best[rows, pick], place[rows, pick]
 
 
-def distances_to_mesh(
-    call: str, points: Floats, counts: tuple[int, ...], vertices: Floats, faces: Integers
-) -> Floats:
+def distances_to_mesh(call: str, points: Floats, counts: tuple[int, ...], vertices: Floats, faces: Integers) -> Floats:
     """(nx, ny, nz) signed distances of the points of a grid to a closed mesh, by the sign of its winding number.
 
     Points with neighbours of the same distance or more from the surface are on one side with them: the winding number
@@ -139,7 +138,7 @@ def distances_to_mesh(
 
 
 def winding(points: Floats, vertices: Floats, faces: Integers) -> Floats:
-    """(n,) how often a mesh goes around points: solid angles over 4 pi (van Oosterom and Strackee 1983), without sign."""
+    """(n,) how often a mesh goes around points, without sign: solid angles over 4 pi (van Oosterom, Strackee 1983)."""
     corners = vertices[faces]
     out = np.empty(len(points))
     chunk = max(1, 2_000_000 // max(len(faces), 1))

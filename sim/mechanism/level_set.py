@@ -55,9 +55,7 @@ class LevelSet:
         for start in range(0, len(points), _CHUNK):
             s = (points[start : start + _CHUNK] - self.origin) / self.spacing
             s = np.clip(s, 0.0, np.array(self.values.shape) - 1.0)
-            (a, da, i), (b, db, j), (c, dc, k) = (
-                spline_basis(s[:, e], self.coefficients.shape[e]) for e in range(3)
-            )
+            (a, da, i), (b, db, j), (c, dc, k) = (spline_basis(s[:, e], self.coefficients.shape[e]) for e in range(3))
             part = self.coefficients[i[:, :, None, None], j[:, None, :, None], k[:, None, None, :]]
             along = np.einsum("nijk,nk->nij", part, c)
             here = slice(start, start + len(s))

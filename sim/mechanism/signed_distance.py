@@ -34,7 +34,7 @@ class SignedDistance(Solid):
     the Euclidean distance to the level set, whatever the scale of phi; phi itself only says where to look for the
     nearest point, so that distances are the best values. Edges of the solid are rounded, by about one cell.
 
-    Spheres and capsules collide with it, boxes and polytopes with their corners. One sphere, or end of a capsule,
+    Spheres and capsules collide with it, other shapes do not. One sphere, or end of a capsule,
     touches it at one point, the nearest: a ball that fits a hollow at two places touches in turn. On planes and ground
     it stands on points: corners of its convex hull, at most 32, each with the offset around it. Shapes with the same
     array of values share one table. Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
@@ -67,7 +67,9 @@ class SignedDistance(Solid):
             values = np.array(checks.array(f"{call}(values=...)", values, (None, None, None)))
             values.setflags(write=False)
         if min(values.shape) < _LEAST:
-            raise ValueError(f"{call}(values=...): expected at least {_LEAST} values along each axis, got {values.shape}")
+            raise ValueError(
+                f"{call}(values=...): expected at least {_LEAST} values along each axis, got {values.shape}"
+            )
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "origin", checks.vector(f"{call}(origin=...)", self.origin, 3))
         self._positive("spacing")

@@ -1,4 +1,6 @@
-"""Balls and capsules a against the level set of a field b (level_set.py), with a radius around it. With delta = v + w x c
+"""Balls and capsules a against the level set of a field b (level_set.py), with a radius around it.
+
+With delta = v + w x c:
 
     ball at c             dn = (I + d S)^-1 S delta
     capsule, c = r + s u  where n.u = 0:  (u.K u) ds = -(u.K delta + n.(w x u)),   dn = K (delta + u ds)
@@ -19,7 +21,7 @@ from solvers.rotation import Vec3
 from solvers.types import Matrix, Vector
 
 _STEPS = 60  # of Newton's method along a capsule
-_CONVERGED = 1e-9  # of its half length: a step after which the next one would be rounding
+_CONVERGED = 1e-13  # of its half length: a step that is rounding
 _FLAT = 1e-3  # curvature along a capsule over its half length, below which the ends are enough
 INSIDE = 2  # the point of a capsule that is between its ends
 
@@ -76,8 +78,8 @@ def slope(hull: Matrix, o: int, c: Vec3, u: Vec3) -> tuple[float, float, tuple[f
 
 @kernel
 def between(hull: Matrix, o: int, c: Vec3, u: Vec3, half: float) -> tuple[float, bool]:
-    """Where along |s| <= half a segment is nearer to the level set than beside it, and whether that is between its ends:
-    Newton's method within bounds that close in. An end where it is not.
+    """Where along |s| <= half a segment is nearer to the level set than beside it, and whether that is between its
+    ends: Newton's method within bounds that close in. An end where it is not.
     """
     low, high = -half, half
     if slope(hull, o, along(c, low, u), u)[0] >= 0.0:

@@ -45,7 +45,12 @@ def weights(t: float) -> tuple[Vec4, Vec4, Vec4]:
     """Weights of four coefficients at the fraction t of a cell, and their first and second derivatives."""
     u = 1.0 - t
     return (
-        (u * u * u / 6.0, (4.0 + t * t * (3.0 * t - 6.0)) / 6.0, (4.0 + u * u * (3.0 * u - 6.0)) / 6.0, t * t * t / 6.0),
+        (
+            u * u * u / 6.0,
+            (4.0 + t * t * (3.0 * t - 6.0)) / 6.0,
+            (4.0 + u * u * (3.0 * u - 6.0)) / 6.0,
+            t * t * t / 6.0,
+        ),
         (-0.5 * u * u, t * (1.5 * t - 2.0), -u * (1.5 * u - 2.0), 0.5 * t * t),
         (u, 3.0 * t - 2.0, 3.0 * u - 2.0, t),
     )

@@ -220,7 +220,7 @@ def face_polytope_polytope(model: Model, feature: int, sizes: Vector, R: Vector,
 def _put_field(
     model: Model, kind: int, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector
 ) -> None:
-    """`put_contact` of a level set; no other kind comes here but those of cylinders, which have kernels of their own."""
+    """`put_contact` of a level set; of the others only those of cylinders come here, which have their own kernels."""
     if kind == Pair.SPHERE_FIELD:
         _sphere_field(model, feature, code, sizes, R, r, out)
     elif kind == Pair.CAPSULE_FIELD:
