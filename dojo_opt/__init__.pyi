@@ -54,6 +54,7 @@ from sim.mechanism.shapes import (
     Sphere as Sphere,
     String as String,
 )
+from sim.mechanism.signed_distance import SignedDistance as SignedDistance
 from sim.simulator.simulator import Simulator as Simulator
 from sim.simulator.inverse_kinematics import IkResult as IkResult, ik as ik
 from sim.simulator.kinematics import Kinematics as Kinematics

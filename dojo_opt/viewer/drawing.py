@@ -151,8 +151,9 @@ def extent(found: Sequence[Piece]) -> Floats:
         else:
             assert piece.solid is not None
             size = piece.solid.size
-            radius = float(np.max(size)) if piece.solid.kind != "hull" else 0.0
-            own = size if piece.solid.kind == "hull" else np.array([[-radius] * 3, [radius] * 3])
+            of_points = piece.solid.kind in ("hull", "triangles")
+            radius = 0.0 if of_points else float(np.max(size))
+            own = size if of_points else np.array([[-radius] * 3, [radius] * 3])
         points.append(own @ piece.place[:3, :3].T + piece.place[:3, 3])
     return np.concatenate(points)
 
@@ -163,6 +164,10 @@ def geometry(piece: Piece) -> tuple[Any, Any, Floats]:
 
     if piece.mesh is None:
         assert piece.solid is not None
+        if piece.solid.kind == "triangles":
+            corners = piece.solid.size
+            mesh = TriangleMesh(corners, np.arange(len(corners)).reshape(-1, 3), None)
+            return _surface(mesh), material(piece.color), piece.place
         if piece.solid.kind == "hull":
             shape = _hull(piece.solid.size)
             return _surface(shape), material(piece.color), piece.place

@@ -38,6 +38,7 @@ PARTS = {
     "MjcfReport": "sim.io.mjcf.report",
     "Note": "sim.io.urdf.report",
     "Polytope": "sim.mechanism.polytope",
+    "SignedDistance": "sim.mechanism.signed_distance",
     "Simulator": "sim.simulator.simulator",
     "Sphere": "sim.mechanism.shapes",
     "String": "sim.mechanism.shapes",

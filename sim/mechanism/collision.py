@@ -29,8 +29,8 @@ class Collision:
     Attributes:
         a: name of the first body.
         b: name of the second body (default None: the world, whose shape is an obstacle, a step or a slope).
-        shape_a: Sphere, Capsule, Box, Cylinder, Ellipsoid, Polytope or HalfSpace; a HalfSpace moves with its body
-            (default None: the shape of the body).
+        shape_a: Sphere, Capsule, Box, Cylinder, Ellipsoid, Polytope, SignedDistance or HalfSpace; a HalfSpace
+            moves with its body (default None: the shape of the body).
         shape_b: likewise of b; of the world, it is placed in world axes (default None: the shape of the body).
         friction: coefficient of friction (default None: the larger one of the two shapes, 0.5 where they have none).
         law: contact law, see `dojo.Contact` (default "nonlinear").

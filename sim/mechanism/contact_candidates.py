@@ -14,6 +14,7 @@ from sim.mechanism.collision import Collision
 from sim.mechanism.parts import WORLD, Body, Joint
 from sim.mechanism.polytope import Polytope, hull_table
 from sim.mechanism.shapes import HalfSpace, Solid, String, rotation_matrix
+from sim.mechanism.signed_distance import SignedDistance
 from sim.model import shape_kinds
 
 Floats = NDArray[np.float64]
@@ -72,9 +73,9 @@ def _touches(call: str, bodies: Sequence[Body], index: dict[str, int], collision
     (a, first), (b, second) = solids
     if isinstance(first, String) and isinstance(second, String) and first.length != second.length:
         raise ValueError(f"{call}: both ends of a string have its length, got {first.length:g} and {second.length:g}")
-    if isinstance(first, Polytope) and isinstance(second, HalfSpace):
+    if isinstance(first, _STANDING) and isinstance(second, HalfSpace):
         return _corners(collision, (a, first), (b, second))
-    if isinstance(first, HalfSpace) and isinstance(second, Polytope) and b >= 0:
+    if isinstance(first, HalfSpace) and isinstance(second, _STANDING) and b >= 0:
         return _corners(collision, (b, second), (a, first))
     match = shape_kinds.pair(first.code, second.code)
     if match is None:
@@ -90,13 +91,18 @@ def _points(collision: Collision, kind: shape_kinds.Pair, ends: list[End]) -> li
     """The contact points of two shapes in the order of their pair."""
     rope = isinstance(ends[0][1], String)  # which pulls along itself, and does not rub
     sizes = np.zeros(8)
+    values: tuple[float, ...]
     around, corners, tables = [0.0, 0.0], [0, 0], []
     for k, (_, shape) in enumerate(ends):
-        if shape_kinds.tables(kind)[k]:
+        if isinstance(shape, SignedDistance):
+            tables.append(shape.level_set.table)
+            thick = float(np.ptp(shape.outline(), axis=0).min())
+            values, around[k] = (0.0, shape.offset, thick), shape.bounding_radius()
+        elif shape_kinds.tables(kind)[k]:
             table, radius = hull_table(shape)
             points = table[1 : 1 + int(table[0, 0]), :3]
             thick = radius if len(points) < 4 else float(np.ptp(points, axis=0).min())
-            values: tuple[float, ...] = (0.0, radius, thick)
+            values = (0.0, radius, thick)
             around[k], corners[k] = float(np.linalg.norm(points, axis=1).max()) + radius, len(points)
             tables.append(table)
         else:
@@ -126,21 +132,33 @@ def _points(collision: Collision, kind: shape_kinds.Pair, ends: list[End]) -> li
     ]
 
 
-_REASON = "half-spaces do not end, so one of the two has to be another shape; the ends of a string are both strings"
+_STANDING = (Polytope, SignedDistance)  # on a plane, with points
+_REASON = (
+    "half-spaces do not end, so one of the two has to be another shape; the ends of a string are both strings; "
+    "a signed distance collides with spheres, capsules and half-spaces"
+)
 
 
-def _corners(collision: Collision, solid: tuple[int, Polytope], ground: End) -> list[Touch]:
-    """A polytope above a half-space touches it with its corners: points, each a ball without radius."""
+def _corners(collision: Collision, solid: tuple[int, Polytope | SignedDistance], ground: End) -> list[Touch]:
+    """A polytope above a half-space touches it with its corners: points, each a ball without radius; a signed distance
+    with the points of its stance, each with the offset around it.
+    """
     body, shape = solid
     places = np.array([_place(shape), _place(ground[1])])
     kind, bodies = int(shape_kinds.Pair.SPHERE_HALFSPACE), (body, ground[0])
-    out = []
-    for k, point in enumerate(np.asarray(shape.vertices) @ places[0, 3:].reshape(3, 3).T + places[0, :3]):
+    stance, out = shape.stance(), []
+    sizes = np.zeros(8)
+    sizes[0] = stance.radius
+    for k, point in enumerate(stance.points @ places[0, 3:].reshape(3, 3).T + places[0, :3]):
         where = places.copy()
         where[0, :3] = point
         law = (collision.friction or 0.0, collision.law, collision.restitution or 0.0, collision.name)
         reach = inf if collision.reach is None else collision.reach
-        out.append(Touch(f"{collision.name}_{k}", bodies, kind, 0, np.zeros(8), (), (0.0, np.inf), where, *law, reach))
+        out.append(
+            Touch(
+                f"{collision.name}_{k}", bodies, kind, 0, sizes.copy(), (), (stance.radius, np.inf), where, *law, reach
+            )
+        )
     return out
 
 

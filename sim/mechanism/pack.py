@@ -11,7 +11,7 @@ from sim.mechanism.axes import contact_frame, fixed_axes, translation_axes
 from sim.mechanism.contact_candidates import couples
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack_clusters import pack_clusters
-from sim.mechanism.pack_collisions import pack_collisions
+from sim.mechanism.pack_collisions import pack_collisions, tables_of
 from sim.mechanism.parts import WORLD, Contact, Joint
 from sim.mechanism.seen_inertia import seen_inertias
 from sim.mechanism.servos import is_limited, limited_servos, with_servos
@@ -42,7 +42,7 @@ def mechanism_sizes(mech: Mechanism) -> Sizes:
         ncoupling=npairs + len(mech.loops),
         nrow=6 * npairs + sum(6 - j.nv for j in mech.loops) + len(mech.gears),
         nloop=len(mech.loops),
-        nhull=max(1, sum(len(table) for touch in mech.touches for table in touch.hulls)),
+        nhull=max(1, sum(len(table) for table in tables_of(mech.touches))),
         ngear=len(mech.gears),
         nterrain=len(fields),
         nheight=sum(f.coefficients.size for f in fields),

@@ -6,11 +6,14 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.mechanism.contact_candidates import Touch, couples
 from sim.mechanism.mechanism import Mechanism
 from sim.model import shape_kinds
 from sim.model.model import Law, Model
+
+Floats = NDArray[np.float64]
 
 
 def pack_collisions(mech: Mechanism, model: Model) -> None:
@@ -58,14 +61,21 @@ def _pack_far(found: Sequence[Touch], model: Model) -> None:
         model.pair_far[j] = sum(touch.radii), *arms, mobility, turning, most, end - j, touch.reach
 
 
+def tables_of(found: Sequence[Touch]) -> list[Floats]:
+    """The tables of shapes, each once, though many shapes may share it."""
+    return list({id(table): table for touch in found for table in touch.hulls}.values())
+
+
 def _pack_hulls(found: Sequence[Touch], model: Model) -> None:
-    """hull, and where in it the polytopes of every point are."""
-    end, rows = 0, [0, 0]
+    """hull, and where in it the shapes of every point have theirs."""
+    end, rows, starts = 0, [0, 0], {}
+    for table in tables_of(found):
+        starts[id(table)] = end
+        model.hull[end : end + len(table)] = table
+        end += len(table)
     for j, touch in enumerate(found):
         for k, table in enumerate(touch.hulls):
-            rows[k] = end
-            model.hull[end : end + len(table)] = table
-            end += len(table)
+            rows[k] = starts[id(table)]
         sides = [side for side, given in enumerate(shape_kinds.tables(touch.kind)) if given]
         for side, row in zip(sides, rows, strict=False):
             model.pair_sizes[j, 4 * side] = row

@@ -42,7 +42,7 @@ def _matrix(w: Any, x: Any, y: Any, z: Any) -> list[list[Any]]:
 class Primitive(NamedTuple):
     """A part of the drawing of a shape: in the frame of the shape, about its own centre, long along z."""
 
-    kind: str  # "ball" of one radius or three, "cylinder" of radius and length, "box" of its edges, "hull" of points
+    kind: str  # "ball" of one radius or three, "cylinder" of radius and length, "box", "hull" or "triangles"
     size: Floats  # [m]
     center: tuple[float, float, float] = (0.0, 0.0, 0.0)
 

@@ -1,4 +1,4 @@
-"""Cubic B-splines in the plane: coefficients through heights on a grid, values and derivatives for many points at once.
+"""Cubic B-splines: coefficients through heights on a grid, values and derivatives for many points at once.
 
 Compiled code reads the same coefficients in height_field.py.
 """
@@ -15,10 +15,15 @@ Floats = NDArray[np.float64]
 
 def spline_coefficients(heights: ArrayLike) -> Floats:
     """(nx + 2, ny + 2) coefficients of the cubic B-spline through heights (nx, ny); not-a-knot at the edges."""
-    out = np.asarray(heights, dtype=np.float64)
-    for _ in range(2):
-        out = np.linalg.solve(_collocation(len(out)), np.concatenate([out, np.zeros((2, out.shape[1]))])).T
-    return np.ascontiguousarray(out)
+    return spline_coefficients_along(spline_coefficients_along(np.asarray(heights, dtype=np.float64), 0), 1)
+
+
+def spline_coefficients_along(values: Floats, axis: int) -> Floats:
+    """The same along one axis of an array, which gets longer by two."""
+    rows = np.moveaxis(values, axis, 0)
+    ends = np.zeros((2, rows[0].size))
+    out = np.linalg.solve(_collocation(len(rows)), np.concatenate([rows.reshape(len(rows), -1), ends]))
+    return np.ascontiguousarray(np.moveaxis(out.reshape(-1, *rows.shape[1:]), 0, axis))
 
 
 def spline_gradient(rows: Floats) -> Floats:
@@ -43,8 +48,8 @@ def _collocation(n: int) -> Floats:
 
 def spline(coefficients: Floats, s: Floats, t: Floats) -> tuple[Floats, Floats, Floats]:
     """(F, F_s, F_t) of a cubic B-spline at grid coordinates; see height_field.py."""
-    bs, ds, rows = _basis(s, coefficients.shape[0])
-    bt, dt, columns = _basis(t, coefficients.shape[1])
+    bs, ds, rows = spline_basis(s, coefficients.shape[0])
+    bt, dt, columns = spline_basis(t, coefficients.shape[1])
     c = coefficients[rows[..., :, None], columns[..., None, :]]
     pick = "...i,...ij,...j->..."
     return np.einsum(pick, bs, c, bt), np.einsum(pick, ds, c, bt), np.einsum(pick, bs, c, dt)
@@ -54,15 +59,15 @@ def spline_shares(shape: tuple[int, ...], s: Floats, t: Floats) -> Any:
     """(number of points, nx ny) shares of the coefficients, `shape` (nx, ny), in F at grid coordinates; sparse."""
     from scipy.sparse import csr_array
 
-    bs, _, rows = _basis(s.ravel(), shape[0])
-    bt, _, columns = _basis(t.ravel(), shape[1])
+    bs, _, rows = spline_basis(s.ravel(), shape[0])
+    bt, _, columns = spline_basis(t.ravel(), shape[1])
     index = rows[:, :, None] * shape[1] + columns[:, None, :]
     points = np.broadcast_to(np.arange(len(index))[:, None, None], index.shape)
     weights = bs[:, :, None] * bt[:, None, :]
     return csr_array((weights.ravel(), (points.ravel(), index.ravel())), shape=(len(index), shape[0] * shape[1]))
 
 
-def _basis(s: Floats, count: int) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def spline_basis(s: Floats, count: int) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Weights of four coefficients, their derivatives, and which coefficients they are."""
     s = np.clip(s, -4.0, count + 2.0)
     i = np.floor(s)

@@ -24,6 +24,7 @@ class Shape(IntEnum):
     HALFSPACE = 4  # no sizes: z <= 0 of its frame is solid
     POLYTOPE = 6  # row of its table (hull.py), radius around it; as others are against one, and all against a cylinder
     ELLIPSOID = 7  # semi-axes along x, y, z
+    FIELD = 8  # row of its table (level_set.py), radius around the level set, least extent
     STRING = 5  # as shape a: greatest length; against a STRING b without sizes: the other end
 
 
@@ -63,9 +64,11 @@ class Pair(IntEnum):
     ELLIPSOID_ELLIPSOID = 13
     CYLINDER_ELLIPSOID = 14
     POLYTOPE_ELLIPSOID = 15
-    POLYTOPE_POLYTOPE = 16  # from here on pairs have room for elements that are kept
-    POLYTOPE_CYLINDER = 17
-    CYLINDER_CYLINDER = 18
+    SPHERE_FIELD = 16
+    CAPSULE_FIELD = 17
+    POLYTOPE_POLYTOPE = 18  # from here on pairs have room for elements that are kept
+    POLYTOPE_CYLINDER = 19
+    CYLINDER_CYLINDER = 20
 
 
 _PAIRS: dict[tuple[Shape | None, Shape | None], Pair] = {
@@ -85,6 +88,8 @@ _PAIRS: dict[tuple[Shape | None, Shape | None], Pair] = {
     (Shape.ELLIPSOID, Shape.ELLIPSOID): Pair.ELLIPSOID_ELLIPSOID,
     (Shape.CYLINDER, Shape.ELLIPSOID): Pair.CYLINDER_ELLIPSOID,
     (Shape.POLYTOPE, Shape.ELLIPSOID): Pair.POLYTOPE_ELLIPSOID,
+    (Shape.SPHERE, Shape.FIELD): Pair.SPHERE_FIELD,
+    (Shape.CAPSULE, Shape.FIELD): Pair.CAPSULE_FIELD,
     (Shape.POLYTOPE, Shape.POLYTOPE): Pair.POLYTOPE_POLYTOPE,
     (Shape.POLYTOPE, Shape.CYLINDER): Pair.POLYTOPE_CYLINDER,
     (Shape.CYLINDER, Shape.CYLINDER): Pair.CYLINDER_CYLINDER,
@@ -97,6 +102,7 @@ _COUNT = {
     Pair.BOX_BOX: 13,  # first and last points of four clipped edges, four corners of b, closest point elsewhere
     Pair.BOX_HALFSPACE: 8,  # corners
     Pair.CYLINDER_HALFSPACE: 8,  # lowest points of two rims, three fixed points on each
+    Pair.CAPSULE_FIELD: 3,  # ends, a place between them
     Pair.CYLINDER_CYLINDER: 2 * RIM_POINTS + CROSSINGS,  # on the rims of each; where axes and rims cross
 }
 
@@ -104,6 +110,8 @@ _COUNT = {
 _STANDING = {Shape.SPHERE, Shape.CAPSULE, Shape.BOX}  # on corners, which may have a ball around them: polytopes
 _TABLES = {
     Pair.POLYTOPE_ELLIPSOID: (True, False),
+    Pair.SPHERE_FIELD: (False, True),
+    Pair.CAPSULE_FIELD: (False, True),
     Pair.POLYTOPE_POLYTOPE: (True, True),
     Pair.POLYTOPE_CYLINDER: (True, False),
 }
@@ -128,7 +136,7 @@ def _forms(a: Shape | None) -> list[Shape | None]:
 
 
 def tables(kind: int) -> tuple[bool, bool]:
-    """Whether the shapes of a pair are given by tables of corners (hull.py)."""
+    """Whether the shapes of a pair are given by tables: of corners (hull.py), or of a field (level_set.py)."""
     return _TABLES.get(Pair(kind % SWAPPED), (False, False))
 
 

@@ -196,3 +196,7 @@ class Slot(IntEnum):
     # contacts that only derivatives take as active; rows of pairs
     ALL_STIFF = 162
     PAIRS_FINITE = 163
+    # spheres and capsules against level sets
+    PUT_SPHERE_FIELD = 164
+    PUT_CAPSULE_FIELD = 165
+    CHOOSE_CAPSULE_FIELD = 166

@@ -10,7 +10,7 @@ from support.solids import PAIRS
 
 POLYTOPES = ["sphere_polytope", "capsule_polytope", "box_polytope", "polytope_polytope"]
 ON_CYLINDERS = ["capsule_cylinder", "box_cylinder", "polytope_cylinder"]
-OTHERS = [p.name.lower() for p in Pair if not p.name.startswith("POLYTOPE")]
+OTHERS = [p.name.lower() for p in Pair if not p.name.startswith("POLYTOPE") and not p.name.endswith("FIELD")]
 ON_ELLIPSOIDS = ["sphere_ellipsoid", "capsule_ellipsoid", "box_ellipsoid", "polytope_ellipsoid"]
 NAMES = [n for n in OTHERS if "ellipsoid" not in n] + POLYTOPES + ON_CYLINDERS
 NAMES += [n for n in OTHERS if "ellipsoid" in n] + ON_ELLIPSOIDS

@@ -215,7 +215,7 @@ def test_a_wheel_rolls_on_the_lowest_points_of_its_rims() -> None:
 _ARRANGED = (Pair.POLYTOPE_POLYTOPE, Pair.POLYTOPE_CYLINDER, Pair.CYLINDER_CYLINDER)
 
 
-@pytest.mark.parametrize("kind", [p for p in Pair if p not in _ARRANGED])
+@pytest.mark.parametrize("kind", [p for p in Pair if p not in _ARRANGED and not p.name.endswith("FIELD")])
 def test_aligned_shapes_on_a_grid_have_a_point_and_finite_numbers(kind: Pair) -> None:
     """Every tie at once: centres on a grid of half sizes, axes along axes."""
     for turn in list(Rotation.create_group("O"))[::5]:

@@ -10,7 +10,7 @@ from support.collide import collide, collide_rows
 
 Array = np.ndarray
 NO_HULL = np.zeros((1, 4))
-TABLES = {"POLYTOPE"}  # test_collision_table.py covers polytopes
+TABLES = {"POLYTOPE", "FIELD"}  # test_collision_table.py covers polytopes, test_signed_distance.py fields
 SIMPLE = [p for p in Pair if p < Pair.POLYTOPE_POLYTOPE and not TABLES & set(p.name.split("_"))]
 CORE = [p for p in SIMPLE if not {"CYLINDER", "HALFSPACE", "STRING", "ELLIPSOID"} & set(p.name.split("_"))]
 NAMES = {p: p.name.lower() for p in Pair}

@@ -17,6 +17,7 @@ from sim.contact.collision.pair_kernels import (
     choose_box_box,
     choose_capsule_box,
     choose_capsule_capsule,
+    choose_capsule_field,
     choose_polytope_polytope,
     face_polytope_polytope,
     put_contact,
@@ -104,9 +105,13 @@ def _choose(
         return choose_capsule_box(model, feature, arrangement, sizes, R, r, out)
     if kind == Pair.POLYTOPE_POLYTOPE:
         return choose_polytope_polytope(model, feature, arrangement, sizes, R, r, out)
-    code = choose_capsule_capsule(model, feature, sizes, R, r) if kind == Pair.CAPSULE_CAPSULE else 1
+    code = 1
+    if kind == Pair.CAPSULE_CAPSULE:
+        code = choose_capsule_capsule(model, feature, sizes, R, r)
+    elif kind == Pair.CAPSULE_FIELD:
+        code = choose_capsule_field(model, feature, sizes, R, r)
     put_contact(model, kind, feature, code, sizes, R, r, out)
-    return code if out[0] < ABSENT else 0
+    return 0 if out[0] >= ABSENT else code  # NaN is a contact that was not found, and fails the step
 
 
 @kernel

@@ -21,6 +21,7 @@ from sim.contact.collision.ellipsoid import (
     ellipsoid_halfspace,
     polytope_ellipsoid,
 )
+from sim.contact.collision.fields import capsule_field, choose_end, sphere_field
 from sim.contact.collision.halfspace import box_halfspace, capsule_halfspace, cylinder_halfspace, sphere_halfspace
 from sim.contact.collision.sphere import sphere_box, sphere_capsule, sphere_cylinder, sphere_sphere, string
 from sim.contact.collision.witness import absent
@@ -128,6 +129,16 @@ def _polytope_ellipsoid(
     polytope_ellipsoid(sizes, model.hull, R, r, out)
 
 
+@optional(Slot.PUT_SPHERE_FIELD)
+def _sphere_field(model: Model, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+    sphere_field(sizes, model.hull, r, out)
+
+
+@optional(Slot.PUT_CAPSULE_FIELD)
+def _capsule_field(model: Model, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+    capsule_field(feature, sizes, model.hull, R, r, out)
+
+
 @optional(Slot.PUT_POLYTOPE_POLYTOPE)
 def _polytope_polytope(model: Model, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     hulls.put_elements(feature, code, sizes, model.hull, R, r, out)
@@ -169,6 +180,12 @@ def choose_capsule_capsule(model: Model, feature: int, sizes: Vector, R: Vector,
     return segment.choose_points(feature, sizes, R, r)
 
 
+@optional(Slot.CHOOSE_CAPSULE_FIELD)
+def choose_capsule_field(model: Model, feature: int, sizes: Vector, R: Vector, r: Vector) -> int:
+    """`choose` of collide.py for this pair."""
+    return choose_end(feature, sizes, model.hull, R, r)
+
+
 @optional(Slot.CHOOSE_CAPSULE_BOX)
 def choose_capsule_box(
     model: Model, feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector
@@ -197,6 +214,19 @@ def choose_polytope_polytope(
 def face_polytope_polytope(model: Model, feature: int, sizes: Vector, R: Vector, r: Vector) -> int:
     """`instead` of collide.py for this pair."""
     return hulls.face_towards(feature, sizes, model.hull, R, r)
+
+
+@inner_kernel
+def _put_field(
+    model: Model, kind: int, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector
+) -> None:
+    """`put_contact` of a level set; of the others only those of cylinders come here, which have their own kernels."""
+    if kind == Pair.SPHERE_FIELD:
+        _sphere_field(model, feature, code, sizes, R, r, out)
+    elif kind == Pair.CAPSULE_FIELD:
+        _capsule_field(model, feature, code, sizes, R, r, out)
+    else:
+        absent(out)
 
 
 @inner_kernel
@@ -241,7 +271,7 @@ def put_contact(
     elif kind == Pair.POLYTOPE_POLYTOPE:
         _polytope_polytope(model, feature, code, sizes, R, r, out)
     else:
-        absent(out)
+        _put_field(model, kind, feature, code, sizes, R, r, out)
 
 
 KERNELS: dict[Pair, tuple[Callable[..., Any], ...]] = {
@@ -274,6 +304,11 @@ KERNELS: dict[Pair, tuple[Callable[..., Any], ...]] = {
     Pair.ELLIPSOID_ELLIPSOID: (_ellipsoid_ellipsoid,),
     Pair.CYLINDER_ELLIPSOID: (_cylinder_ellipsoid,),
     Pair.POLYTOPE_ELLIPSOID: (_polytope_ellipsoid,),
+    Pair.SPHERE_FIELD: (_sphere_field,),
+    Pair.CAPSULE_FIELD: (
+        _capsule_field,
+        choose_capsule_field,
+    ),
     Pair.POLYTOPE_POLYTOPE: (
         _polytope_polytope,
         arrange_polytope_polytope,

@@ -1,0 +1,330 @@
+"""SignedDistance: a solid of any smooth form, given by a field on a grid, as a shape."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
+from sim.mechanism.distances import distances_to_level, distances_to_mesh
+from sim.mechanism.level_set import LevelSet, level_set
+from sim.mechanism.shapes import Primitive, Solid, Stance, rotation_matrix
+from sim.model import shape_kinds
+from sim.model.shape_kinds import Size
+
+Floats = NDArray[np.float64]
+Field = Callable[[Floats], ArrayLike]
+
+_LEAST = 4  # values along each axis
+_MARGIN = 3  # cells around a mesh
+_STAND = 32  # points on which it stands
+
+
+@dataclass(frozen=True, eq=False)
+class SignedDistance(Solid):
+    """The solid inside of the level set phi = 0 of a field on a grid: phi < 0 inside, phi > 0 outside.
+
+    phi is a cubic B-spline through the values: its surface, normals and curvature are smooth. The gap of a contact is
+    the Euclidean distance to the level set, whatever the scale of phi; phi itself only says where to look for the
+    nearest point, so that distances are the best values. Edges of the solid are rounded, by about one cell.
+
+    Spheres and capsules collide with it, other shapes do not. One sphere, or end of a capsule,
+    touches it at one point, the nearest: a ball that fits a hollow at two places touches in turn. On planes and ground
+    it stands on points: corners of its convex hull, at most 32, each with the offset around it. Shapes with the same
+    array of values share one table. Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+
+    Attributes:
+        values: (nx, ny, nz) values of phi, at least 4 along each axis; positive on the outermost grid points [m].
+        origin: (3,) place of the first value, in the frame of the shape [m].
+        spacing: distance of neighbouring grid points, the same along all axes [m].
+        offset: distance by which the solid extends beyond the level set, everywhere along the normal [m] (default 0).
+
+    Raises:
+        ValueError: for values that are nowhere negative, not positive at the edges of the grid, or not finite.
+    """
+
+    code = shape_kinds.Shape.FIELD
+    surface = {"offset": (Size.BALL, 1.0)}
+
+    values: ArrayLike
+    origin: ArrayLike
+    spacing: float
+    offset: float = 0.0
+
+    __repr__ = brief_repr
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        call = "SignedDistance"
+        values: Any = self.values
+        if not (isinstance(values, np.ndarray) and values.dtype == np.float64 and not values.flags.writeable):
+            values = np.array(checks.array(f"{call}(values=...)", values, (None, None, None)))
+            values.setflags(write=False)
+        if min(values.shape) < _LEAST:
+            raise ValueError(
+                f"{call}(values=...): expected at least {_LEAST} values along each axis, got {values.shape}"
+            )
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "origin", checks.vector(f"{call}(origin=...)", self.origin, 3))
+        self._positive("spacing")
+        object.__setattr__(self, "offset", checks.number(f"{call}(offset=...)", self.offset, at_least=0.0))
+        if not values.min() < 0.0:
+            raise ValueError(f"{call}(values=...): there is no solid: expected negative values inside, got none")
+        edge = min(float(np.take(values, [0, -1], axis=k).min()) for k in range(3))
+        if not edge > 0.0:
+            raise ValueError(
+                f"{call}(values=...): the solid reaches the edge of the grid, where a value is {edge:g}; "
+                "expected positive values there: take a larger grid"
+            )
+        object.__setattr__(self, "_solid", level_set(values, np.array(self.origin), self.spacing))
+
+    @property
+    def level_set(self) -> LevelSet:
+        """The solid without its place and offset, with its surface and moments."""
+        found: LevelSet = getattr(self, "_solid")  # noqa: B009
+        return found
+
+    @classmethod
+    def from_function(cls, f: Field, bounds: ArrayLike, spacing: float, **place: Any) -> SignedDistance:
+        """A solid by a function, which is called once, for all grid points.
+
+        Args:
+            f: phi of points (n, 3) [m] as an array (n,), negative inside; best the signed distance [m].
+            bounds: (2, 3) lowest and highest corner of the grid, with two cells or more around the solid [m].
+            spacing: distance of neighbouring grid points [m].
+            **place: further fields of the shape, such as `offset`, `center` and `orientation`.
+
+        Returns:
+            The shape.
+
+        Raises:
+            ValueError: for values of another number, or that SignedDistance refuses.
+        """
+        call = "SignedDistance.from_function"
+        origin, counts, points = _grid(call, bounds, spacing)
+        return cls(_sampled(f"{call}(f)", f, points).reshape(counts), origin, spacing, **place)
+
+    @classmethod
+    def from_density(
+        cls,
+        density: Field | ArrayLike,
+        level: float,
+        spacing: float,
+        *,
+        bounds: ArrayLike | None = None,
+        origin: ArrayLike = (0.0, 0.0, 0.0),
+        **place: Any,
+    ) -> SignedDistance:
+        """The solid in which a density is above a level, as of a neural radiance field.
+
+        The surface is where the cubic B-spline through the density has that level. The values of the shape are the
+        distances of the grid points to it, negative where the density is above the level: gaps are distances in
+        metres. The spline through the distances has its surface there to the fourth order of the spacing over the
+        least radius of curvature; features of less than two cells are lost.
+
+        Args:
+            density: values (nx, ny, nz), or a function of points (n, 3) [m] that returns values (n,).
+            level: density on the surface, in units of the density.
+            spacing: distance of neighbouring grid points [m].
+            bounds: (2, 3) lowest and highest corner of the grid [m], for a function.
+            origin: (3,) place of the first value, for values [m] (default the origin of the shape).
+            **place: further fields of the shape, such as `offset`, `center` and `orientation`.
+
+        Returns:
+            The shape.
+
+        Raises:
+            ValueError: for a function without bounds, or a density that is nowhere above the level, or somewhere at the
+                edge of the grid.
+        """
+        call = "SignedDistance.from_density"
+        level = checks.number(f"{call}(level=...)", level)
+        if callable(density):
+            if bounds is None:
+                raise ValueError(f"{call}(density): give bounds=..., the box in which the function is sampled")
+            origin, counts, points = _grid(call, bounds, spacing)
+            values = _sampled(f"{call}(density)", density, points).reshape(counts)
+        else:
+            values = checks.array(f"{call}(density)", density, (None, None, None))
+        raw = cls(level - values, origin, spacing)
+        return cls(distances_to_level(raw.level_set), origin, spacing, **place)
+
+    @classmethod
+    def from_mesh(cls, mesh: Any, spacing: float, **place: Any) -> SignedDistance:
+        """The solid inside of a closed mesh; edges are rounded, by about one cell.
+
+        Args:
+            mesh: path of a file that trimesh reads (extra `meshes`), a trimesh.Trimesh, or (vertices, faces).
+            spacing: distance of neighbouring grid points; the grid ends three cells beyond the mesh [m].
+            **place: further fields of the shape, such as `offset`, `center` and `orientation`.
+
+        Returns:
+            The shape, in the frame of the mesh.
+
+        Raises:
+            ImportError: a path, without trimesh.
+            ValueError: the mesh is not closed, or thinner than the grid resolves.
+        """
+        call = "SignedDistance.from_mesh"
+        vertices, faces = _triangles(call, mesh)
+        spacing = checks.number(f"{call}(spacing=...)", spacing, above=0.0)
+        around = _MARGIN * spacing
+        bounds = np.array([vertices.min(axis=0) - around, vertices.max(axis=0) + around])
+        origin, counts, points = _grid(call, bounds, spacing)
+        values = distances_to_mesh(call, points, counts, vertices, faces)
+        return cls(values, origin, spacing, **place)
+
+    def about_centroid(self) -> SignedDistance:
+        """The shape with the centroid of the solid at its origin, as a body that takes its inertia from it has it.
+
+        Returns:
+            The shape; its values are the same.
+        """
+        place = {f: getattr(self, f) for f in ("center", "orientation", "friction", "restitution", "name")}
+        return SignedDistance(self.values, np.asarray(self.origin) - self.centroid, self.spacing, self.offset, **place)
+
+    @cached_property
+    def _moments(self) -> tuple[float, Floats, Floats]:
+        return self.level_set.moments(self.offset)
+
+    @cached_property
+    def _vertices(self) -> Floats:
+        """Points of the surface (n, 3), with the offset."""
+        vertices = self.level_set.surface[0]
+        return vertices + self.offset * self.level_set.settled(vertices)[1]
+
+    @property
+    def centroid(self) -> Floats:
+        """(3,) centre of the solid, in the frame of the shape [m]."""
+        volume, first, _ = self._moments
+        return first / volume
+
+    def inertia(self, mass: float) -> Floats:
+        """Inertia about the origin of the shape, which is its centroid.
+
+        Args:
+            mass: mass [kg].
+
+        Returns:
+            (3, 3) inertia in body axes [kg m^2].
+
+        Raises:
+            ValueError: the centroid is elsewhere.
+        """
+        if np.abs(self.centroid).max() > 1e-6 * self.bounding_radius():
+            raise ValueError(
+                f"SignedDistance: its centroid is at {np.round(self.centroid, 9).tolist()}; a body has its origin "
+                "there: use shape.about_centroid(), or give inertia=..."
+            )
+        return self.central_inertia(mass)
+
+    def mass_centre(self) -> Floats:
+        """Centre of the solid.
+
+        Returns:
+            (3,) place from the centre of mass of the body, body axes [m].
+        """
+        return self.place(self.centroid)
+
+    def central_inertia(self, mass: float) -> Floats:
+        """Inertia about the centre of the solid: C = m/V int (x - c)(x - c)^T, J = tr(C) I - C.
+
+        Args:
+            mass: mass [kg].
+
+        Returns:
+            (3, 3) inertia in body axes [kg m^2].
+        """
+        volume, first, second = self._moments
+        C = mass / volume * (second - np.outer(first, first) / volume)
+        R = rotation_matrix(self.orientation)
+        return np.asarray(R @ (np.trace(C) * np.eye(3) - C) @ R.T)
+
+    def principal(self, mass: float) -> tuple[float, float, float]:
+        """Principal moments of inertia about the centroid, ascending.
+
+        Args:
+            mass: mass [kg].
+
+        Returns:
+            (3,) moments [kg m^2].
+        """
+        a, b, c = np.linalg.eigvalsh(self.central_inertia(mass))
+        return float(a), float(b), float(c)
+
+    def volume(self) -> float:
+        return self._moments[0]
+
+    def bounding_radius(self) -> float:
+        # the surface bulges between its vertices, by less than half a cell where the grid resolves it
+        return float(np.linalg.norm(self._vertices, axis=1).max()) + 0.5 * self.spacing
+
+    def outline(self) -> Floats:
+        return self._vertices
+
+    def primitives(self) -> list[Primitive]:
+        faces = self.level_set.surface[1]
+        return [Primitive("triangles", self._vertices[faces].reshape(-1, 3))]
+
+    @cached_property
+    def _stand(self) -> Floats:
+        """Corners (n, 3) of the convex hull of the level set, at most 32: those that are farthest from the hull of the
+        others, one by one.
+        """
+        from scipy.spatial import ConvexHull
+
+        points = self.level_set.surface[0]
+        corners = points[ConvexHull(points).vertices]
+        chosen = list({int(np.argmax(s * corners[:, k])) for k in range(3) for s in (-1.0, 1.0)})
+        while len(chosen) < min(_STAND, len(corners)):
+            try:
+                planes = ConvexHull(corners[chosen]).equations
+                far = (corners @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+            except Exception:  # too few, or all in one plane
+                far = np.min(np.linalg.norm(corners[:, None] - corners[chosen], axis=2), axis=1)
+            far[chosen] = -1.0
+            if far.max() < 1e-3 * self.spacing:
+                break
+            chosen.append(int(np.argmax(far)))
+        return corners[sorted(chosen)]
+
+    def stance(self) -> Stance:
+        return Stance("point", self._stand, self.offset)
+
+
+def _grid(call: str, bounds: ArrayLike, spacing: float) -> tuple[Floats, tuple[int, ...], Floats]:
+    """Lowest corner, numbers of points along the axes, and all points (n, 3) of a grid that covers a box."""
+    box = checks.array(f"{call}(bounds=...)", bounds, (2, 3))
+    spacing = checks.number(f"{call}(spacing=...)", spacing, above=0.0)
+    if not np.all(box[1] > box[0]):
+        raise ValueError(f"{call}(bounds=...): expected a lowest and a highest corner, got {box.tolist()}")
+    counts = np.ceil((box[1] - box[0]) / spacing - 1e-9).astype(int) + 1
+    axes = [box[0, k] + spacing * np.arange(counts[k]) for k in range(3)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return box[0], tuple(counts.tolist()), points
+
+
+def _sampled(call: str, f: Field, points: Floats) -> Floats:
+    return checks.array(f"{call}: its values", f(points), (len(points),))
+
+
+def _triangles(call: str, mesh: Any) -> tuple[Floats, NDArray[np.int64]]:
+    """Vertices (n, 3) and faces (k, 3)."""
+    if isinstance(mesh, tuple) and len(mesh) == 2:
+        vertices, faces = mesh
+    else:
+        if not hasattr(mesh, "vertices"):
+            try:
+                import trimesh
+            except ImportError as error:
+                raise ImportError('meshes need trimesh: pip install "dojo-opt[meshes]"') from error
+            mesh = trimesh.load(mesh, force="mesh")
+        vertices, faces = mesh.vertices, mesh.faces
+    points = checks.array(f"{call}(mesh): vertices", vertices, (None, 3))
+    return points, np.asarray(faces, dtype=np.int64).reshape(-1, 3)
