@@ -24,6 +24,7 @@ Field = Callable[[Floats], ArrayLike]
 _LEAST = 4  # values along each axis
 _MARGIN = 3  # cells around a mesh
 _STAND = 32  # points on which it stands
+_APART = 0.05  # of a cell, within which the balls around two of them are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +35,10 @@ class SignedDistance(Solid):
     the Euclidean distance to the level set, whatever the scale of phi; phi itself only says where to look for the
     nearest point, so that distances are the best values. Edges of the solid are rounded, by about one cell.
 
-    Spheres and capsules collide with it, other shapes do not. One sphere, or end of a capsule,
-    touches it at one point, the nearest: a ball that fits a hollow at two places touches in turn. On planes and ground
-    it stands on points: corners of its convex hull, at most 32, each with the offset around it. Shapes with the same
-    array of values share one table. Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+    Spheres and capsules collide with it, other shapes do not. One sphere, or end of a capsule, touches it at one point,
+    the nearest: a ball that fits a hollow at two places touches in turn. On planes and ground it stands on equal balls
+    inside it, which touch the surface at corners of its convex hull, at most 32. Shapes with the same array of values
+    share one table. Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
 
     Attributes:
         values: (nx, ny, nz) values of phi, at least 4 along each axis; positive on the outermost grid points [m].
@@ -294,8 +295,34 @@ class SignedDistance(Solid):
             chosen.append(int(np.argmax(far)))
         return corners[sorted(chosen)]
 
+    @cached_property
+    def _balls(self) -> tuple[Floats, float]:
+        """Centres (n, 3) and common radius of the largest equal balls inside the level set that touch it at `_stand`.
+
+        Between its points a round solid would sink into a plane; its balls are nearly as round.
+        """
+        at, normals = self.level_set.settled(self._stand)
+        step = 1e-3 * self.spacing
+        ways = step * np.eye(3)
+        H = np.stack(
+            [(self.level_set.field(at + e)[1] - self.level_set.field(at - e)[1]) / (2 * step) for e in ways], 1
+        )
+        P = np.eye(3) - normals[:, :, None] * normals[:, None, :]
+        slopes = np.linalg.norm(self.level_set.field(at)[1], axis=1)
+        bends = np.linalg.eigvalsh(P @ (0.5 * (H + H.swapaxes(1, 2))) @ P).max(axis=1) / slopes  # largest curvature
+        radius = 1.0 / max(float(bends.max()), 1.0 / self.bounding_radius())
+        for p, n in zip(at, normals, strict=True):  # |v - p + r n| >= r for all points v of the surface
+            away = self.level_set.surface[0] - p
+            below, squares = -2.0 * away @ n, (away**2).sum(axis=1)
+            inward = below > 1e-3 * self.spacing
+            radius = min(radius, float((squares[inward] / below[inward]).min(initial=np.inf)))
+        centres = at - radius * normals
+        apart = np.unique(np.round(centres / (_APART * self.spacing)), axis=0, return_index=True)[1]
+        return centres[np.sort(apart)], radius
+
     def stance(self) -> Stance:
-        return Stance("point", self._stand, self.offset)
+        centres, radius = self._balls
+        return Stance("point", centres, self.offset + radius)
 
 
 def _grid(call: str, bounds: ArrayLike, spacing: float) -> tuple[Floats, tuple[int, ...], Floats]:
