@@ -1,6 +1,9 @@
 """Intervals: the states of a simulator that divides steps, and those of the parts of a step, by their momenta.
 
-p(q, v'; h') = p(q, v; tau),      tau: interval of the state (start_velocity.py),  h': time step of the parts
+P(q, v'; h') = P(q, v; tau),      tau: interval of the state (start_velocity.py),  h': time step of the parts
+
+P = M (M + C)^-1 p is the momentum of the node: that which arrives, p, after half the impulse of the dampers, C
+(dynamics/joints/damper.py). Both states have the same velocity at the node, so the energy is handed on as well.
 """
 
 from __future__ import annotations
@@ -8,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.derivatives.momentum_gradient import momentum_jacobian
+from sim.dynamics.joints.damper import node_dampings
 from sim.model.pace import rows
 from sim.simulator.engine import Engine, Floats
 from sim.simulator.link import link_gradient, link_step
@@ -16,6 +20,7 @@ from solvers.status import Status
 from solvers.types import Vector
 
 _FINEST = 1e-3  # how well the share of a momentum is found
+_BRIEF = 3e-4  # of a step: its square is small, and the rounding of displacements over it too
 
 
 class Intervals:
@@ -23,6 +28,7 @@ class Intervals:
 
     def __init__(self, engine: Engine) -> None:
         self._engine, self._h = engine, engine.settings.time_step
+        self._damped = bool(np.any(engine.model.dof_damper))
 
     def of(self, xs: Floats) -> Vector:
         """(n,) intervals of the states xs (n, nx) [s]."""
@@ -37,16 +43,38 @@ class Intervals:
         return float(self.of(x[None])[0])
 
     def momentum(self, h: float, x: Vector) -> Vector:
+        """P(q, v; h), (nv,)."""
+        p = self._arriving(h, x)
+        if self._damped:
+            C = self._damping(h)
+            p -= C @ np.linalg.solve(self._mass(x) + C, p)
+        return p
+
+    def state(self, h: float, P: Vector, near: Vector) -> Vector | None:
+        """The state with P(q, v; h) = P (nv,), sought from the velocity of `near` (nx,); None where there is none."""
+        out = near.copy()
+        p = P + self._damping(h) @ np.linalg.solve(self._mass(near), P) if self._damped else P
+        status = state_of_momentum(self._engine.linked(link_step), self._engine.table(), h, p, out)
+        return out if status == Status.SOLVED and np.isfinite(out).all() else None
+
+    def _arriving(self, h: float, x: Vector) -> Vector:
         """p(q, v; h), (nv,)."""
         out = np.zeros(self._engine.sizes.nv)
         momentum_at(self._engine.linked(link_step), self._engine.table(), h, x, out)
         return out
 
-    def state(self, h: float, p: Vector, near: Vector) -> Vector | None:
-        """The state with p(q, v; h) = p (nv,), sought from the velocity of `near` (nx,); None where there is none."""
-        out = near.copy()
-        status = state_of_momentum(self._engine.linked(link_step), self._engine.table(), h, p, out)
-        return out if status == Status.SOLVED and np.isfinite(out).all() else None
+    def _damping(self, h: float) -> Floats:
+        """C of the dampers for an interval, (nv, nv)."""
+        out = np.zeros(self._engine.sizes.nv)
+        node_dampings(self._engine.linked(link_step), h, out)
+        return np.diag(out)
+
+    def _mass(self, x: Vector) -> Floats:
+        """M(q), (nv, nv)."""
+        nv = self._engine.sizes.nv
+        out = np.zeros((nv, nv))
+        momenta_of_velocities(self._engine.linked(link_step), self._engine.table(), x, np.eye(nv), out)
+        return out
 
     def changed(self, h: float, other: float, x: Vector) -> Vector | None:
         """x (nx,) with the mean velocity over another interval that has the same momentum; None where there is none."""
@@ -58,31 +86,31 @@ class Intervals:
 
     def from_part(self, x: Vector, part: float) -> Vector | None:
         """The state with the momentum of x, a state of parts; None where there is none."""
-        p = self.momentum(part, x)
-        node = self.state(SHORTEST * self._h, p, x)
+        P = self.momentum(part, x)
+        node = self.state(SHORTEST * self._h, P, x)
         if node is not None and self.of_one(node) < self._h:
             return node
-        found = self.state(self._h, p, x)
+        found = self.state(self._h, P, x)
         return None if found is None or self.of_one(found) < self._h else found
 
     def slowed(self, x: Vector, part: float) -> tuple[Vector, float]:
         """(state, share s) nearest to x, a state of parts, where no state has its momentum p:
 
-            p_s = p_0 + M v_r + s (p - p_0 - M v_r)
+            P_s = P_0 + M v_r + s (P - P_0 - M v_r)
 
-        p_0: of the forces at rest, v_r: the motion of the floating bodies with all other joints locked that has their
+        P_0: of the forces at rest, v_r: the motion of the floating bodies with all other joints locked that has their
         momentum. So the momentum of everything is that of x, and the energy of the bodies against each other is
         s^2 of theirs: as in an impact that is not elastic.
         """
         q = x.copy()
         q[-self._engine.sizes.nv :] = 0.0
-        rest, p = self.momentum(self._h, q), self.momentum(part, x)
-        locked = self._locked(x, p - rest)
-        state = self.state(self._h, rest + locked[0], np.concatenate([x[: -len(p)], locked[1]]))
+        rest, P = self.momentum(self._h, q), self.momentum(part, x)
+        locked = self._locked(x, P - rest)
+        state = self.state(self._h, rest + locked[0], np.concatenate([x[: -len(P)], locked[1]]))
         share, step = 0.0, 0.25
         found = q if state is None else state
         while step > _FINEST:
-            ahead = self.state(self._h, rest + locked[0] + (share + step) * (p - rest - locked[0]), found)
+            ahead = self.state(self._h, rest + locked[0] + (share + step) * (P - rest - locked[0]), found)
             if ahead is None or self.of_one(ahead) < self._h or share + step > 1.0:
                 step *= 0.5
             else:
@@ -102,7 +130,7 @@ class Intervals:
         return out, v
 
     def slopes(self, x: Vector, part: float, y: Vector) -> Floats:
-        """d(y)/d(x) of y = to_part(x), (ndx, ndx):  p_v' dv' = p_v dv + (p_q - p_q') dq."""
+        """d(y)/d(x) of y = to_part(x), (ndx, ndx):  P_v' dv' = P_v dv + (P_q - P_q') dq."""
         return self._between((self.of_one(x), x), (part, y))
 
     def slopes_back(self, y: Vector, part: float, x: Vector) -> Floats:
@@ -119,6 +147,26 @@ class Intervals:
         return out
 
     def _momentum_slopes(self, h: float, x: Vector) -> tuple[Floats, Floats]:
+        """dP/dq and dP/dv of P(q, v; h), (nv, nv).
+
+        With the velocity w of the node, P = M w and (M + C) w = p:
+
+            P_v = M (M + C)^-1 p_v      P_q = (M w)_q + M (M + C)^-1 (p_q - (M w)_q)
+
+        (M w)_q is p_q of the velocity w over an interval of length 0, extrapolated from two short ones.
+        """
+        by_q, by_v = self._arriving_slopes(h, x)
+        if self._damped:
+            M = self._mass(x)
+            damped = M + self._damping(h)
+            node = x.copy()
+            node[-len(M) :] = np.linalg.solve(damped, self._arriving(h, x))
+            near, far = (self._arriving_slopes(k * _BRIEF * self._h, node)[0] for k in (1.0, 2.0))
+            rest = 2.0 * near - far
+            by_q, by_v = rest + M @ np.linalg.solve(damped, by_q - rest), M @ np.linalg.solve(damped, by_v)
+        return by_q, by_v
+
+    def _arriving_slopes(self, h: float, x: Vector) -> tuple[Floats, Floats]:
         """dp/dq and dp/dv of p(q, v; h), (nv, nv)."""
         nv = self._engine.sizes.nv
         by_q, by_v = np.zeros((nv, nv)), np.zeros((nv, nv))

@@ -25,7 +25,7 @@ _VARIABLES = ("state", "input")
 _NUDGE, _LEAST = 1e-5, 1e-2  # relative size of the differences of parameters, of values of at least that size
 _OF_MOMENTUM = frozenset(  # kinds on which the momentum of a state depends
     ("mass", "inertia", "com", "parent_point", "child_point", "orientation", "axis", "spring", "rest", "armature")
-    + ("pitch", "gravity", "time_step")
+    + ("damper", "pitch", "gravity", "time_step")
 )
 
 

@@ -130,12 +130,17 @@ def test_derivatives_of_a_divided_step(name: str, steps: int) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_derivatives_of_the_conversions(kind: str) -> None:
-    """Of the state with the same momentum over another interval, with springs, against central differences."""
+    """Of the state with the same momentum over another interval, with springs and dampers, by central differences.
+
+    The energy of both states is the same: half the impulse of a damper, of either interval, is part of the momentum.
+    """
     rng = np.random.default_rng(8)
-    sim = dojo.Simulator(chain(kind, 2, spring=3.0), time_step=0.03, tolerance=1e-12)
+    sim = dojo.Simulator(chain(kind, 2, spring=3.0, damper=2.0), time_step=0.03, tolerance=1e-12)
     x, change = random_state(sim, rng, speed=2.0), engine(sim).intervals
     part = change.to_part(x, 0.01)
     assert part is not None and np.abs(part - x).max() > 1e-4
+    short = engine(sim).part(3)
+    assert short.energies(part[None])[0] == pytest.approx(engine(sim).energies(x[None])[0], rel=1e-10)
     slopes, eps = change.slopes(x, 0.01, part), 1e-5
     for k in range(sim.ndx):
         ends = [change.to_part(sim.integrate(x, s * eps * np.eye(sim.ndx)[k]), 0.01) for s in (1.0, -1.0)]
