@@ -14,6 +14,16 @@ os.environ.setdefault("DOJO_OPT_JOBS", "1")  # workers of pytest-xdist share the
 os.environ["PYTHONSAFEPATH"] = "1"  # nor do processes that tests start import the folder they run in: it has no kernels
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep bytecode beside pytest's own files where Python is told not to write it, as in most container images.
+
+    Without bytecode each worker parses all tests again, and each process that a test starts all modules: ten seconds
+    a worker, and half a second a process.
+    """
+    if sys.dont_write_bytecode and config.cache is not None:
+        sys.pycache_prefix, sys.dont_write_bytecode = str(config.cache.mkdir("bytecode")), False
+
+
 @pytest.hookimpl(tryfirst=True)  # before `-m` chooses
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Of the cases of a function marked `sweep(n)`, `-m "not slow"` takes every n-th."""

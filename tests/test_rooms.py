@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections import Counter, defaultdict
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,12 @@ import pytest
 from support.programs import PACKAGES
 
 ROOT = Path(__file__).resolve().parent.parent
-FILES = {file: ast.parse(file.read_text()) for package in PACKAGES for file in (ROOT / package).rglob("*.py")}
+
+
+@cache
+def _files() -> dict[Path, ast.Module]:
+    """Every module with its syntax tree. Not at import: each worker of pytest-xdist imports this file."""
+    return {file: ast.parse(file.read_text()) for package in PACKAGES for file in (ROOT / package).rglob("*.py")}
 
 
 def _module(file: Path) -> str:
@@ -22,9 +28,9 @@ def _module(file: Path) -> str:
 
 def _imports() -> dict[str, set[str]]:
     """Modules by module, of every import: also under TYPE_CHECKING and inside functions."""
-    modules = {_module(file) for file in FILES}
+    modules = {_module(file) for file in _files()}
     out: dict[str, set[str]] = defaultdict(set)
-    for file, tree in FILES.items():
+    for file, tree in _files().items():
         here = _module(file)
         for node in ast.walk(tree):
             names: list[str] = []
@@ -83,7 +89,7 @@ def test_few_entries_at_the_top(package: str, most: int) -> None:
 
 
 def test_every_room_says_its_purpose() -> None:
-    for file, tree in FILES.items():
+    for file, tree in _files().items():
         if file.name == "__init__.py":
             assert ast.get_docstring(tree), file
 
@@ -96,7 +102,7 @@ def test_no_file_name_is_used_more_than_twice() -> None:
 
 def test_no_class_name_is_used_twice() -> None:
     classes = defaultdict(list)
-    for file, tree in FILES.items():
+    for file, tree in _files().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.ClassDef):
                 classes[node.name].append(_module(file))
@@ -105,10 +111,10 @@ def test_no_class_name_is_used_twice() -> None:
 
 def test_files_that_docstrings_name_exist() -> None:
     """A name with folders is a path, in part at least; a bare name is the name of some file."""
-    paths = {file.relative_to(ROOT).as_posix() for file in FILES}
+    paths = {file.relative_to(ROOT).as_posix() for file in _files()}
     paths |= {file.relative_to(ROOT).as_posix() for file in ROOT.glob("*/**/*.py")}
     wrong = []
-    for file, tree in FILES.items():
+    for file, tree in _files().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
                 for name in re.findall(r"(?<![\w/.])(?:\w+/)*\w+\.py\b", text):

@@ -17,23 +17,27 @@ from solvers.status import Status
 from support.interrupts import heard
 from support.programs import HOME
 
-TROT = dojo.problems.trot(cycles=30)
 ENDLESS: dict[str, Any] = {"tolerance": 1e-12, "violation": 1e-14}
+
+
+@pytest.fixture(scope="module")
+def long_trot() -> dojo.Problem:
+    return dojo.problems.trot(cycles=30)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("after", [0.02, 0.1, 0.2, 0.5, 1.0])
-def test_a_plan_ended_by_ctrl_c_is_its_last_iterate(after: float) -> None:
+def test_a_plan_ended_by_ctrl_c_is_its_last_iterate(long_trot: dojo.Problem, after: float) -> None:
     dojo.ilqr(dojo.problems.trot(), max_iterations=2)
-    plan = heard(lambda: dojo.ilqr(TROT, **ENDLESS), after)
+    plan = heard(lambda: dojo.ilqr(long_trot, **ENDLESS), after)
     if plan is None:  # while the first iterate was made
         assert after < 0.2
         return
     assert plan.status == dojo.Status.INTERRUPTED
     assert not plan.success
     assert "Ctrl-C" in plan.message
-    assert plan.x.shape == (TROT.horizon + 1, TROT.sim.nx)
-    again = dojo.ilqr(TROT, warm_start=plan, max_iterations=1)
+    assert plan.x.shape == (long_trot.horizon + 1, long_trot.sim.nx)
+    again = dojo.ilqr(long_trot, warm_start=plan, max_iterations=1)
     assert np.isfinite(again.fun)
 
 

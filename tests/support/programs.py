@@ -15,6 +15,8 @@ HOME = Path(dojo.__file__).resolve().parent.parent  # where the three packages a
 
 def python(program: str, *, cwd: Path | None = None, home: Path = HOME, **environment: str) -> str:
     """Output of `program` in a new process that finds the packages below `home`."""
+    if home == HOME and sys.pycache_prefix:  # not of copies, which are read once
+        environment = {"PYTHONPYCACHEPREFIX": sys.pycache_prefix, "PYTHONDONTWRITEBYTECODE": "", **environment}
     path = os.pathsep.join([str(home)] if cwd is None else [str(cwd), str(home)])
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", program],
