@@ -129,7 +129,7 @@ def test_links_between_pages_lead_somewhere(page: str) -> None:
             assert section in [re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles], section
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/guide.md"])
+@pytest.mark.parametrize("page", ["README.md", pytest.param("docs/guide.md", marks=pytest.mark.slow)])
 def test_the_python_of_the_pages_runs(page: str, tmp_path: Path) -> None:
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), flags=re.DOTALL)
     assert blocks

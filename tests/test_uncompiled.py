@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pytest
 
 from support.programs import python
 
@@ -39,6 +40,7 @@ print(json.dumps(found))
 """
 
 
+@pytest.mark.slow
 def test_kernels_run_uncompiled_with_the_same_result():
     compiled = json.loads(python(PROGRAM))
     plain = json.loads(python(PROGRAM, NUMBA_DISABLE_JIT="1"))

@@ -39,6 +39,7 @@ def answer(job):
         os.environ.clear()
         os.environ.update(job["environment"])
         numba.core.config.reload_config()
+        sys.pycache_prefix, sys.dont_write_bytecode = job["bytecode"]
         os.chdir(job["cwd"])
         sys.path[:0] = job["path"]
         code = 0
@@ -97,10 +98,12 @@ def forked(program: str, *, cwd: Path | None = None, home: Path = HOME, **enviro
         from support.programs import python
 
         return python(program, cwd=cwd, home=home, **environment)
+    kept = (sys.pycache_prefix, sys.dont_write_bytecode) if home == HOME else (None, False)  # a copy is the test's own
     job = {
         "program": program,
         "cwd": str(cwd or os.getcwd()),
         "path": [str(home)] if cwd is None else [str(cwd), str(home)],
+        "bytecode": kept,
         "environment": {**os.environ, **environment},
     }
     send, receive = _server()
