@@ -8,18 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])  # axes after each axis, and before it
 
 
 def cross(a: Array, b: Array) -> Array:
     """a x b on the last axis."""
-    return np.stack(
-        (
-            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
-            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
-            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
-        ),
-        axis=-1,
-    )
+    return a.take(_NEXT, -1) * b.take(_LAST, -1) - a.take(_LAST, -1) * b.take(_NEXT, -1)
 
 
 def dot(a: Array, b: Array) -> Array:
