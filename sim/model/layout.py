@@ -135,12 +135,12 @@ class Sizes(NamedTuple):
     ndry: int = 0  # dry friction of degrees of freedom, and servos with limits of their force
 
 
-def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
-    """Rows and columns of one field."""
+def _lengths(sizes: Sizes) -> dict[str, int]:
+    """Numbers of rows and columns by the names that the shapes of fields use."""
     nv, nu = sizes.nv, sizes.nu
     columns = max(2 * nv + whole(nu), nv + whole(nv))  # with the numbers that lanes write behind dR_dv and the inputs
     columns = -(-columns // SIDE) * SIDE
-    named = {
+    return {
         **sizes._asdict(),
         "nbody+1": sizes.nbody + 1,
         "6nbody": 6 * sizes.nbody,
@@ -158,13 +158,18 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
         "npanel": columns if sizes.nrow else LANES,
         "nreach": min(3 * (sizes.ncontact - sizes.npair) + sizes.nlimit, _REACH),
     }
+
+
+def _extent(shape: Shape, named: dict[str, int]) -> tuple[int, int]:
+    """Rows and columns of one field."""
     rows, cols = (named[n] if isinstance(n, str) else n for n in (*shape, 1)[:2])
     return rows, cols
 
 
 def _carve(fields: dict[str, Shape], sizes: Sizes, kind: Any) -> dict[str, Any]:
     """Zeroed arrays of these shapes, end to end in one buffer."""
-    extents = {name: _extent(shape, sizes) for name, shape in fields.items()}
+    named = _lengths(sizes)
+    extents = {name: _extent(shape, named) for name, shape in fields.items()}
     line = 128 // 8  # a pair of cache lines: arrays that two threads write must not share one
     buffer: NDArray[Any] = np.zeros(sum(whole(rows * cols) for rows, cols in extents.values()) + 2 * line, dtype=kind)
     first = -(buffer.ctypes.data // 8) % line
