@@ -110,11 +110,12 @@ class Adam:
 
     def step(self, weights: Floats, gradient: Floats, rate: float) -> None:
         """Move the weights against the gradient."""
-        (m, v, t), (b1, b2) = self.moments, self.betas
-        t += 1.0
+        (m, v, steps), (b1, b2) = self.moments, self.betas
+        steps += 1.0
+        t = float(steps[0])  # powers of a whole row, smaller than any number after a while, took longer than the rest
         m += (1.0 - b1) * (gradient - m)
         v += (1.0 - b2) * (gradient**2 - v)
-        weights -= rate * (m / (1.0 - b1**t)) / (np.sqrt(v / (1.0 - b2**t)) + 1e-8)
+        weights -= (rate / (1.0 - b1**t)) * m / (np.sqrt(v / (1.0 - b2**t)) + 1e-8)
 
 
 def clipped(gradient: Floats, norm: float) -> tuple[Floats, float]:

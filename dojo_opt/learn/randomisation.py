@@ -87,7 +87,7 @@ class Models:
         """The models of an epoch."""
         substeps = int(rng.choice(self._choices))
         count = rows if self._given.by_row else 1
-        chosen = np.broadcast_to(rng.integers(self._given.models, size=count), rows)
+        chosen = rng.integers(self._given.models, size=count)
         kappa = None
         if self._given.kappa is not None:
             low, high = np.log(self._given.kappa)
@@ -107,7 +107,7 @@ class Drawn:
     sim: Simulator
     substeps: int
     kappa: Floats | None  # (n,)
-    parameters: Mapping[str, Floats]  # each (n, components)
+    parameters: Mapping[str, Floats]  # each (n, components), or (1, components) of all rows
     noise: float
 
     __repr__ = brief_repr
@@ -121,7 +121,8 @@ class Drawn:
     def rows(self, chosen: NDArray[np.int64]) -> Drawn:
         """Those of some rows."""
         kappa = None if self.kappa is None else self.kappa[chosen]
-        return replace(self, kappa=kappa, parameters={name: table[chosen] for name, table in self.parameters.items()})
+        own = {name: t if len(t) == 1 else t[chosen] for name, t in self.parameters.items()}
+        return replace(self, kappa=kappa, parameters=own)
 
     @classmethod
     def of(cls, task: Task) -> Drawn:

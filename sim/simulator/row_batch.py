@@ -68,17 +68,12 @@ class RowModels:
         if not parameters:
             return [self._simulator._engine], np.zeros(count, dtype=np.int64)
         sizes = {name: self._size(name) for name in parameters}
-        columns = []
-        for name, values in parameters.items():
-            given = checks.floats(f"{call}: {name!r}", values)
-            shaped = given[:, None] if given.ndim == 1 and sizes[name] == 1 else given
-            try:
-                columns.append(np.broadcast_to(shaped, (count, sizes[name])))
-            except ValueError:
-                raise ValueError(
-                    f"{call}: {name!r}: expected shape ({count}, {sizes[name]}), or one row of it, got {given.shape}"
-                ) from None
-        rows, index = _distinct(np.concatenate(columns, axis=1))
+        columns = [self._columns(call, name, values, count) for name, values in parameters.items()]
+        shared = all(len(column) == 1 for column in columns)
+        if not shared:
+            columns = [np.broadcast_to(column, (count, column.shape[1])) for column in columns]
+        joined = np.concatenate(columns, axis=1)
+        rows, index = (joined, np.zeros(count, dtype=np.int64)) if shared else _distinct(joined)
         bounds = np.cumsum([0, *sizes.values()])
         engines = []
         for row in rows:
@@ -91,6 +86,20 @@ class RowModels:
         while len(self._kept) > max(_KEPT, len(rows)):
             self._kept.popitem(last=False)
         return engines, index
+
+    def _columns(self, call: str, name: str, values: ArrayLike, count: int) -> Floats:
+        """Values of a parameter, (count, components), or one row for all."""
+        size = self._size(name)
+        given = checks.floats(f"{call}: {name!r}", values)
+        shaped = given[:, None] if given.ndim == 1 and size == 1 else given
+        if shaped.shape in ((1, size), (count, size)):
+            return shaped
+        try:
+            return np.broadcast_to(shaped, (count, size))
+        except ValueError:
+            raise ValueError(
+                f"{call}: {name!r}: expected shape ({count}, {size}), or one row of it, got {given.shape}"
+            ) from None
 
     def _size(self, name: str) -> int:
         """Number of components of a parameter."""

@@ -12,7 +12,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.learn.discounted_sum import DiscountedSum
-from dojo_opt.learn.network import Network, perceptron
+from dojo_opt.learn.network import Adam, Network, perceptron
 from dojo_opt.learn.policy_rollout import Noise
 from dojo_opt.learn.randomisation import Models
 
@@ -172,12 +172,27 @@ MODELS = dojo.learn.Randomisation(
 )
 
 
+def test_adam_moves_weights_as_its_paper_says_however_many_steps_are_behind():
+    adam, weights, rng = Adam(3, (0.7, 0.95)), np.zeros(3), np.random.default_rng(0)
+    m, v, expected = np.zeros(3), np.zeros(3), np.zeros(3)
+    for t in range(1, 2500):  # 0.7^t is no normal number from 1986 steps on
+        g = rng.standard_normal(3)
+        m, v = 0.7 * m + 0.3 * g, 0.95 * v + 0.05 * g**2
+        expected -= 0.01 * m / (1.0 - 0.7**t) / (np.sqrt(v / (1.0 - 0.95**t)) + 1e-8)
+        adam.step(weights, g, 0.01)
+    np.testing.assert_allclose(weights, expected, rtol=1e-9)
+    assert np.all(adam.moments[2] == 2499.0)
+
+
 @pytest.mark.parametrize("by_row", [True, False])
 def test_rows_of_an_epoch_have_models_of_their_own_or_one(task, by_row):
     models = Models(task, replace(MODELS, by_row=by_row), np.random.default_rng(0))
     drawn = models.draw(np.random.default_rng(1), 12)
-    for values in (drawn.kappa, drawn.parameters["mass"], drawn.parameters["friction:*"]):
-        assert len(values) == 12 and (len(np.unique(values)) > 1) == by_row
+    assert len(drawn.kappa) == 12 and (len(np.unique(drawn.kappa)) > 1) == by_row
+    for values in (drawn.parameters["mass"], drawn.parameters["friction:*"]):  # one row, which step_batch need not sort
+        assert len(values) == (12 if by_row else 1) and (len(np.unique(values[:, 0])) > 1) == by_row
+    some = drawn.rows(np.array([1, 1, 5]))
+    assert len(some.kappa) == 3 and all(len(values) == (3 if by_row else 1) for values in some.parameters.values())
     again = models.draw(np.random.default_rng(2), 12)
     assert again.kappa[0] != drawn.kappa[0]
 

@@ -64,6 +64,11 @@ def test_rows_have_their_own_parameters(sim):
     for i in range(4):
         alone = sim.with_parameters({name: value[i] for name, value in values.items()})
         np.testing.assert_array_equal(found.x[i], alone.rollout(X[i], np.tile(U[i], (2, 1))).x[-1])
+    one = sim.step_batch(X, U, 2, parameters={"friction:*": [[0.1]], "mass": sim.parameters(("mass",)).values[None]})
+    every = sim.step_batch(X, U, 2, parameters={"friction:*": np.full(4, 0.1)})
+    np.testing.assert_array_equal(one.x, every.x)
+    mixed = sim.step_batch(X, U, 2, parameters={"friction:*": values["friction:*"], "time_step": 0.02})
+    np.testing.assert_array_equal(mixed.x[[0, 3]], found.x[[0, 3]])
 
 
 def test_an_unsolved_row_stands_still_and_is_named():
