@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 import dojo_opt as dojo
 
-EPOCHS = 100 if QUICK else 450
+EPOCHS = 100 if QUICK else 900
 task = dojo.learn.half_cheetah()
 learned = dojo.learn.shac(task, seed=0, epochs=EPOCHS, verbose=True)
 print(learned)

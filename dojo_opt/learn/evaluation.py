@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.randomisation import Drawn
 from sim.mechanism.checks import whole_number
@@ -41,6 +42,7 @@ def evaluate(
     *,
     substeps: int | None = None,
     kappa: float | None = None,
+    delay: int = 0,
 ) -> Evaluation:
     """Returns of episodes, all at once on all cores.
 
@@ -50,6 +52,7 @@ def evaluate(
         seed: of their first states.
         substeps: time steps per action; those of the task by default.
         kappa: smoothing [N s m]; that of the task by default.
+        delay: control steps after which an action is applied (default 0).
 
     Returns:
         Evaluation; the same for the same seed.
@@ -65,6 +68,7 @@ def evaluate(
     if substeps is not None:
         steps = whole_number("evaluate(substeps=...)", substeps)
         model = Drawn(task.sim.replace(time_step=task.knot_time / steps, kappa=task.sim.kappa), steps, None, {}, 0.0)
+    delays = ActionDelay(whole_number("evaluate(delay=...)", delay, 0), count, task.sim.nu)
     rngs = [np.random.default_rng((seed, i)) for i in range(count)]
     xs = task.starts(rngs)
     returns, lengths, unsolved = np.zeros(count), np.zeros(count, dtype=np.int64), 0
@@ -72,7 +76,7 @@ def evaluate(
     for age in range(task.steps):
         task.redraw(xs, np.full(count, age), rngs)
         x = xs[alive]
-        actions = policy.actions(task.observe(x)[0])
+        actions, _ = delays.apply(age, policy.actions(task.observe(x)[0]), delay, alive)
         found = model.step(x, task.inputs(actions), kappa=kappa)
         bad = found.status != Status.SOLVED
         over = task.ends(found.x)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
@@ -29,7 +30,8 @@ class PairInputs(NamedTuple):
     x: Floats  # (n, nx)
     substeps: int
     kappa: Floats | None  # (n,)
-    parameters: Mapping[str, Floats]  # each (n, components)
+    parameters: Mapping[str, Floats]  # each (n, components), or (1, components) of all rows
+    delay: int  # [control steps]
 
 
 class PairReturns(NamedTuple):
@@ -58,14 +60,15 @@ def pair_returns(shared: Shared, given: PairInputs, horizon: int, shift: float) 
     n = len(given.moves)
     weights = np.concatenate([given.weights + given.moves, given.weights - given.moves])
     rows = np.concatenate([np.arange(n)] * 2)
-    drawn = models.drawn(given.substeps, given.kappa, given.parameters).rows(rows)
+    drawn = models.drawn(given.substeps, given.kappa, given.parameters, given.delay).rows(rows)
     out, alive, x = np.zeros(2 * n), np.arange(2 * n), given.x[rows]
     seen, steps, unsolved = ObservationStatistics.empty(task.observations), 0, 0
-    for _ in range(horizon):
+    delays = ActionDelay(given.delay, 2 * n, task.sim.nu)
+    for t in range(horizon):
         here, own = x[alive], drawn.rows(alive)
         observed = task.observe(here)[0]
         seen.add(observed)
-        actions = policy.actions(observed, weights[alive])
+        actions, _ = delays.apply(t, policy.actions(observed, weights[alive]), given.delay, alive)
         found = own.step(here, task.inputs(actions))
         bad, over = found.status != Status.SOLVED, task.ends(found.x)
         rewards = task.rewards(here, actions, found.x)[0] + task.survival * ~over - shift

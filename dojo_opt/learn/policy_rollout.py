@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.randomisation import Drawn, Randomisation
@@ -74,7 +75,8 @@ class PolicyRollout:
 
     x            (T + 1, n, nx) states; where a row started anew, its new state
     after        (T, n, nx) states after each step
-    actions      (T, n, nu); rewards (T, n)
+    actions      (T, n, nu) as decided; rewards (T, n)
+    applied      (T, n, nu) actions of the step, and decided_in (T, n) the steps in which they were decided, -1 before
     terminated   (T, n) the episode has ended there; unsolved (T, n) the step was not solved, and has no reward
     cut          (T, n) the next step starts from another state: of both, and of episodes that were cut off
 
@@ -93,6 +95,7 @@ class PolicyRollout:
         self.observations = np.zeros((steps, rows, self.task.observations))
         self.outputs = np.zeros((steps, rows, sim.nu))  # before they are squashed
         self.actions, self.rewards = np.zeros((steps, rows, sim.nu)), np.zeros((steps, rows))
+        self.applied, self.decided_in = np.zeros((steps, rows, sim.nu)), np.zeros((steps, rows), dtype=np.int64)
         self.terminated, self.unsolved, self.cut = (np.zeros((steps, rows), dtype=np.bool_) for _ in range(3))
         self._slopes: list[tuple[Floats, ...]] = []
         self._inside: list[Flags] = []
@@ -136,7 +139,9 @@ class PolicyRollout:
     ) -> PolicyGradient:
         """Gradient of sum_t,i weights_ti r_ti + sum_t,i e_ti(after_ti), by one sweep from the end.
 
-            l_t = A_t^T m_t + dr/dx + O_t^T dL/do_t,    m_t = l_t+1 + dr/dx' + e_t',    dL/da_t = B_t^T m_t + dr/da
+            l_t = A_t^T m_t + dr/dx + O_t^T dL/do_t,    m_t = l_t+1 + dr/dx' + e_t',    dL/da_t = B_s^T m_s + dr_s/da
+
+        where s is the step in which the action of step t is applied.
 
         Args:
             weights: (T, n) of the rewards.
@@ -150,7 +155,7 @@ class PolicyRollout:
         policy, ndx, nu = self.policy, self.task.sim.ndx, self.task.sim.nu
         rows = self.x.shape[1]
         costate, out, clipped, largest = np.zeros((rows, ndx)), np.zeros(policy.network.count), 0, 0.0
-        half = 0.5 * (self.task.high - self.task.low)
+        half, by_decided = 0.5 * (self.task.high - self.task.low), np.zeros_like(self.actions)
         for t in range(len(self.actions) - 1, -1, -1):
             rates, A, B, reward = self._slopes[t]
             costate[self.cut[t]] = 0.0
@@ -158,10 +163,12 @@ class PolicyRollout:
             after = costate + scale * reward[:, ndx + nu :]
             if ends is not None:
                 after += ends[t]
-            by_action = half * np.matmul(after[:, None], B)[:, 0] + scale * reward[:, ndx : ndx + nu]
+            by_applied = half * np.matmul(after[:, None], B)[:, 0] + scale * reward[:, ndx : ndx + nu]
+            known = np.flatnonzero(self.decided_in[t] >= 0)
+            by_decided[self.decided_in[t, known], known] += by_applied[known]
             costate = np.matmul(after[:, None], A)[:, 0] + scale * reward[:, :ndx]
             a = self.actions[t]
-            by_output = by_action * (np.abs(a) < 1.0 if policy.linear else 1.0 - a**2)
+            by_output = by_decided[t] * (np.abs(a) < 1.0 if policy.linear else 1.0 - a**2)
             y = self.outputs[t]
             by_output = by_output - 2.0 * saturation * np.sign(y) * np.maximum(np.abs(y) - _STEEP, 0.0)
             by_scaled = policy.network.backward(policy.weights, self._kept[t], by_output, out)
@@ -183,6 +190,7 @@ def roll_policy_batch(
     noise: Noise | None = None,
     slopes: bool = False,
     kappa_grad: float | None = None,
+    delays: ActionDelay | None = None,
     restart: Callable[[int, Flags, Flags, Floats], Flags] | None = None,
 ) -> PolicyRollout:
     """Rows under a policy, each from its own state, on all cores.
@@ -195,6 +203,7 @@ def roll_policy_batch(
         noise: of actions and observations; none by default.
         slopes: whether `gradient` will be asked for.
         kappa_grad: smoothing of the derivatives [N s m]; that of the motion by default.
+        delays: the last actions of the rows, for the delay of `drawn`; none by default, as where episodes begin.
         restart: function of (step, terminated (n,), unsolved (n,), states (n, nx)) that replaces the states of rows
             that start anew, and returns which these are (n,); by default rows go on, unsolved ones stand still.
 
@@ -209,18 +218,21 @@ def roll_policy_batch(
         raise ValueError("roll_policy_batch(policy): expected a policy with a task")
     model = Drawn.of(task) if drawn is None else drawn
     out = PolicyRollout(policy, steps, len(starts))
+    lags = ActionDelay(model.delay, len(starts), task.sim.nu) if delays is None else delays
+    lags.begin()
     out.x[0] = starts
     one_pass = slopes and kappa_grad is None
     for t in range(steps):
         rates = out.act(t, noise, slopes)
-        x, inputs = out.x[t], task.inputs(out.actions[t])
+        out.applied[t], out.decided_in[t] = lags.apply(t, out.actions[t], model.delay)
+        x, inputs = out.x[t], task.inputs(out.applied[t])
         found = model.step(x, inputs, one_pass)
         A, B, unsolved = found.A, found.B, found.status != Status.SOLVED
         if slopes and not one_pass:
             smooth = model.step(x, inputs, True, kappa_grad)
             A, B, unsolved = smooth.A, smooth.B, unsolved | (smooth.status != Status.SOLVED)
         out.after[t] = out.x[t + 1] = found.x
-        out.rewards[t], by_reward = task.rewards(x, out.actions[t], found.x, slopes)
+        out.rewards[t], by_reward = task.rewards(x, out.applied[t], found.x, slopes)
         out.terminated[t], out.unsolved[t] = task.ends(found.x), unsolved
         out.rewards[t] += task.survival * ~out.terminated[t]
         out.rewards[t, unsolved] = 0.0
@@ -231,6 +243,7 @@ def roll_policy_batch(
         out.cut[t] = unsolved
         if restart is not None:
             out.cut[t] |= restart(t, out.terminated[t], unsolved, out.x[t + 1])
+        lags.forget(out.cut[t])
     return out
 
 

@@ -32,6 +32,8 @@ class Randomisation:
         models: number of models per choice of substeps (default 16).
         pushes: mean time between pushes [s], and the standard deviations of the changes that one makes to the first
             velocities, such as the six of a floating base [m/s, rad/s] (default None: none).
+        delays: control steps from the decision of an action to its application; one is chosen for all rows of an epoch
+            (default (): none).
         by_row: whether every row of an epoch has a model and a kappa of its own; otherwise all have one, drawn anew for
             the next epoch (default True).
     """
@@ -44,6 +46,7 @@ class Randomisation:
     models: int = 16
     by_row: bool = True
     pushes: tuple[float, ArrayLike] | None = None
+    delays: tuple[int, ...] = ()
 
     __repr__ = brief_repr
 
@@ -55,6 +58,8 @@ class Randomisation:
             raise ValueError("Randomisation(values=..., factors=...): a parameter is in both")
         for count in self.substeps:
             checks.whole_number("Randomisation(substeps=...)", count)
+        for count in self.delays:
+            checks.whole_number("Randomisation(delays=...)", count, 0)
         if self.kappa is not None and not 0.0 < self.kappa[0] <= self.kappa[1]:
             raise ValueError(f"Randomisation(kappa=...): expected 0 < low <= high, got {self.kappa}")
         checks.number("Randomisation(noise=...)", self.noise, at_least=0.0)
@@ -93,11 +98,12 @@ class Models:
             low, high = np.log(self._given.kappa)
             kappa = np.broadcast_to(np.exp(rng.uniform(low, high, count)), rows)
         parameters = {name: table[chosen] for name, table in self._tables[substeps].items()}
-        return self.drawn(substeps, kappa, parameters)
+        delay = int(rng.choice(self._given.delays)) if self._given.delays else 0
+        return self.drawn(substeps, kappa, parameters, delay)
 
-    def drawn(self, substeps: int, kappa: Floats | None, parameters: Mapping[str, Floats]) -> Drawn:
+    def drawn(self, substeps: int, kappa: Floats | None, parameters: Mapping[str, Floats], delay: int) -> Drawn:
         """Models of these values, of rows."""
-        return Drawn(self._sims[substeps], substeps, kappa, parameters, self._given.noise)
+        return Drawn(self._sims[substeps], substeps, kappa, parameters, self._given.noise, delay)
 
 
 @dataclass(frozen=True)
@@ -109,6 +115,7 @@ class Drawn:
     kappa: Floats | None  # (n,)
     parameters: Mapping[str, Floats]  # each (n, components), or (1, components) of all rows
     noise: float
+    delay: int = 0  # of actions [control steps]
 
     __repr__ = brief_repr
 

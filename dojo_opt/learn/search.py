@@ -196,8 +196,9 @@ class RandomSearch(WeightSearch):
             rows = drawn.rows(np.arange(part.start, part.stop))
             moves = o.noise * directions[part]
             given = PairInputs(
-                policy.network, policy.weights, scale, moves, x[part], rows.substeps, rows.kappa, rows.parameters
-            )
+                policy.network, policy.weights, scale, moves, x[part], rows.substeps, rows.kappa, rows.parameters,
+                rows.delay,
+            )  # fmt: skip
             calls.append((self.shared, given, self.horizon, o.shift))
         return list(results_in_order(pair_returns, calls, self.executor))
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.discounted_sum import DiscountedSum
 from dojo_opt.learn.epochs import learn
 from dojo_opt.learn.learned import Learned
@@ -145,6 +146,7 @@ class _Shac(Training):
             self.statistics.sums[2] = _KNOWN
             self.policy.mean, self.policy.deviation = self._scale(self.statistics)
         self.x = task.starts([self.restarts] * o.environments)
+        self.delays = ActionDelay(max(o.randomisation.delays, default=0), o.environments, task.sim.nu)
         self.limit = task.steps if o.episode is None else min(o.episode, task.steps)
         self.age = self.restarts.integers(self.limit, size=o.environments)
         self.running, self.known = np.zeros(o.environments), np.zeros(o.environments, dtype=np.bool_)
@@ -193,7 +195,7 @@ class _Shac(Training):
         noise = Noise.draw(self.rng, self.task, (o.horizon, n), deviation, o.randomisation)
         roll = roll_policy_batch(
             self.policy, self.x, o.horizon, drawn=drawn, noise=noise, slopes=True,
-            kappa_grad=o.kappa_grad, restart=self.restart,
+            kappa_grad=o.kappa_grad, delays=self.delays, restart=self.restart,
         )  # fmt: skip
         self._count(roll)
         after, by_value = self.values(self.target, roll.after.reshape(o.horizon * n, -1), slopes=True)
@@ -259,7 +261,7 @@ class _Shac(Training):
         """As Training.arrays, with rows, values, statistics and the moments of Adam."""
         rows = {name: getattr(self, name) for name in ("x", "age", "running", "known", "value", "target")}
         moments = {"actor": self.actor_adam.moments, "critic": self.critic_adam.moments}
-        return super().arrays() | rows | {"sums": self.statistics.sums} | moments
+        return super().arrays() | rows | {"sums": self.statistics.sums, "decided": self.delays.actions} | moments
 
     def state(self) -> dict[str, Any]:
         """As Training.state, with the returns of finished episodes."""

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import io
+import os
+import signal
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
+from threading import Timer
 
 import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.discounted_sum import DiscountedSum
 from dojo_opt.learn.network import Adam, Network, perceptron
 from dojo_opt.learn.policy_rollout import Noise
-from dojo_opt.learn.randomisation import Models
+from dojo_opt.learn.randomisation import Drawn, Models
 
 
 def _task(steps=30, tolerance=1e-8):
@@ -57,21 +61,24 @@ def _policy(task, hidden=(5, 4), activation="elu"):
 CLOSE = {"rtol": 2e-6, "atol": 2e-6}
 
 
-@pytest.mark.parametrize(("hidden", "activation"), [((5, 4), "elu"), ((6,), "tanh"), ((), "tanh")])
-def test_gradients_of_returns_are_those_of_central_differences(hidden, activation):
+@pytest.mark.parametrize(
+    ("hidden", "activation", "delay"), [((5, 4), "elu", 0), ((6,), "tanh", 0), ((), "tanh", 0), ((6,), "tanh", 2)]
+)
+def test_gradients_of_returns_are_those_of_central_differences(hidden, activation, delay):
     """Differences of steps that end early are off by the root of their tolerance: steps of this task are exact."""
     task = _task(tolerance=1e-12)
     policy, rng = _policy(task, hidden, activation), np.random.default_rng(6)
     starts, weights = task.starts([rng] * 3), rng.uniform(0.5, 1.0, (6, 3))
     noise = Noise.draw(rng, task, (6, 3), 0.1, dojo.learn.Randomisation(noise=0.02))
-    seeds = rng.standard_normal((6, 3, task.sim.ndx))
+    seeds, drawn = rng.standard_normal((6, 3, task.sim.ndx)), replace(Drawn.of(task), delay=delay)
 
     def value(states):
-        roll = dojo.learn.roll_policy_batch(policy, states, 6, noise=noise)
+        roll = dojo.learn.roll_policy_batch(policy, states, 6, drawn=drawn, noise=noise)
         ends = task.sim.difference(roll.after.reshape(18, -1), np.tile(task.sim.neutral(), (18, 1)))
         return float((weights * roll.rewards).sum() + (seeds.reshape(18, -1) * ends).sum())
 
-    found = dojo.learn.roll_policy_batch(policy, starts, 6, noise=noise, slopes=True).gradient(weights, seeds)
+    found = dojo.learn.roll_policy_batch(policy, starts, 6, drawn=drawn, noise=noise, slopes=True)
+    found = found.gradient(weights, seeds)
     for i in range(0, policy.network.count, 3):
         kept, sides = policy.weights[i], []
         for step in (1e-5, -1e-5):
@@ -169,6 +176,7 @@ MODELS = dojo.learn.Randomisation(
     kappa=(1e-4, 1e-2),
     noise=0.02,
     models=3,
+    delays=(0, 1),
 )
 
 
@@ -182,6 +190,26 @@ def test_adam_moves_weights_as_its_paper_says_however_many_steps_are_behind():
         adam.step(weights, g, 0.01)
     np.testing.assert_allclose(weights, expected, rtol=1e-9)
     assert np.all(adam.moments[2] == 2499.0)
+
+
+def test_a_delayed_action_is_applied_later_and_forgotten_where_an_episode_begins(task):
+    policy, starts, drawn = _policy(task), np.array([[0.25, -1.0], [0.8, 1.5]]), replace(Drawn.of(task), delay=1)
+
+    def restart(t, terminated, unsolved, states):
+        return np.array([t == 2, False])
+
+    delays = ActionDelay(2, 2, task.sim.nu)
+    delays.actions[1:, 1] = 0.5  # decided before the rollout
+    roll = dojo.learn.roll_policy_batch(policy, starts, 5, drawn=drawn, slopes=True, delays=delays, restart=restart)
+    assert roll.applied[0].tolist() == [[0.0], [0.5]] and roll.decided_in[0].tolist() == [-1, -1]
+    np.testing.assert_array_equal(roll.applied[1:, 1], roll.actions[:-1, 1])
+    np.testing.assert_array_equal(roll.applied[[1, 2, 4], 0], roll.actions[[0, 1, 3], 0])
+    assert roll.applied[3, 0] == 0.0 and roll.decided_in[:, 0].tolist() == [-1, 0, 1, -1, 3]
+    alone = task.sim.step_batch(starts[1:], task.inputs(np.array([[0.5]])), task.substeps)
+    np.testing.assert_array_equal(roll.after[0, 1], alone.x[0])
+    np.testing.assert_array_equal(delays.actions[-1], roll.actions[-1])
+    now, later = (dojo.learn.evaluate(policy, 2, delay=delay).states for delay in (0, 2))
+    assert np.abs(now[1] - later[1]).max() > 1e-6  # actions of 0 first
 
 
 @pytest.mark.parametrize("by_row", [True, False])
@@ -232,6 +260,32 @@ def test_workers_find_the_same_policies(task):
         np.testing.assert_array_equal(run.state["sums"], other.state["sums"])
         assert run.policy.task is task and (run.steps, run.best) == (other.steps, other.best)
     assert np.abs(runs[0].policy.weights - runs[1].policy.weights).max() > 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning", "ignore::UserWarning")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_dask_cluster_finds_the_same_policy_though_a_worker_is_killed(task):
+    distributed = pytest.importorskip("distributed")
+    options = {"epochs": 4, "directions": 40, "randomisation": MODELS, "evaluations": 1, "episodes": 2}
+    alone = dojo.learn.ars(task, seed=3, **options)
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        first, killed = client.run(os.getpid), []
+
+        def kill(record):
+            if record["epoch"] == 2:  # while the calls of the third are under way
+                killed.append(next(iter(first.values())))
+                Timer(0.02, os.kill, (killed[0], signal.SIGKILL)).start()
+
+        together = dojo.learn.ars(task, seed=3, executor=client.get_executor(), callback=kill, **options)
+        client.wait_for_workers(2)
+        assert killed[0] not in client.run(os.getpid).values()
+    np.testing.assert_array_equal(together.policy.weights, alone.policy.weights)
+    np.testing.assert_array_equal(together.state["sums"], alone.state["sums"])
+    assert (together.steps, together.best) == (alone.steps, alone.best)
 
 
 def test_policies_learn_and_hold_the_pendulum_down_in_a_closed_loop(task, tmp_path):
