@@ -58,6 +58,7 @@ def pack(mech: Mechanism) -> Model:
     model.dof_seen[:] = seen_inertias(model)
     _pack_dry(mech, model)
     _pack_branches(model)
+    _pack_trees(model)
     _pack_terrain(mech, model)
     _pack_contacts(mech, model)
     pack_collisions(mech, model)
@@ -105,6 +106,16 @@ def _pack_branches(model: Model) -> None:
         dofs = dofs[dofs >= own[0] + len(own)] if len(own) else dofs  # those of the bodies below come after its own
         model.count_below[i] = len(dofs)
         model.dofs_below[i, : len(dofs)] = dofs[::-1]
+
+
+def _pack_trees(model: Model) -> None:
+    """The trees that move apart from one another: body_root and tree_end."""
+    for i, p in enumerate(model.body_parent.tolist()):
+        held = p < 0 or model.body_root[p] < 0
+        first = i if model.body_vadr[i + 1] > model.body_vadr[i] else -1
+        model.body_root[i] = first if held else model.body_root[p]
+        if model.body_root[i] >= 0:
+            model.tree_end[model.body_root[i]] = i + 1
 
 
 def _set_bits(row: NDArray[np.int64], dofs: NDArray[np.int64]) -> None:

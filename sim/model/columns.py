@@ -198,7 +198,7 @@ class Grid(IntEnum):
 
 
 class CoupleRank(IntEnum):
-    """couple_rank: the dense system of loops, gears and pairs."""
+    """couple_rank: the system of loops, gears and pairs."""
 
     RANK = 0
     SIZE = 1

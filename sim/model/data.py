@@ -90,7 +90,16 @@ class Data(NamedTuple):
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with active pairs
     near_count: Integers  # (1,)
     near_first: Integers  # (npair,) first pairs of the collisions within their reach, see pairs/reach.py
-    couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
+    couple_live: IntegerMatrix  # (nrow, 2) rows of the system of couplings, with their couplings; see coupling_order.py
+    couple_seen: Integers  # (ncouple,) 1 for the active couplings and gears for which order and links hold
+    couple_order: Integers  # (ncouple,) the active ones in the order of their elimination
+    couple_count: Integers  # (1,) their number
+    couple_degree: Integers  # (ncouple,) scratch, by place in that order
+    couple_linked: IntegerMatrix  # (ncouple, ncouple) 1 where one appears in the equations of another, likewise
+    couple_start: Integers  # (ncouple + 1,) first row, likewise
+    node_count: Integers  # (1,)
+    node_row: Integers  # (ncouple + 1,) Nodes of solvers/block_lu.py: the active couplings, or one of all rows
+    node_span: IntegerMatrix  # (ncouple, ncouple + 2)
     feature_choice: Integers  # (1,) FeatureChoice: when active features of shapes are chosen
     overlap_allowed: Integers  # (1,) 1 where a small overlap in other features is accepted
     inactive: Matrix  # (nground, 38) Inactive, see contact/inactive.py
@@ -138,24 +147,26 @@ class Data(NamedTuple):
     couple_G: Matrix  # (nrow, 6) constraint directions of loops at configuration 3
     couple_R: Matrix  # (nrow, 12) direction of a force, in the twists of a and b
     couple_E: Vector  # (nrow,) its compliance, 0 for loops
-    couple_Y: Matrix  # (nrow, nv) answer of the tree to a unit force
-    couple_T: Matrix  # (nrow, nrow) the dense system
+    couple_Y: Matrix  # (nv, 8 ncouple) answers of the trees to unit forces, LANES columns for each coupling or gear
+    couple_Z: Matrix  # (6 nbody, 8) wrenches, then twists of those of one coupling
+    couple_T: Matrix  # (nrow, 8 ncouple) the system
     couple_pivots: Matrix  # (nrow, 2)
     couple_rank: Vector  # (4,) CoupleRank; also read in the next step, and by the first step of the next motion
     couple_scale: Vector  # (nrow,)
-    couple_x: Matrix  # (nrow, 1)
+    couple_x: Matrix  # (nrow, 8)
     couple_gap: Vector  # (nrow,) of loops
     couple_step: Vector  # (nrow,)
     couple_trial: Vector  # (nrow,)
-    couple_panel: Matrix  # (nrow, 2 nv + nu)
+    couple_panel: Matrix  # (nrow, ncolumn)
     couple_wrench: Vector  # (6,) scratch
     loop_frame: Matrix  # (nloop, 12)
     loop_turn: Matrix  # (nloop, 9)
     loop_velocity: Vector  # (nv,) where a step begins to look for its velocity
     loop_start: Vector  # (nv,) where it looks for another one
     loop_kept: Vector  # (nv,) the first of them
-    loop_pivot: Vector  # (1,) least pivot of the dense system at configuration 2
+    loop_pivot: Vector  # (1,) least pivot of the couplings at configuration 2
     bifurcation_direction: Matrix  # (nrow, nv) directions of forces in joint space, or 0, see loops/bifurcation.py
+    bifurcation_row: Matrix  # (nrow, nv) scratch of its search
     loop_scale: Vector  # (nrow,) scratch
     loop_open: Vector  # (nrow,) |gap| of loops at configuration 2
     gear_rate: Matrix  # (ngear, 2) d(gap)/d(v25) of both

@@ -30,7 +30,7 @@ def _shapes(text: str) -> dict[str, Shape]:
 MODEL_INTS = _shapes(
     """
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
-    body_above nbody nblock, body_below nbody nblock,
+    body_root nbody, tree_end nbody, body_above nbody nblock, body_below nbody nblock,
     dofs_above nbody nv, dofs_below nbody nv, count_above nbody, count_below nbody,
     dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, optional nslot,
     contact_terrain nground, contact_hold nground, terrain_size nterrain 3,
@@ -71,7 +71,8 @@ DATA_INTS = CARRY_INTS | _shapes(
     pair_sides npair, pair_code npair, pair_previous npair,
     feature_choice 1, overlap_allowed 1, bifurcation_count 1, bifurcation_replaces 1, loop_used nrow, reach_of nreach,
     coupling_live ncoupling, near_count 1, near_first npair,
-    couple_live nrow 2
+    couple_live nrow 2, couple_seen ncouple, couple_order ncouple, couple_count 1, node_count 1, couple_degree ncouple,
+    couple_linked ncouple ncouple, couple_start ncouple+1, node_row ncouple+1, node_span ncouple ncouple+2
     """
 )
 
@@ -97,11 +98,12 @@ DATA_FLOATS = CARRY_FLOATS | _shapes(
     body_way nbody 9,
     pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
-    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 4,
-    couple_scale nrow, couple_x nrow 1, couple_gap nrow, couple_step nrow, couple_trial nrow,
-    couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
-    loop_velocity nv, loop_start nv, loop_kept nv, loop_pivot 1, bifurcation_direction nrow nv, loop_scale nrow,
-    loop_open nrow, gear_rate ngear 2,
+    couple_R nrow 12, couple_E nrow, couple_Y nv 8ncouple, couple_Z 6nbody 8, couple_T nrow 8ncouple,
+    couple_pivots nrow 2, couple_rank 4,
+    couple_scale nrow, couple_x nrow 8, couple_gap nrow, couple_step nrow, couple_trial nrow,
+    couple_panel nrow ncolumn, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
+    loop_velocity nv, loop_start nv, loop_kept nv, loop_pivot 1, bifurcation_direction nrow nv, bifurcation_row nrow nv,
+    loop_scale nrow, loop_open nrow, gear_rate ngear 2,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 24, G nv 24, S_across 18 nwide, F_across 12 nwide,
     triangles nv nwide, triangle_across 12 nwide,
     dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel,
@@ -140,6 +142,7 @@ def _lengths(sizes: Sizes) -> dict[str, int]:
     nv, nu = sizes.nv, sizes.nu
     columns = max(2 * nv + whole(nu), nv + whole(nv))  # with the numbers that lanes write behind dR_dv and the inputs
     columns = -(-columns // SIDE) * SIDE
+    couple = sizes.ncoupling + sizes.ngear
     return {
         **sizes._asdict(),
         "nbody+1": sizes.nbody + 1,
@@ -151,6 +154,10 @@ def _lengths(sizes: Sizes) -> dict[str, int]:
         "2npair": 2 * sizes.npair,
         "ncoupling+1": sizes.ncoupling + 1,
         "2ncoupling": 2 * sizes.ncoupling,
+        "ncouple": couple,
+        "ncouple+1": couple + 1,
+        "ncouple+2": couple + 2,
+        "8ncouple": LANES * couple,
         "nslot": len(Slot),
         "nblock": whole(nv) // LANES,
         "nwide": whole(nv),

@@ -44,6 +44,8 @@ class Model(NamedTuple):
     body_leaf: Integers  # (nbody,) 1 where no body hangs on this one
     body_qadr: Integers  # (nbody + 1,) first coordinate of joint i in q
     body_vadr: Integers  # (nbody + 1,) first velocity of joint i in v: translations first, then rotations
+    body_root: Integers  # (nbody,) first body of its tree, the one that moves first; -1 of bodies that cannot move
+    tree_end: Integers  # (nbody,) of a root: one past the last body of its tree; bodies of others may lie between
     body_above: IntegerMatrix  # (nbody, nblock) dofs above its joint, as bits of blocks of LANES (solvers/lanes.py)
     body_below: IntegerMatrix  # (nbody, nblock) dofs of its joint and below
     dofs_above: IntegerMatrix  # (nbody, nv) the dofs above the joint of a body, root first
@@ -65,7 +67,7 @@ class Model(NamedTuple):
     pair_kind: Integers  # (npair,) of shapes
     pair_feature: Integers  # (npair,) which point of a pair of shapes with several
     coupling_body: IntegerMatrix  # (ncoupling, 2) bodies a and b, -1 for the world; loops after pairs
-    coupling_row: Integers  # (ncoupling + 1,) first row in the dense system
+    coupling_row: Integers  # (ncoupling + 1,) first row in the system of the couplings
     loop_ntrans: Integers  # (nloop,) free translations
     loop_nrot: Integers  # (nloop,) free rotations
     gear_dof: IntegerMatrix  # (ngear, 2) the degree of freedom that follows, and the one that leads

@@ -99,7 +99,6 @@ from sim.dynamics.loops.branch_motion import (
 from sim.dynamics.loops.closure import apply_loops, keep_loops, move_loops, start_loops
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling, solve_coupling_panel
 from sim.dynamics.loops.gears import (
-    add_gear_columns,
     apply_gears,
     gear_derivatives,
     gear_response,
@@ -332,7 +331,7 @@ def link_gradient(model: Model) -> None:
     if len(model.loop_ntrans):
         link(model.optional, loop_stiffness)
     if len(model.gear_dof):
-        link(model.optional, add_gear_columns, gear_derivatives)
+        link(model.optional, gear_derivatives)
     if len(model.pair_kind):
         link(model.optional, all_near)
     if _has_strings(model):

@@ -53,7 +53,7 @@ def _next_pivot(data: Data, first: int, last: int) -> tuple[int, int, float, flo
         if data.loop_used[r] != 0:
             continue
         change = max(change, _largest(data.bifurcation_direction[r]))
-        w = data.couple_Y[r]
+        w = data.bifurcation_row[r]
         for c in range(w.shape[0]):
             if abs(w[c]) > best:
                 best = abs(w[c])
@@ -64,17 +64,17 @@ def _next_pivot(data: Data, first: int, last: int) -> tuple[int, int, float, flo
 @kernel
 def _eliminate(data: Data, first: int, last: int, p: int, c: int) -> None:
     """Row p out of the rows that are left: w and dw combined as w says, and dw modulo the row p."""
-    w = data.couple_Y[p]
+    w = data.bifurcation_row[p]
     dw = data.bifurcation_direction[p]
     data.loop_used[p] = 1
     for r in range(first, last):
         if data.loop_used[r] != 0:
             continue
-        f = data.couple_Y[r, c] / w[c]
+        f = data.bifurcation_row[r, c] / w[c]
         for d in range(w.shape[0]):
-            data.couple_Y[r, d] -= f * w[d]
+            data.bifurcation_row[r, d] -= f * w[d]
             data.bifurcation_direction[r, d] -= f * dw[d]
-        data.couple_Y[r, c] = 0.0
+        data.bifurcation_row[r, c] = 0.0
         f = data.bifurcation_direction[r, c] / w[c]
         for d in range(w.shape[0]):
             data.bifurcation_direction[r, d] -= f * w[d]
@@ -82,14 +82,14 @@ def _eliminate(data: Data, first: int, last: int, p: int, c: int) -> None:
 
 @kernel
 def _set_rows(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
-    """couple_Y = w at configuration 2 and bifurcation_direction = dw, row by row; loop_scale = sizes of dw."""
+    """bifurcation_row = w at configuration 2 and bifurcation_direction = dw, row by row; loop_scale = sizes of dw."""
     for row in range(data.bifurcation_direction.shape[0]):
         for d in range(data.bifurcation_direction.shape[1]):
-            data.couple_Y[row, d] = 0.0
+            data.bifurcation_row[row, d] = 0.0
             data.bifurcation_direction[row, d] = 0.0
     tree_moves(model, data, Increment(q, v, h), True)
     turn_bodies(data, data.rot3)
-    _add_directions(model, data, data.S2, data.couple_B, 1.0, data.couple_Y)
+    _add_directions(model, data, data.S2, data.couple_B, 1.0, data.bifurcation_row)
     for m in range(model.loop_ntrans.shape[0]):
         loop_rows(model, data, m, data.pos3, data.rot3, data.couple_G)
     _add_directions(model, data, data.S3, data.couple_G, 0.5, data.bifurcation_direction)
@@ -112,7 +112,7 @@ def lead_loops(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None
     for row in range(first, last):
         data.loop_used[row] = 0
         data.loop_scale[row] = _largest(data.bifurcation_direction[row])
-        size = max(size, _largest(data.couple_Y[row]))
+        size = max(size, _largest(data.bifurcation_row[row]))
     for _ in range(first, last):
         row, col, best, change = _next_pivot(data, first, last)
         if row < 0 or best < _MEETING * change:

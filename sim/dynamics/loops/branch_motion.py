@@ -6,7 +6,7 @@ The right one continues configurations 1 and 2. Newton's method finds it from a 
 other: the leapfrog start 2 P v - v (loop_velocity.py) has an error of O(h^3), the incoming velocity one of O(h^2). Of
 two solutions the one closer to this start is taken.
 
-This costs as much as the step, and far from a bifurcation it changes nothing. The least pivot of the dense system
+This costs as much as the step, and far from a bifurcation it changes nothing. The least pivot of the system
 (coupling_system.py) is the product of the distances of configurations 2 and 3 from singular ones. If it was not small
 in the last step, the step is solved from its guess without regard to branches; if it is still not small, that is the
 solution. At a singular configuration a constraint depends on others. The number of constraints that always do is

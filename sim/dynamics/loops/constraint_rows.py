@@ -1,12 +1,13 @@
-"""Rows of the dense system of the couplings (coupling_system.py): their list, their forces and their responses."""
+"""Rows of the system of the couplings (coupling_system.py): their list, their forces and their responses."""
 
 from __future__ import annotations
 
-from sim.dynamics.loops.gears import add_gear_columns, gear_response, unit_gear_impulse
+from sim.dynamics.loops.gears import gear_response, gear_responses, gear_row, unit_gear_impulse
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.dense import dot
+from solvers.lanes import Lanes, dot_lanes, load, six, spread
 from solvers.types import Matrix, Vector
 
 _ROUNDING = 1e-14  # stiffness below this share of the largest is rounding
@@ -16,6 +17,12 @@ _ROUNDING = 1e-14  # stiffness below this share of the largest is rounding
 def is_loop(model: Model, k: int) -> bool:
     """Whether coupling k is a closed loop; they come after the pairs."""
     return k >= model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
+
+
+@kernel
+def is_pair(model: Model, k: int) -> bool:
+    """Whether coupling k is that of two bodies in contact, not a loop or a gear."""
+    return k < model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
 
 
 @kernel
@@ -85,8 +92,11 @@ def response(model: Model, data: Data, k: int, row: int) -> float:
 
 
 @kernel
-def response_size(model: Model, data: Data, k: int, row: int) -> float:
-    """|R||zeta| instead of R zeta, translations and rotations apart: a response far below it is rounding."""
+def response_size(model: Model, data: Data, p: int, e: int) -> float:
+    """|R||zeta| instead of R zeta, translations and rotations apart, of row p and column e of couple_Z: a response far
+    below it is rounding.
+    """
+    row, k = data.couple_live[p, 0], data.couple_live[p, 1]
     R = data.couple_R[row]
     t = 0.0
     for side in range(2):
@@ -97,52 +107,77 @@ def response_size(model: Model, data: Data, k: int, row: int) -> float:
                 z = 0.0
                 for c in range(3 * part, 3 * part + 3):
                     r += R[6 * side + c] ** 2
-                    z += data.twist[i, c] ** 2
+                    z += data.couple_Z[6 * i + c, e] ** 2
                 t += (r * z) ** 0.5
     return t
 
 
 @kernel
-def enlist(model: Model, data: Data) -> int:
-    """couple_live: rows of the dense system, with their coupling, or number of couplings + gear; returns how many."""
-    n = 0
+def enlist(model: Model, data: Data, n: int) -> int:
+    """couple_live and couple_start of n couplings in their order: rows of the system, each with its coupling, or the
+    number of couplings + gear; returns how many rows are those of pairs.
+    """
     count = model.coupling_body.shape[0]
-    for k in range(count):
-        if not is_loop(model, k):
-            if data.coupling_live[k] == 0:
-                continue
-            take_apart(data, k, model.coupling_row[k])
-        for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
-            if is_loop(model, k) or data.couple_E[row] > 0.0 or data.couple_E[row] < 0.0:
-                data.couple_live[n, 0] = row
-                data.couple_live[n, 1] = k
-                n += 1
-    for k in range(model.gear_dof.shape[0]):
-        data.couple_live[n, 0] = model.coupling_row[count] + k
-        data.couple_live[n, 1] = count + k
-        n += 1
-    return n
+    row = 0
+    pairs = 0
+    for m in range(n):
+        k = data.couple_order[m]
+        data.couple_start[m] = row
+        first = gear_row(model, k - count) if k >= count else int(model.coupling_row[k])
+        last = first + 1 if k >= count else int(model.coupling_row[k + 1])
+        pair = is_pair(model, k)
+        if pair:
+            take_apart(data, k, first)
+        for r in range(first, last):
+            if not pair or data.couple_E[r] > 0.0 or data.couple_E[r] < 0.0:
+                data.couple_live[row, 0] = r
+                data.couple_live[row, 1] = k
+                row += 1
+                pairs += 1 if pair else 0
+    data.couple_start[n] = row
+    return pairs
 
 
 @kernel
-def unit_impulse(model: Model, data: Data, p: int, out: Vector) -> None:
-    """out (nv,) = the generalized impulse of a unit force in row p of the dense system."""
+def unit_impulses(model: Model, data: Data, m: int, c: int) -> None:
+    """couple_Y and -couple_Z = impulses of unit forces of the rows at place m, one per column: on joints, on bodies."""
+    k = data.couple_order[m]
+    if k >= model.coupling_body.shape[0]:
+        unit_gear_impulse(model, k - model.coupling_body.shape[0], data.couple_Y, c)
+        return
+    for p in range(data.couple_start[m], data.couple_start[m + 1]):
+        row, e = data.couple_live[p, 0], p - data.couple_start[m]
+        for side in range(2):
+            i = model.coupling_body[k, side]
+            if i >= 0 and model.body_root[i] >= 0:
+                sign = -1.0 if side == 0 else 1.0
+                for r in range(6):
+                    data.couple_Z[6 * i + r, e] = sign * data.couple_B[row, r]
+        if data.bifurcation_count[0] > 0:
+            for d in range(data.couple_Y.shape[0]):
+                data.couple_Y[d, c + e] += data.bifurcation_direction[row, d]
+
+
+@kernel
+def row_responses(model: Model, data: Data, p: int, c: int) -> Lanes:
+    """Row p of the system times LANES velocities, columns of couple_Y from c on, whose twists are in couple_Z."""
     row, k = data.couple_live[p, 0], data.couple_live[p, 1]
     if k >= model.coupling_body.shape[0]:
-        unit_gear_impulse(model, k - model.coupling_body.shape[0], out)
-        return
-    for d in range(out.shape[0]):
-        out[d] = 0.0
-    add_along_path(model, data.S2, model.coupling_body[k, 0], 1.0, data.couple_B[row], out)
-    add_along_path(model, data.S2, model.coupling_body[k, 1], -1.0, data.couple_B[row], out)
-    if data.bifurcation_count[0] > 0:
-        for d in range(out.shape[0]):
-            out[d] += data.bifurcation_direction[row, d]
+        return gear_responses(model, data, k - model.coupling_body.shape[0], data.couple_Y, c)
+    x = spread(0.0)
+    for side in range(2):
+        i = model.coupling_body[k, side]
+        if i >= 0:
+            x = x + dot_lanes(data.couple_R, row, 6 * side, six(data.couple_Z, 6 * i, 0))
+    if data.bifurcation_replaces[0] > 0:
+        for d in range(data.couple_Y.shape[0]):
+            x = x + data.bifurcation_direction[row, d] * load(data.couple_Y, d, c)
+    return x
 
 
 @kernel
 def row_response(model: Model, data: Data, p: int, y: Vector) -> float:
-    """Row p of the dense system times the velocities y (nv,), whose twists are in data.twist."""
+    """Row p of the system times the velocities y (nv,), whose twists are in data.twist."""
     row, k = data.couple_live[p, 0], data.couple_live[p, 1]
     if k >= model.coupling_body.shape[0]:
         return gear_response(model, data, k - model.coupling_body.shape[0], y)
@@ -151,20 +186,14 @@ def row_response(model: Model, data: Data, p: int, y: Vector) -> float:
 
 
 @kernel
-def add_columns(model: Model, data: Data, p: int, x: Vector) -> None:
-    """x = the row of couple_panel that is row p of the dense system, plus its response to the columns."""
+def column_responses(model: Model, data: Data, p: int, c: int) -> Lanes:
+    """Row p of couple_panel and its response to data.columns, whose twists are in data.panel; LANES from c on."""
     row, k = data.couple_live[p, 0], data.couple_live[p, 1]
-    for m in range(x.shape[0]):
-        x[m] = data.couple_panel[row, m]  # p <= row
+    x = load(data.couple_panel, row, c)
     if k >= model.coupling_body.shape[0]:
-        add_gear_columns(model, data, k - model.coupling_body.shape[0], x)
-        return
+        return x + gear_responses(model, data, k - model.coupling_body.shape[0], data.columns, c)
     for side in range(2):
         i = model.coupling_body[k, side]
-        if i < 0:
-            continue
-        for c in range(6):
-            f = data.couple_R[row, 6 * side + c]
-            z = data.panel[6 * i + c]
-            for m in range(x.shape[0]):
-                x[m] += f * z[m]
+        if i >= 0:
+            x = x + dot_lanes(data.couple_R, row, 6 * side, six(data.panel, 6 * i, c))
+    return x

@@ -1,4 +1,4 @@
-"""Gears: rows of the dense system of the couplings that act on joint coordinates instead of bodies.
+"""Gears: rows of the system of the couplings that act on joint coordinates instead of bodies.
 
     g = q3_a - ratio q3_b - offset = 0        impulse f on coordinate a, -ratio f on coordinate b
 
@@ -11,12 +11,13 @@ from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
+from solvers.lanes import Lanes, load
 from solvers.types import Matrix, Vector
 
 
 @kernel
 def gear_row(model: Model, k: int) -> int:
-    """Row of gear k in the dense system."""
+    """Row of gear k in that system."""
     return int(model.coupling_row[model.coupling_body.shape[0]]) + k
 
 
@@ -46,12 +47,10 @@ def apply_gears(model: Model, data: Data, h: float) -> float:
 
 
 @optional(Slot.UNIT_GEAR_IMPULSE)
-def unit_gear_impulse(model: Model, k: int, out: Vector) -> None:
-    """out (nv,) = the generalized impulse of gear k, of size one."""
-    for d in range(out.shape[0]):
-        out[d] = 0.0
-    out[model.gear_dof[k, 0]] += 1.0
-    out[model.gear_dof[k, 1]] -= model.gear_ratio[k]
+def unit_gear_impulse(model: Model, k: int, out: Matrix, c: int) -> None:
+    """Column c of out (nv, ...) += the generalized impulse of gear k, of size one."""
+    out[model.gear_dof[k, 0], c] += 1.0
+    out[model.gear_dof[k, 1], c] -= model.gear_ratio[k]
 
 
 @optional(Slot.GEAR_RESPONSE, default=0.0)
@@ -60,13 +59,11 @@ def gear_response(model: Model, data: Data, k: int, y: Vector) -> float:
     return data.gear_rate[k, 0] * y[model.gear_dof[k, 0]] + data.gear_rate[k, 1] * y[model.gear_dof[k, 1]]
 
 
-@optional(Slot.ADD_GEAR_COLUMNS)
-def add_gear_columns(model: Model, data: Data, k: int, x: Vector) -> None:
-    """x += d(gap of gear k)/d(v25) of the columns."""
-    a = data.columns[model.gear_dof[k, 0]]
-    b = data.columns[model.gear_dof[k, 1]]
-    for m in range(x.shape[0]):
-        x[m] += data.gear_rate[k, 0] * a[m] + data.gear_rate[k, 1] * b[m]
+@kernel
+def gear_responses(model: Model, data: Data, k: int, X: Matrix, c: int) -> Lanes:
+    """d(gap of gear k)/d(v25) X, of the columns from c on."""
+    a, b = data.gear_rate[k, 0], data.gear_rate[k, 1]
+    return a * load(X, model.gear_dof[k, 0], c) + b * load(X, model.gear_dof[k, 1], c)
 
 
 @optional(Slot.GEAR_DERIVATIVES)
