@@ -31,6 +31,12 @@ __all__ = ["KernelLowering"]
 _NUMBERS = (types.float64, types.int64)
 
 
+def _is_whole(kind: Any) -> bool:
+    """Whether a type is that of whole numbers, or of names for them."""
+    kind = types.unliteral(kind)
+    return kind == types.int64 or (isinstance(kind, types.IntEnumMember) and kind.dtype == types.int64)
+
+
 class _Lower(Lower):
     """Numba's lowering with the changes above, for functions without reference counts."""
 
@@ -181,7 +187,7 @@ class _Lower(Lower):
             return None
         kind = types.unliteral(self.typeof(index.name))
         several = isinstance(kind, types.BaseTuple)
-        if any(types.unliteral(k) != types.int64 for k in (kind.types if several else (kind,))):
+        if not all(map(_is_whole, kind.types if several else (kind,))):
             return None
         value = self.loadvar(index.name)
         if not several:

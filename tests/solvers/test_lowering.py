@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+from enum import IntEnum
+
+import numba
 import numpy as np
 import pytest
 
-from solvers.compiler import kernel
+from solvers.compiler import kernel, local_kernel
 
 pytestmark = pytest.mark.kernel
 
@@ -44,6 +48,22 @@ def _deep(c, t, out):
         row[k] += k
     tail = row[1:]
     tail[0] = 7.0
+
+
+class _Column(IntEnum):
+    """Names of columns."""
+
+    FIRST = 0
+    THIRD = 2
+
+
+@kernel
+def _named(a, i, out):
+    """Columns by name, of an entry, of an entry of a row, and of the result."""
+    out[_Column.FIRST] = a[i, _Column.THIRD]
+    row = a[i]
+    row[_Column.FIRST] += 2.0
+    out[_Column.THIRD] = row[_Column.FIRST] + a[i, _Column.FIRST]
 
 
 @kernel
@@ -93,6 +113,7 @@ _CASES = [
     (_negative, lambda: (_matrix(), 1)),
     (_variable_index, lambda: (_matrix(), 1)),
     (_variable_index, lambda: (_matrix(), 0)),
+    (_named, lambda: (_matrix(), 1)),
     (_deep, lambda: (_cube(), 1)),
     (_deep, lambda: (_cube(), 0)),
     (_mixed, lambda: (3, 2.5, np.arange(4))),
@@ -115,3 +136,23 @@ def test_the_same_as_in_python(kernel_, arguments):
     assert np.array_equal(out, expected, equal_nan=True)
     for a, b in zip(ours, theirs, strict=True):
         assert np.array_equal(a, b, equal_nan=True)
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="looks at compiled code")
+@pytest.mark.skipif(
+    os.environ.get("DOJO_OPT_PLAIN_NUMBA", "0") not in ("", "0"), reason="Numba asks whether indices are negative"
+)
+def test_columns_by_name_take_the_instructions_of_numbers():
+    def by_number(a, i):
+        return a[i, 2]
+
+    def by_name(a, i):
+        return a[i, _Column.THIRD]
+
+    code = []
+    for func in (by_number, by_name):
+        compiled = local_kernel(func).entry
+        compiled(_matrix(), 1)
+        (text,) = compiled.inspect_llvm().values()
+        code.append({word: text.count(word) for word in (" icmp ", " select ", " add ", " load ")})
+    assert code[0] == code[1]
