@@ -1,6 +1,6 @@
 """The real cube: parameters identified from films of its tosses, and predictions of tosses that were not used.
 
-python benchmarks/cube.py FOLDER [--tosses 8 64 300] [--held-out 100] [--no-prior] [--all] [--output cube.json]
+python benchmarks/cube.py FOLDER [--tosses 4 8 16 32 64 300] [--held-out 100] [--no-prior] [--all] [--out DIR]
 
 FOLDER holds tosses_train.npz: `states` (N, 13) of position, quaternion, velocity, angular velocity (body) at 148 Hz, in
 half widths of 52.4 mm, of all tosses stacked, and `lengths`: 400 of the 570 tosses of ContactNets (Pfrommer, Halm,
@@ -17,16 +17,18 @@ minima; fits to 8 and 16 tosses then depend on the path of the iterations.
 from __future__ import annotations
 
 import argparse
-import json
+import sys
 import time
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from command import deliver, number, parser
 from numpy.typing import NDArray
 
 import dojo_opt as dojo
+from dojo_opt.report.result import Report, Table
 
 Floats = NDArray[np.float64]
 
@@ -115,7 +117,7 @@ def fitted(motions: list[Floats], judged: list[Floats], given: argparse.Namespac
     found = fit(motions, given.window, tuple(given.further), not given.no_prior)
     seconds = time.process_time() - began
     corners = found.values[2:26].reshape(8, 3)
-    print(f"{len(motions)} tosses: {found!r}")
+    print(f"{len(motions)} tosses: {found!r}", file=sys.stderr)
     return errors(found.simulator, judged) | {
         "seconds": seconds,
         "friction": [float(found.values[0]), float(found.deviation[0])],
@@ -126,36 +128,72 @@ def fitted(motions: list[Floats], judged: list[Floats], given: argparse.Namespac
     }
 
 
-def main() -> None:
-    """Print tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--tosses", nargs="+", type=int, default=[8, 64, 300])
-    parser.add_argument("--held-out", type=int, default=100)
-    parser.add_argument("--window", type=int, default=40)
-    parser.add_argument("--further", nargs="*", default=["inertia:cube", "com:cube"])
-    parser.add_argument("--no-prior", action="store_true", help="without what a ruler, scales and tables tell: PRIOR")
-    parser.add_argument("--all", action="store_true", help="also fit to all tosses, held-out ones included")
-    parser.add_argument("--output", type=Path, default=None)
-    given = parser.parse_args()
+_COLUMNS = (*map(str, GRID), "average")
+_ERRORS = ("position, mean [mm]", "position, median [mm]", "rotation, mean [rad]", "rotation, median [rad]")
+_FEW, _MOST = 8, 300  # tosses that the bars are about
+
+
+def bars(rows: dict[str, Any], held_out: int) -> list[Any]:
+    """Bars of the fits that were made: those of 300 tosses, and of 8 beside them."""
+    best, few = rows.get(f"{_MOST} tosses"), rows.get(f"{_FEW} tosses")
+    if best is None or held_out != 100:
+        return []
+    p, _, r, _ = best["errors"]["average"]
+    out = [number("position, 300 tosses", p, 9.5, unit="mm"), number("rotation, 300 tosses", r, 0.2, unit="rad")]
+    if few is not None:
+        p_few, _, r_few, _ = few["errors"]["average"]
+        out += [
+            number("position, 8 tosses over 300", p_few / p, 1.1),
+            number("rotation, 8 tosses over 300", r_few / r, 1.1),
+        ]
+    return out
+
+
+def run(given: argparse.Namespace) -> Report:
+    """Fits to so many tosses, and their errors on those held out."""
     motions = tosses(given.folder)
     order = np.random.default_rng(0).permutation(len(motions))
     unseen = [motions[i] for i in order[-given.held_out :]]
     rows: dict[str, Any] = {"published": errors(cube(0.18, 0.125, HALF), unseen)}
-    for count in given.tosses:
+    for count in [8] if given.quick else given.tosses:
         if count > len(motions) - given.held_out:
-            parser.error(f"--tosses {count}: {len(motions) - given.held_out} are left beside those held out")
+            raise SystemExit(f"--tosses {count}: {len(motions) - given.held_out} are left beside those held out")
         rows[f"{count} tosses"] = fitted([motions[i] for i in order[:count]], unseen, given)
     if given.all:
         rows[f"all {len(motions)} tosses, in sample"] = fitted(motions, motions, given)
-    print(f"{'steps: position mean, median [mm]; rotation mean, median [rad]':>40}")
-    for name, row in rows.items():
-        print(name, {k: v for k, v in row.items() if k != "errors"})
-        for n, values in row["errors"].items():
-            print(f"  {n:>8}: {values[0]:7.2f} {values[1]:7.2f}   {values[2]:7.3f} {values[3]:7.3f}")
-    if given.output:
-        given.output.write_text(json.dumps(rows, indent=1))
+    report = Report(f"The real cube: errors on {len(unseen)} tosses held out, {given.window} steps a window")
+    report.rows = bars(rows, given.held_out)
+    if given.all:
+        seconds = rows[f"all {len(motions)} tosses, in sample"]["seconds"]
+        report.rows.append(number(f"fit to {len(motions)} tosses", seconds, 60.0, unit="s"))
+    for k, title in enumerate(_ERRORS):
+        cells = [[name, *(row["errors"].get(n, [None] * 4)[k] for n in _COLUMNS)] for name, row in rows.items()]
+        report.tables.append(Table(title, ("after steps", *_COLUMNS), cells))
+    fits = {name: row for name, row in rows.items() if "seconds" in row}
+    header = ("fit", "time [s]", "friction", "restitution", "half widths [mm]", "rms of the errors", "unsolved")
+    cells = []
+    for name, f in fits.items():
+        sizes = float(np.mean(f["half widths"]))
+        cells.append([name, f["seconds"], f["friction"][0], f["restitution"][0], sizes, f["rms"], f["unsolved"]])
+    report.tables.append(Table("Fits", header, cells))
+    report.details = {"fits": {name: {k: v for k, v in f.items() if k != "errors"} for name, f in fits.items()}}
+    return report
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report."""
+    arguments = parser(__doc__)
+    arguments.add_argument("folder", type=Path)
+    arguments.add_argument("--tosses", nargs="+", type=int, default=[4, 8, 16, 32, 64, 300])
+    arguments.add_argument("--held-out", type=int, default=100)
+    arguments.add_argument("--window", type=int, default=40)
+    arguments.add_argument("--further", nargs="*", default=["inertia:cube", "com:cube"])
+    arguments.add_argument(
+        "--no-prior", action="store_true", help="without what a ruler, scales and tables tell: PRIOR"
+    )
+    arguments.add_argument("--all", action="store_true", help="also fit to all tosses, held-out ones included")
+    return deliver("cube", run, arguments, argv)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

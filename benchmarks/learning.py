@@ -2,12 +2,13 @@
 
 python benchmarks/learning.py DIR HalfCheetah --algorithms shac ars --seeds 0 1 2 3 4      runs and saves
 python benchmarks/learning.py DIR HalfCheetah --only-figure                                 draws what is saved
-python benchmarks/learning.py DIR HalfCheetah --table           and tabulates it, with returns in MuJoCo, in TASK.json
+python benchmarks/learning.py DIR HalfCheetah --beside Hopper --table       and tabulates it, in DIR/learning.json
 
 `best_of` with seed k begins with the seeds 3k, 3k + 1, 3k + 2 of SHAC. A run is DIR/TASK_ALGORITHM_SEED.npz, and its
-policy DIR/....policy.npz. For one core, set NUMBA_NUM_THREADS=1 and OPENBLAS_NUM_THREADS=1. Policies are also evaluated
-at time steps and smoothings that they have not learnt on, and in MuJoCo by benchmarks/evaluate_policy.py, which imports
-nothing of dojo-opt. Runs of other libraries are those of benchmarks/learning_peers.py in the same folder.
+policy DIR/....policy.npz. For one core, set NUMBA_NUM_THREADS=1 and OPENBLAS_NUM_THREADS=1. The table has the returns
+of policies at a time step and a smoothing that they have not learnt on, and in MuJoCo, by
+benchmarks/evaluate_policy.py, which imports nothing of dojo-opt. Runs of other libraries are those of
+benchmarks/learning_peers.py in the same folder.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import argparse
 import json
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ from numpy.typing import NDArray
 import dojo_opt as dojo
 from dojo_opt.learn.gymnasium_tasks import BALANCE, TRANSFER
 from dojo_opt.learn.registration import task_of
+from dojo_opt.report.result import Report, Row, Table
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +57,20 @@ SETTINGS: dict[str, dict[str, dict[str, Any]]] = {  # of shac, beside those of t
 }
 PEERS = ("ppo", "sac")  # of learning_peers.py
 JUDGED = ("HalfCheetah", "Hopper", "Walker2d", "Ant")
-UNSEEN = ((10, 3e-5), (7, 2e-3))  # time steps per action, smoothing [N s m]
+UNSEEN = (10, 3e-5)  # time steps per action, smoothing [N s m]
+BARS: dict[str, list[tuple[str, float]]] = {  # of shac: quantity of its seeds, and what it should be at least
+    "HalfCheetah": [
+        ("mean return after 60 s", 5500.0), ("least return", 4500.0), ("mean return in MuJoCo", 4500.0),
+        ("mean return in MuJoCo, time step / 5", 6000.0),
+    ],
+    "Hopper": [("mean return", 2400.0)],
+    "Walker2d": [("mean return", 3000.0), ("mean return in MuJoCo", 1500.0)],
+    "Ant": [("mean return", 2300.0)],
+}  # fmt: skip
+_HEADER = (
+    "algorithm", "seed", "return", "after 60 s", "unseen step and smoothing", "MuJoCo", "MuJoCo, time step / 5",
+    "time [s]", "control steps", "unsolved", "gradients not finite",
+)  # fmt: skip
 
 
 def run(folder: Path, name: str, algorithm: str, seed: int, given: dict[str, Any]) -> None:
@@ -71,14 +87,7 @@ def run(folder: Path, name: str, algorithm: str, seed: int, given: dict[str, Any
         learned = getattr(dojo.learn, algorithm)(task, seed=seed, verbose=True, **options)
     learned.save(path)
     learned.policy.save(path.with_suffix(".policy.npz"))
-    print(f"{name} seed {seed}: {learned!r}")
-    for substeps, kappa in UNSEEN:
-        found = dojo.learn.evaluate(learned.policy, 8, 100, substeps=substeps, kappa=kappa)
-        print(
-            f"  {substeps} time steps per action, kappa {kappa:g}: {found.returns.mean():.1f} +- "
-            f"{found.returns.std():.1f}, {found.lengths.mean():.0f} steps, {found.unsolved} unsolved",
-            flush=True,
-        )
+    print(f"{name} seed {seed}: {learned!r}", flush=True)
 
 
 def saved(folder: Path, name: str, algorithm: str) -> list[Path]:
@@ -114,47 +123,69 @@ def figure(folder: Path, names: list[str]) -> None:
         axes.set(xlabel="processor time [s]", ylabel="return in the task", title=name, xlim=(0.0, None))
         if axes.lines:
             axes.legend()
-    target = folder / f"{'_'.join(names)}.png"
+    target = folder / "learning.png"
     page.savefig(target, dpi=150)
     print(f"wrote {target}")
 
 
-def table(folder: Path, name: str) -> None:
-    """Returns of all saved runs: here, and in MuJoCo where Gymnasium has the task."""
-    rows: dict[str, Any] = {}
-    print(f"{name}: return here (mean, least over seeds), minutes of a core, in MuJoCo, at a fifth of its time step")
-    for algorithm in PEERS:
-        ends = [curve(path)[-1] for path in saved(folder, name, algorithm)]
-        if ends:
-            seconds, best = np.array(ends).T
-            rows[algorithm] = {"returns": best.tolist(), "minutes": (seconds / 60.0).tolist()}
-            minutes = seconds.mean() / 60.0
-            print(
-                f"{algorithm:16} {len(ends)} seeds {best.mean():8.1f} {best.min():8.1f} {minutes:6.2f} min (its last)"
-            )
-    for algorithm in SETTINGS[name]:
-        paths = saved(folder, name, algorithm)
-        if not paths:
+def in_mujoco(name: str, policies: list[Path]) -> list[list[float]]:
+    """(return in Gymnasium's environment, at a fifth of its time step) of policies, where Gymnasium has the task."""
+    if name not in JUDGED:
+        return [[float("nan")] * 2] * len(policies)
+    judge = Path(__file__).with_name("evaluate_policy.py")
+    with tempfile.TemporaryDirectory() as folder:
+        there = Path(folder) / "returns.json"
+        command = [sys.executable, str(judge), f"{name}-v5", *map(str, policies), "--output", str(there)]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        return list(json.loads(there.read_text()).values())
+
+
+def cells(folder: Path, name: str, algorithm: str) -> list[list[Any]]:
+    """The rows of the table of a task that an algorithm has, one per seed, as in _HEADER."""
+    out = []
+    if algorithm in PEERS:
+        for path in saved(folder, name, algorithm):
+            seconds, best = curve(path)[-1]
+            out.append([algorithm, int(path.stem.split("_")[-1]), best, *[None] * 4, seconds, *[None] * 3])
+        return out
+    paths = saved(folder, name, algorithm)
+    policies = [path.with_suffix(".policy.npz") for path in paths]
+    for path, policy, there in zip(paths, policies, in_mujoco(name, policies) if paths else [], strict=True):
+        found, points = dojo.learn.Learned.load(path), curve(path)
+        soon = points[points[:, 0] <= 60.0, 1].max(initial=-np.inf)
+        learnt = dojo.learn.LearnedPolicy.load(policy, task_of(name))
+        unseen = dojo.learn.evaluate(learnt, 8, 100, substeps=UNSEEN[0], kappa=UNSEEN[1]).returns.mean()
+        counts = [found.steps, found.unsolved, found.infinite]
+        out.append([algorithm, found.seed, found.best, soon, float(unseen), *there, found.seconds, *counts])
+    return out
+
+
+def table(folder: Path, names: list[str]) -> Report:
+    """Returns of all saved runs: here, and in MuJoCo where Gymnasium has the task; bars of shac."""
+    report = Report("Policies of Gymnasium's tasks, one core")
+    for name in names:
+        lines = [line for algorithm in (*SETTINGS[name], *PEERS) for line in cells(folder, name, algorithm)]
+        report.tables.append(Table(name, _HEADER, lines))
+        numbers = np.array([line[1:] for line in lines if line[0] == "shac"], dtype=np.float64).reshape(
+            -1, len(_HEADER) - 1
+        )
+        report.rows.append(Row(f"{name}, seeds of shac", float(len(numbers)), ""))
+        if not len(numbers):
             continue
-        runs = [dojo.learn.Learned.load(path) for path in paths]
-        best, minutes = np.array([r.best for r in runs]), np.array([r.seconds / 60.0 for r in runs])
-        row: dict[str, Any] = {
-            "returns": best.tolist(), "minutes": minutes.tolist(), "steps": [r.steps for r in runs],
-            "unsolved": sum(r.unsolved for r in runs), "infinite": sum(r.infinite for r in runs),
+        means = dict(zip(_HEADER[1:], numbers.mean(axis=0), strict=True))
+        found = {
+            "mean return": means["return"], "least return": numbers[:, 1].min(),
+            "mean return after 60 s": means["after 60 s"],
+            "mean return at an unseen step and smoothing": means["unseen step and smoothing"],
+            "mean return in MuJoCo": means["MuJoCo"],
+            "mean return in MuJoCo, time step / 5": means["MuJoCo, time step / 5"],
         }  # fmt: skip
-        text = f"{algorithm:16} {len(runs)} seeds {best.mean():8.1f} {best.min():8.1f} {minutes.mean():6.2f} min"
-        if name in JUDGED:
-            there = folder / f"{name}_{algorithm}.mujoco.json"
-            judge = Path(__file__).with_name("evaluate_policy.py")
-            policies = [str(path.with_suffix(".policy.npz")) for path in paths]
-            command = [sys.executable, str(judge), f"{name}-v5", *policies, "--output", str(there)]
-            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-            row["mujoco"] = list(json.loads(there.read_text()).values())
-            means = np.mean(row["mujoco"], axis=0)
-            text += f" {means[0]:8.1f} {means[1]:8.1f}"
-        print(text, flush=True)
-        rows[algorithm] = row
-    (folder / f"{name}.json").write_text(json.dumps(rows, indent=1))
+        bars = dict(BARS.get(name, ()))
+        report.rows += [Row(f"{name}, {key}", float(v), "", bars.get(key), True) for key, v in found.items()]
+        report.rows.append(Row(f"{name}, mean time", means["time [s]"], "s"))
+        report.rows.append(Row(f"{name}, unsolved steps", numbers[:, -2].sum(), "", 0.0))
+        report.rows.append(Row(f"{name}, gradients not finite", numbers[:, -1].sum(), "", 0.0))
+    return report
 
 
 def main() -> None:
@@ -178,7 +209,11 @@ def main() -> None:
             run(given.folder, given.task, algorithm, seed, limits)
     figure(given.folder, [given.task, *given.beside])
     if given.table:
-        table(given.folder, given.task)
+        report = table(given.folder, [given.task, *given.beside])
+        beside = f" --beside {' '.join(given.beside)}" if given.beside else ""
+        report.command = f"python benchmarks/learning.py DIR {given.task}{beside} --table"
+        print(report.as_text())
+        (given.folder / "learning.json").write_text(report.as_json() + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from dojo_opt.learn.seeds import best_of, seeds
 from dojo_opt.learn.shac import ShacOptions, shac
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.velocity_task import quadruped, velocity_error
+from dojo_opt.learn.waypoint_tasks import quadrotor, uuv, youbot
 
 if find_spec("gymnasium") is not None:
     from dojo_opt.learn.registration import register
@@ -46,10 +47,13 @@ __all__ = [
     "humanoid",
     "imitate",
     "pendulum",
+    "quadrotor",
     "quadruped",
     "roll_policy_batch",
     "seeds",
     "shac",
+    "uuv",
     "velocity_error",
     "walker2d",
+    "youbot",
 ]

@@ -27,6 +27,9 @@ TASKS = {  # name: module and function, steps of an episode
     "Cartpole": ("gymnasium_tasks", "cartpole", 1000),
     "Pendulum": ("gymnasium_tasks", "pendulum", 200),
     "Quadruped": ("velocity_task", "quadruped", 500),
+    "QuadrotorWaypoint": ("waypoint_tasks", "quadrotor", 500),
+    "UuvWaypoint": ("waypoint_tasks", "uuv", 300),
+    "YoubotWaypoint": ("waypoint_tasks", "youbot", 300),
 }
 
 

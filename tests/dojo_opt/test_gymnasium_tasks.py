@@ -12,7 +12,10 @@ gymnasium = pytest.importorskip("gymnasium")
 pytest.importorskip("mujoco")
 from gymnasium.vector import AutoresetMode  # noqa: E402
 
-NAMES = ("Pendulum", "Cartpole", "HalfCheetah", "Hopper", "Walker2d", "Ant", "Humanoid", "Quadruped")
+NAMES = (
+    "Pendulum", "Cartpole", "HalfCheetah", "Hopper", "Walker2d", "Ant", "Humanoid", "Quadruped", "QuadrotorWaypoint",
+    "UuvWaypoint", "YoubotWaypoint",
+)  # fmt: skip
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")  # that observations have no bounds; faults are assertions
