@@ -82,7 +82,7 @@ def step(
     x = np.tile(start, (len(time), 1))
     x[:, 2] += out * (sim.neutral()[2] - lower - start[2])
     try:
-        base = _balanced(feet, x, path, goal)
+        base = balanced(feet, x, path, goal)
     except ValueError as error:
         raise ValueError(f"gaits.step(length={length:g}, lower={lower:g}): {error}") from error
     contact = np.ones((len(time), len(swung)), dtype=bool)
@@ -123,14 +123,28 @@ def _end(sim: Simulator, after: Gait) -> Array:
     return np.asarray(state)
 
 
-def _balanced(feet: Feet, x: Array, path: Array, goal: Array) -> Array:
-    """Poses (n, 7) of the base near those of x (n, nx) for which the centre of mass is above `goal` (n, 2)."""
+def balanced(feet: Feet, x: Array, path: Array, goal: Array) -> Array:
+    """Poses of the base near those of given states for which the centre of mass is where it should be.
+
+    Args:
+        feet: the feet.
+        x: (n, nx) states.
+        path: (n, k, 3) places of the feet [m].
+        goal: (n, 2) places of the centre of mass, or (2,) [m].
+
+    Returns:
+        (n, 7) poses.
+
+    Raises:
+        ValueError: a foot cannot reach its place.
+    """
     sim = feet.sim
     mass = np.array([body.mass for body in sim.mechanism.bodies])
+    x = np.array(x)
     for _ in range(_CORRECTIONS):
         x = feet.place(x, path)
         centre = np.einsum("b,nbk->nk", mass / mass.sum(), sim.maximal(x)[..., :2])
         if np.abs(goal - centre).max() < _CLOSE:
             break
         x[:, :2] += goal - centre
-    return x[:, :7]
+    return np.asarray(x[:, :7])

@@ -55,6 +55,11 @@ class Feet:
         self.normal = np.array([np.asarray(c.normal) for c in self.contacts])
         self.height = np.array([c.height for c in self.contacts])
 
+    @property
+    def flat(self) -> bool:
+        """Whether some feet have several contacts, and so an attitude on the ground."""
+        return len({contact.body for contact in self.contacts}) < len(self.contacts)
+
     def positions(self, x: ArrayLike) -> Array:
         """Places of the balls.
 

@@ -77,6 +77,23 @@ class Footfall:
         ends = np.concatenate([path, path[:1]])
         return np.stack([np.interp(wrapped, np.linspace(0.0, 1.0, _GRID + 1), c) for c in ends.T], axis=1)
 
+    def shift(self, t: Any, height: float) -> Array:
+        """(n,) displacement of the base to the left [m], for two feet, on which a robot balances in turn.
+
+        The periodic motion y of a linear inverted pendulum, y'' = g/height (y - p), over the middle p of the feet on
+        the ground: each harmonic of p by the factor w^2 / (w^2 + k^2), w^2 = g/height, without the mean. Where no foot
+        is on the ground p is the middle of all.
+        """
+        count = self.contact(self.period * np.arange(_GRID) / _GRID)
+        side = self.foothold.imag - self.foothold.imag.mean()
+        middle = (count * side).sum(axis=1) / np.maximum(count.sum(axis=1), 1)
+        rate, harmonic = 9.81 / height, 2.0 * np.pi * np.arange(_GRID // 2 + 1) / self.period
+        waves = np.fft.rfft(middle) * rate / (rate + harmonic**2)
+        waves[0] = 0.0
+        path = np.fft.irfft(waves, _GRID)
+        wrapped = np.mod(np.asarray(t) / self.period, 1.0)
+        return np.interp(wrapped, np.linspace(0.0, 1.0, _GRID + 1), [*path, path[0]])
+
 
 def _integral(values: Array, period: float) -> Array:
     """Periodic integral of samples of one period, mean removed before and after."""

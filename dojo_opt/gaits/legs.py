@@ -24,6 +24,7 @@ __all__ = ["Legs"]
 _LOW = 0.3  # of the height of the base: contacts no higher than this above the lowest one may be feet
 _FLAT = 0.01  # [m] contacts this near to the lowest one of a foot carry together
 _STRETCH = 0.8  # length of a standing leg over that of a stretched one
+_UPRIGHT = 0.93  # the same on flat feet: bent further, ankles are near their stops, and nothing is left for a crouch
 _BEND = 0.9  # [rad] of the knees where the search for a stance begins
 _PITCH = 0.7  # cosine between the axis of a hinge that bends a leg and y
 _TRIES = 4  # starts of each search
@@ -36,8 +37,8 @@ class Legs:
     The feet are found: the bodies at the ends of the tree that reach down to the ground, with their points that are
     farthest from the knee, or lowest where there is an ankle. Points within 1 cm of such a one are one ball in their
     middle, so that a foot from a mesh costs as much as a ball; two feet keep all these points, on which the robot
-    balances. The stance is found, too: hinges about y bend the legs to 0.8 of their length, with the feet below the
-    hips and the knees to the back where the joint limits allow it.
+    balances. The stance is found, too: hinges about y bend the legs to 0.8 of their length, 0.93 on ankles, with the
+    feet below the hips and the knees to the back where the joint limits allow it.
 
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator.
@@ -46,6 +47,7 @@ class Legs:
         damping: least damper of the joints, as of a motor's controller [N m s/rad] (default None: 0.5 for a robot of
             the weight and height of the A1, in proportion for others; 0 leaves the joints as they are).
         stance: coordinates by joint (default None: found).
+        share: of the usual damper, on flat feet, where none is given.
 
     Raises:
         ValueError: the robot has no legs, no stance is found, or a name is unknown.
@@ -58,6 +60,7 @@ class Legs:
         *,
         damping: float | None = None,
         stance: Any = None,
+        share: float = 1.0,
     ) -> None:
         mech: Mechanism = robot.mechanism if isinstance(robot, Simulator) else robot
         if not isinstance(mech, Mechanism):
@@ -74,11 +77,13 @@ class Legs:
         weight = self.mass * float(np.linalg.norm(np.asarray(mech.gravity)))
         self.torque = weight * self.height / (_A1[0] * _A1[1])  # in units of that of the A1
         self.size = self.height / _A1[0]
-        least = 0.5 * self.torque * self.size**0.5 if damping is None else damping
+        usual = 0.5 * self.torque * self.size**0.5 * (share if Feet(sim).flat else 1.0)
+        least = usual if damping is None else damping
         checks.number("Legs(damping=...)", least, at_least=0.0)
         joints = [mech.joints[0], *(_damped(joint, least) for joint in mech.joints[1:])]
         self.mechanism = replace(mech, joints=joints, neutral=x[: sim.nq])
         self.feet = tuple(contact.name for contact in mech.contacts)
+        self.biped = len({contact.body for contact in mech.contacts}) == 2
 
     def simulator(self, time_step: float, kappa: float) -> Simulator:
         """The simulator of the robot on its feet.
@@ -167,7 +172,8 @@ def _stance(sim: Simulator) -> Array:
         kin.add(f"foot {k}", contact.body, turn.T @ (np.asarray(contact.point) - point))
         sole = float(foot[2] - at[k, 2])
         middle = hip[0] + (at[k, 0] - foot[0] if len(hinges) > 2 else 0.0)
-        places[f"foot {k}"] = np.array([middle, at[k, 1], hip[2] - _STRETCH * length - sole])
+        stretch = _STRETCH if len(hinges) == 2 else _UPRIGHT
+        places[f"foot {k}"] = np.array([middle, at[k, 1], hip[2] - stretch * length - sole])
         knees.append(hinges[1])
     joints = [bodies[name] for name in dict.fromkeys(knees)]
     found = [_bent(sim, kin, places, joints, x, sign) for sign in (1.0, -1.0)]

@@ -7,11 +7,13 @@ of the bodies at the ends of the tree. The base looks along x.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.gaits.biped import balanced
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.footfall import Footfall
 from dojo_opt.gaits.gait import Gait, assemble
@@ -242,7 +244,13 @@ def jump(
     feet[..., 0] += distance * (0.5 * (1.0 - np.cos(np.pi * share)))[:, None]
     feet[..., 2] += (np.maximum(up, 0.0) + clearance * np.sin(np.pi * share) ** 2)[:, None]
     contact = np.repeat(((t <= ends[2] + 1e-9) | (t >= ends[3] - 1e-9))[:, None], feet.shape[1], axis=1)
-    return assemble(sim, "jump", base, feet, contact, names=Feet(sim).names)
+    soles = Feet(sim)
+    if soles.flat:  # nothing but the feet keeps the robot from falling forward
+        x = np.tile(sim.neutral(), (len(t), 1))
+        x[:, :7] = base
+        middle = feet[0, :, :2].mean(axis=0)
+        base = balanced(soles, x, feet, middle + np.stack([forward, np.zeros_like(forward)], axis=1))
+    return assemble(sim, "jump", base, feet, contact, names=soles.names)
 
 
 def _jump_path(t: Array, ends: Array, distance: float, crouch: float, height: float) -> tuple[Array, Array]:
@@ -326,13 +334,16 @@ def _periodic(
     places = ground[:, :2] - neutral[:2]
     if footholds is not None:
         places = checks.array(f"{call}(footholds=...)", footholds, places.shape)
-    offset = _offsets(offsets, places)
+    offset = _offsets(offsets, places, [contact.body for contact in feet.contacts])
     pattern = Footfall(
         offset, duty, period, step_height, complex(speed, lateral), heading_rate, places[:, 0] + 1j * places[:, 1]
     )
     t = sim.time_step * np.arange(-1, steps + 1)
     spot, heading = pattern.base(t)
     sway = pattern.sway(t, _inertia(sim), tilt)
+    if len({contact.body for contact in feet.contacts}) == 2:  # two feet: the weight goes from one to the other
+        spot = spot + 1j * np.exp(1j * heading) * pattern.shift(t, float(neutral[2] - ground[:, 2].mean()))
+        sway[:, 1] = 0.0
     base = np.empty((len(t), 7))
     base[:, :3] = np.stack([spot.real, spot.imag, sway[:, 0] + (neutral[2] if height is None else height)], axis=1)
     base[:, :2] += neutral[:2]
@@ -342,16 +353,21 @@ def _periodic(
     return assemble(sim, name, base, targets, pattern.contact(t), names=feet.names)
 
 
-def _offsets(offsets: dict[tuple[bool, bool], float], places: Array) -> Array:
-    """(k,) when each foot comes down: by left of two, by front and left of four, in turn along each side of more."""
-    middle = places.mean(axis=0)
-    left = places[:, 1] > middle[1]
-    front = (places[:, 0] > middle[0]) & (len(places) != 2)
-    if len(places) > 4:
+def _offsets(offsets: dict[tuple[bool, bool], float], places: Array, bodies: Sequence[str]) -> Array:
+    """(k,) when each contact comes down, with those of its body, which is a foot: by left of two feet, by front and
+    left of four, in turn along each side of more.
+    """
+    names = list(dict.fromkeys(bodies))
+    owner = np.array([names.index(body) for body in bodies])
+    centers = np.array([places[owner == k].mean(axis=0) for k in range(len(names))])
+    middle = centers.mean(axis=0)
+    left = centers[:, 1] > middle[1]
+    front = (centers[:, 0] > middle[0]) & (len(centers) != 2)
+    if len(centers) > 4:
         for side in (True, False):
-            order = np.argsort(-places[left == side, 0]).argsort()
+            order = np.argsort(-centers[left == side, 0]).argsort()
             front[left == side] = order % 2 == 0
-    return np.array([offsets[bool(x), bool(y)] for x, y in zip(front, left, strict=True)])
+    return np.array([offsets[bool(x), bool(y)] for x, y in zip(front, left, strict=True)])[owner]
 
 
 def _attitude(yaw: Array, pitch: Array, roll: Array) -> Array:

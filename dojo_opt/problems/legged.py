@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt import gaits
+from dojo_opt.gaits.biped import balanced
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.gait import Gait, assemble
 from dojo_opt.gaits.legs import Legs
@@ -26,6 +27,11 @@ Array = NDArray[np.float64]
 _PERIOD, _SPEED, _LIFT = 0.6, 0.2, 0.04  # of a trot [s], [m/s], [m]
 _KNOTS = 20  # of a period
 _STEP = 0.02  # [s] of jumps and of standing up
+_LOWS = (0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)  # of the height of the stance, where rising begins
+_STRIDE = 0.7  # [s] of a walk on two feet
+_SINK = 0.4  # of the way down that flat feet allow, by which the base is lower when they walk, and their lift
+_LOOSE = 0.2  # of the usual damper, which takes much of the torque of ankles that push off
+_CROUCH = 0.8  # of the way down that the legs allow, at most, before a jump
 _LEAST = 1e-3  # [s] time steps are multiples of this
 
 
@@ -79,8 +85,8 @@ def walk(
 ) -> Problem:
     """A robot walks, one foot after the other: the library's quadruped, or any one with two or four legs.
 
-    Others walk for two periods of 1 s at 0.1 m/s for a height of 0.29 m, in proportion to the root of the height, with
-    20 knots each; all else is as for `trot`.
+    Others walk for two periods of 1 s, 0.7 s on two feet, at 0.1 m/s for a height of 0.29 m, in proportion to the root
+    of the height, with 20 knots each; all else is as for `trot`.
 
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
@@ -99,7 +105,7 @@ def walk(
     if robot is None:
         return locomotion.walk(**_of_the_quadruped("problems.walk", feet, stance, settings))
     legs = Legs(robot, feet, damping=settings.pop("damping", None), stance=stance)
-    return _periodic(legs, "walk", 1.0, 0.5 * _SPEED, settings)
+    return _periodic(legs, "walk", _STRIDE if legs.biped else 1.0, 0.5 * _SPEED, settings)
 
 
 def _periodic(legs: Legs, name: str, period: float, speed: float, settings: dict[str, Any]) -> Problem:
@@ -109,7 +115,11 @@ def _periodic(legs: Legs, name: str, period: float, speed: float, settings: dict
     follows, rest = _shared_out(settings)
     usual = {"speed": speed * slow, "step_height": _LIFT * legs.size, "cycles": 1 if follows.get("periodic") else 2}
     substeps = whole_number(f"problems.{name}(substeps=...)", follows.get("substeps", 1))
-    made = getattr(gaits, name)(legs.simulator(step / substeps, PLANNED), period=_KNOTS * step, **{**usual, **rest})
+    sim = legs.simulator(step / substeps, PLANNED)
+    if Feet(sim).flat:  # legs that are nearly stretched reach neither to the side nor ahead
+        bend = _deepest(sim, legs.height)
+        usual |= {"height": float(sim.neutral()[2]) - _SINK * bend, "step_height": _SINK * bend}
+    made = getattr(gaits, name)(sim, period=_KNOTS * step, **{**usual, **rest})
     return _scaled(legs, made, follows)
 
 
@@ -127,7 +137,7 @@ def jump(
     constraint.
 
     The quadruped jumps 0.3 m far and 0.2 m high. Others jump as far and high for their height h, that of the quadruped
-    being 0.29 m; times follow the root of h, weights the robot's weight and height.
+    being 0.29 m, a third of it on flat feet; times follow the root of h, weights the robot's weight and height.
 
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
@@ -147,14 +157,20 @@ def jump(
     """
     if robot is None:
         return locomotion.jump(**_of_the_quadruped("problems.jump", feet, stance, settings))
-    legs = Legs(robot, feet, damping=settings.pop("damping", None), stance=stance)
+    legs = Legs(robot, feet, damping=settings.pop("damping", None), stance=stance, share=_LOOSE)
     slow, size = legs.size**0.5, legs.size
     refinement = settings.pop("refinement", 5)
     follows, rest = _shared_out(settings)
     step = _rounded(_STEP * slow) / whole_number("problems.jump(substeps=...)", follows.get("substeps", 1))
     usual = {"distance": 0.3 * size, "height": 0.2 * size, "crouch": 0.1 * size, "clearance": 0.08 * size}
     usual |= {"before": 0.3 * slow, "after": 0.4 * slow}
-    gait = gaits.jump(legs.simulator(step, PLANNED), **{**usual, **rest})
+    sim = legs.simulator(step, PLANNED)
+    if Feet(sim).flat:
+        usual |= {"distance": 0.1 * size, "height": 0.07 * size}
+    if not {"crouch", "clearance"} <= rest.keys():  # both bend the legs
+        bend = _CROUCH * _deepest(sim, legs.height)
+        usual |= {name: min(usual[name], bend) for name in ("crouch", "clearance")}
+    gait = gaits.jump(sim, **{**usual, **rest})
     return locomotion.with_apex(_scaled(legs, gait, follows), refinement)
 
 
@@ -169,7 +185,7 @@ def stand_up(
     robot: Any,
     *,
     feet: Sequence[str] | Mapping[str, float] | None = None,
-    low: float = 0.55,
+    low: float | None = None,
     duration: float | None = None,
     damping: float | None = None,
     stance: Any = None,
@@ -181,7 +197,8 @@ def stand_up(
         robot: the mechanism, on a floating base that looks along x, or its simulator.
         feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
             radii [m] in a table by name (default None: found, as `dojo_opt.gaits.legs.Legs` says).
-        low: height of the base at the beginning over that of the stance, between 0 and 1.
+        low: height of the base at the beginning over that of the stance, between 0 and 1 (default None: 0.55, or the
+            least above it for which flat feet stay on the ground under the centre of mass).
         duration: of the rise and the rest [s] (default None: 1 s for a robot as high as the A1, for others in
             proportion to the root of the height).
         damping: least damper of the joints, see `Legs` (default None: in proportion to weight and height).
@@ -196,8 +213,7 @@ def stand_up(
         ValueError: for an argument out of range, a robot without legs, or a foot that cannot reach its place.
     """
     legs = Legs(robot, feet, damping=damping, stance=stance)
-    checks.number("problems.stand_up(low=...)", low, above=0.0)
-    if not low < 1.0:
+    if low is not None and not checks.number("problems.stand_up(low=...)", low, above=0.0) < 1.0:
         raise ValueError(f"problems.stand_up(low=...): expected a share of the height below 1, got {low:g}")
     follows, rest = _shared_out(settings)
     checks.keywords("problems.stand_up(...)", rest, ())
@@ -207,19 +223,43 @@ def stand_up(
     step = _rounded(_STEP * slow) / substeps
     sim = legs.simulator(step, PLANNED)
     count = substeps * max(2, round(length / (step * substeps)))
-    return _scaled(legs, _rise(sim, count, (1.0 - low) * legs.height), follows)
+    drop = _deepest(sim, legs.height) if low is None else (1.0 - low) * legs.height
+    return _scaled(legs, _rise(sim, count, drop), follows)
+
+
+def _deepest(sim: Simulator, height: float) -> float:
+    """How far the base goes down to the usual height, or as far as the legs let it [m].  ValueError: not at all."""
+    for low in _LOWS:
+        try:
+            _lowered(sim, np.array([(1.0 - low) * height]))
+        except ValueError:
+            if low == _LOWS[-1]:
+                raise
+        else:
+            break
+    return float((1.0 - low) * height)
+
+
+def _lowered(sim: Simulator, by: Array) -> tuple[Array, Array]:
+    """Poses (n, 7) of the base, lower by so much, and places (n, k, 3) of the feet, which stand.
+
+    The centre of mass of a robot on flat feet stays over their middle: no leg before or behind keeps it from falling.
+    """
+    feet, x = Feet(sim), np.tile(sim.neutral(), (len(by), 1))
+    places = feet.positions(x[0])
+    places[:, 2] -= feet.gaps(x[0])
+    x[:, 2] -= by
+    where = np.tile(places, (len(by), 1, 1))
+    if feet.flat:
+        return balanced(feet, x, where, places[:, :2].mean(axis=0)), where
+    return feet.place(x, where)[:, :7], where
 
 
 def _rise(sim: Simulator, steps: int, by: float) -> Gait:
     """The base goes up by so much in two thirds of the steps, at rest at both ends; the feet stand."""
     feet = Feet(sim)
-    x = sim.neutral()
-    places = feet.positions(x)
-    places[:, 2] -= feet.gaps(x)
     share = np.clip(1.5 * np.arange(-1, steps + 1) / steps, 0.0, 1.0)
-    base = np.tile(x[:7], (steps + 2, 1))
-    base[:, 2] -= by * (1.0 - share**3 * (10.0 - 15.0 * share + 6.0 * share**2))
-    where = np.tile(places, (steps + 2, 1, 1))
+    base, where = _lowered(sim, by * (1.0 - share**3 * (10.0 - 15.0 * share + 6.0 * share**2)))
     return assemble(sim, "stand up", base, where, np.ones(where.shape[:2], dtype=bool), names=feet.names)
 
 

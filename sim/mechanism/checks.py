@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _MOST_LISTED = 20  # words in a message
+_LONG = 8192  # numbers; OpenBLAS divides products of 10,000 and more among threads
 
 
 def floats(call: str, value: Any) -> Floats:
@@ -34,8 +35,11 @@ def floats(call: str, value: Any) -> Floats:
 
 def finite(values: Floats) -> bool:
     """Whether all entries are finite numbers."""
-    # the sum of squares shows it at a third of the cost, without a warning, unless it overflows itself
-    return isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
+    # the sum of squares shows it at a third of the cost, without a warning, unless it overflows itself; of long arrays
+    # BLAS takes it with threads, which cost more than they gain, and milliseconds where other processes have the cores
+    if values.size < _LONG and isfinite(np.vdot(values, values)):
+        return True
+    return bool(np.isfinite(values).all())
 
 
 def array(call: str, value: Any, shape: tuple[int | str | None, ...]) -> Floats:

@@ -53,7 +53,7 @@ def opened(call: str, path: str | PathLike[str], what: str) -> tuple[dict[str, A
 
     Args:
         call: the call that an error names.
-        path: path of the file.
+        path: path of the file, or what it was saved as: NumPy adds .npz to other endings.
         what: kind of the archive.
 
     Returns:
@@ -63,8 +63,10 @@ def opened(call: str, path: str | PathLike[str], what: str) -> tuple[dict[str, A
         OSError: the file cannot be read.
         ValueError: it is another file, or of a later version.
     """
+    added = Path(f"{path}.npz")
+    file = added if not Path(path).exists() and added.exists() else path
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with np.load(file, allow_pickle=False) as data:
             arrays = {name: data[name] for name in data.files}
         head = json.loads(str(arrays.pop("meta")))
     except (KeyError, ValueError) as error:

@@ -7,6 +7,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.gaits.feet import Feet
+from dojo_opt.gaits.footfall import Footfall
 from dojo_opt.gaits.legs import Legs
 from dojo_opt.gaits.references import _TROT, _offsets
 from sim.mechanism.parts import Contact
@@ -60,8 +61,39 @@ def test_a_robot_trots_and_jumps(straight, task):
 
 def test_six_legs_trot_in_two_sets_of_three():
     places = np.array([(x, y) for x in (0.3, 0.0, -0.3) for y in (0.2, -0.2)])
-    down = _offsets(_TROT, places).reshape(3, 2)
+    down = _offsets(_TROT, places, [str(k) for k in range(6)]).reshape(3, 2)
     np.testing.assert_array_equal(down, [[0.5, 0.0], [0.0, 0.5], [0.5, 0.0]])
+
+
+def test_soles_of_a_foot_come_down_together_on_two_feet():
+    places = np.array([(x, y) for y in (0.1, -0.1) for x in (0.12, -0.05)])
+    np.testing.assert_array_equal(_offsets(_TROT, places, ["left", "left", "right", "right"]), [0.0, 0.0, 0.5, 0.5])
+
+
+def test_the_shift_of_a_walk_is_that_of_a_pendulum():
+    """y'' = w^2 (y - p): the zero moment point y - y''/w^2 is the middle of the feet on the ground."""
+    walk = Footfall(np.array([0.0, 0.5]), 0.6, 0.8, 0.05, 0.2, 0.0, np.array([0.1j, -0.1j]))
+    h, height = 0.8 / 512, 0.7
+    t = h * np.arange(512)
+    y = walk.shift(np.concatenate([t - h, t, t + h]), height).reshape(3, -1)
+    support = y[1] - height / 9.81 * (y[0] - 2.0 * y[1] + y[2]) / h**2
+    assert 0.02 < np.abs(y[1]).max() < 0.05 and y[1].mean() == pytest.approx(0.0, abs=1e-4)
+    for begin, end, middle in ((0.12, 0.48, 0.1), (0.52, 0.58, 0.0), (0.62, 0.98, -0.1)):
+        assert support[(t > 0.8 * begin) & (t < 0.8 * end)].mean() == pytest.approx(middle, abs=0.005)
+
+
+def test_a_humanoid_crouches_as_far_as_its_ankles_go():
+    """Atlas stands up and jumps without a height that its user would have to find."""
+    mech = dojo.models.atlas()
+    for name, times in (("stand_up", {"duration": 0.3}), ("jump", {"before": 0.2, "after": 0.2})):
+        problem = getattr(dojo.problems, name)(mech, **times)
+        path = np.asarray(problem.specs[0][0].reference)
+        mass = np.array([body.mass for body in mech.bodies])
+        center = np.einsum("b,tbk->tk", mass / mass.sum(), problem.sim.maximal(path)[..., :2])
+        feet = Feet(problem.sim)
+        standing = feet.gaps(path).max(axis=1) < 0.02
+        assert standing[:3].all() and path[:, 2].max() - path[0, 2] > 0.03
+        np.testing.assert_allclose(center[0], feet.positions(path)[0, :, :2].mean(axis=0), atol=1e-4)
 
 
 def test_an_arm_reaches_a_pose_within_its_limits():

@@ -27,6 +27,20 @@ def test_a_root_called_world_is_the_world(tmp_path: Path) -> None:
     assert "fixed there although floating=True" in str(mech.report)
 
 
+def test_what_the_world_alone_holds_floats_when_asked_to(tmp_path: Path) -> None:
+    """The parts of an arm, each in a file with its stand, are things to drop."""
+    path = write(
+        tmp_path, link("world", ""), link("arm", inertial(mass=2.0)), joint("stand", "world", "arm", "fixed", "")
+    )
+    with pytest.warns(
+        dojo.UrdfWarning, match="fixed to the world; as floating=True, they float without this joint: stand"
+    ):
+        mech = dojo.load_urdf(path, ground=False)
+    assert (mech.nv, mech.joints[0].kind, mech.bodies[0].mass) == (6, "floating", 2.0)
+    with pytest.raises(dojo.UrdfError, match="no joint is free to move"):
+        dojo.load_urdf(path, floating=False)
+
+
 def test_the_base_joint_makes_way_for_a_joint_of_its_name(tmp_path: Path) -> None:
     path = write(tmp_path, link("base"), link("arm"), joint("floating_base", "base", "arm"))
     assert dojo.load_urdf(path, ground=False).joint_names == ("base_floating_base", "floating_base")

@@ -123,7 +123,7 @@ BROKEN: dict[str, tuple[tuple[str, ...], str]] = {  # parts from line 2 on, and 
         "line 3, .*a link of this name must be the root",
     ),
     "nothing moves": (
-        (link("world", ""), link("a"), joint("j", "world", "a", "fixed", "")),
+        (link("world", ""), *(link(n) + joint(f"j{n}", "world", n, "fixed", "") for n in "ab")),
         "no joint is free to move",
     ),
     "no mass at all": ((link("base", ""),), "nothing that moves has a mass"),

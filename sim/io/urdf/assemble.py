@@ -17,7 +17,7 @@ from sim.io.urdf.mimic import follower_value, leader_of, mimic_gears
 from sim.io.urdf.report import OVERLAPPING, LinkFrame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
 from sim.io.urdf.robot import Robot, UrdfJoint
 from sim.io.urdf.solids import body_shapes, body_visuals, collision_shapes
-from sim.io.urdf.tree import MergedLinks, Place, group, ordered
+from sim.io.urdf.tree import MergedLinks, Place, group, held_pose, ordered
 from sim.io.urdf.xml import UrdfError
 from sim.mechanism import checks
 from sim.mechanism.composite import composite
@@ -66,6 +66,8 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
     locked = {name: _neutral(robot, choices, name) for name in choices.locked}
     if locked:
         notes.add("joints that are held where they are", locked)
+    if root == WORLD and not choices.fixed_base and all(held_pose(joint, locked) is not None for joint in order):
+        robot, root, order = _let_go(robot, order, notes)
     groups, places = group(robot, root, order, choices.fixed_base, choices.merge, locked)
     if root == WORLD and not choices.fixed_base:
         notes.add("the root is called 'world', so it is fixed there although floating=True", [root])
@@ -118,6 +120,20 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
         if note.warn:
             warnings.warn(f"load_urdf: {choices.file}: {note}", UrdfWarning, stacklevel=3)
     return replace(mech, report=report)
+
+
+def _let_go(robot: Robot, order: list[UrdfJoint], notes: Notes) -> tuple[Robot, str, list[UrdfJoint]]:
+    """The robot, root and joints without the world, where one fixed joint on it keeps all links from moving."""
+    on_world = [joint for joint in order if joint.parent == WORLD]
+    if len(on_world) != 1:
+        return robot, WORLD, order
+    held = on_world[0]
+    notes.add(
+        "all links are fixed to the world; as floating=True, they float without this joint", [held.name], warn=True
+    )
+    links = {name: link for name, link in robot.links.items() if name != WORLD}
+    joints = {name: joint for name, joint in robot.joints.items() if joint is not held}
+    return replace(robot, links=links, joints=joints), held.child, [joint for joint in order if joint is not held]
 
 
 def _neutral(robot: Robot, choices: Choices, name: str, depth: int = 0) -> float:

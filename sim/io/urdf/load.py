@@ -51,8 +51,9 @@ def load_urdf(
     Args:
         path: path of the file.
         floating: whether the root moves freely or is fixed to the world; a root link called "world" is the world in
-            either case. The joint is called "floating_base": its coordinates are the position of the root's frame and
-            its quaternion, its speeds that of the frame's origin (world) and of rotation (body).
+            either case, unless nothing could move then: the rest floats without it. The joint is called
+            "floating_base": its coordinates are the position of the root's frame and its quaternion, its speeds that of
+            the frame's origin (world) and of rotation (body).
         ground: whether collision shapes cannot enter the half-space z < 0.
         friction: coefficient of friction of all contacts; None: <lateral_friction> of the link if the file has it, else
             0.8.
