@@ -95,7 +95,7 @@ class MPC:
         terms = (t for t in self.problem.costs if isinstance(t, StateTerm) and t.knots[0] == 0)
         self._tracking = next(terms, None)  # whose error is logged
         self._first = plan
-        self._ground = Ground(self.sim)
+        self._ground = Ground(self.sim, self.settings.kappa if self.settings.learn_ground == "slope" else None)
         self.reset()
 
     def __reduce__(self) -> Any:
@@ -225,7 +225,7 @@ class MPC:
         if self.settings.learn_ground:
             self._ground.learn(old, now, self._measured.last[1], self._measured.first)
         self._due = now + self.period
-        self.references.move(now + self._later, self._ground.rise, start)
+        self.references.move(now + self._later, self._ground.plane, start)
         shifted = old.shifted(now + self._later, lambda count: tail(old, self.references, count))
         problem.start = start
         shift_multipliers(problem.constraints, (now - self.log[-1].time) / problem.knot_time)

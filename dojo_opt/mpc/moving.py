@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.planning.names import chosen_components
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.term import PickTerm, StateTerm
+from dojo_opt.plant.ground_plane import GroundPlane
 from sim.mechanism import checks
 from sim.simulator.simulator import Simulator
 
@@ -208,7 +209,7 @@ class References:
         self.state: Moving | None = next(states, None)  # one that is a function of time alone
         self._call_checked(0.0)
         self._begin = np.nan  # [s] of the first knot
-        self.rise = 0.0  # [m] of a floating base, at the last move
+        self.plane = GroundPlane()  # at the last move
 
     @property
     def tracked(self) -> Integers | None:
@@ -230,26 +231,26 @@ class References:
             times = time + self._h * term.knots
             checks.array(f"MPC(reference=...) at {times.size} times", function(times), term.reference.shape)
 
-    def move(self, time: float, rise: float = 0.0, x: Vector | None = None) -> None:
+    def move(self, time: float, plane: GroundPlane | None = None, x: Vector | None = None) -> None:
         """Move the references to the present.
 
         Args:
             time: time of the first knot [s].
-            rise: height of the ground, added to that of a floating base [m].
+            plane: the ground, onto which states are carried (default None: that of the references).
             x: (nx,) state at the first knot, for functions that are anchored there (default None: they stay).
         """
-        self._begin, self.rise = time, rise
+        self._begin, self.plane = time, plane or GroundPlane()
         for term, function in self._moving:
             if x is not None and hasattr(function, "anchor"):
                 function.anchor(time, x)
             term.reference[:] = function(time + self._h * term.knots)
-            if rise and isinstance(term, StateTerm):
-                term.reference[:, 2] += rise
+            if self.plane != GroundPlane() and isinstance(term, StateTerm):
+                term.reference[:] = self.plane.carry(term.reference, self._sim.nq)
 
     def rows(self, kind: type[StateTerm] | type[PickTerm], begin: float, count: int) -> Matrix | None:
         """Rows of the first reference of a kind, one knot apart.
 
-        Rows of the present horizon are not computed again, and states are `rise` higher then, as all others of it.
+        Rows of the present horizon are not computed again, and states are on the plane then, as all others of it.
 
         Args:
             kind: class of the term.

@@ -45,7 +45,8 @@ class MPCSettings:
             see `dojo_opt.mpc.measurement`.
         friction: coefficient of friction that plans count on (default None: that of the model). A value below that of
             the ground is safer.
-        learn_ground: whether to take the height of the ground from the standing contacts (default False).
+        learn_ground: whether to take the height of the ground from the standing contacts; "slope" takes the plane on
+            which they stand, of a robot on a floating base, and references are turned with it (default False).
         options: settings of the planner in a tick (default None: `OPTIONS`); its stage is made from kappa and
             kappa_grad.
         first: settings of the planner for the first plan (default None: those of `ilqr`).
@@ -64,7 +65,7 @@ class MPCSettings:
     time_limit: float = float("inf")
     mean_velocity: bool = True
     friction: float | None = None
-    learn_ground: bool = False
+    learn_ground: bool | str = False
     options: Options | None = None
     first: Options | None = None
     log: int | None = 10_000
@@ -90,6 +91,8 @@ class MPCSettings:
             raise ValueError(
                 "MPC(feedforward=False): without a servo nothing would drive the robot; give servo=(kp, kd)"
             )
+        if self.learn_ground not in (False, True, "slope"):
+            raise ValueError(f"MPC(learn_ground=...): expected False, True or 'slope', got {self.learn_ground!r}")
         if self.log is not None:
             whole_number("MPC(log=...)", self.log)
         if self.friction is not None:

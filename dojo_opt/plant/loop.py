@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.planning.names import chosen_components
+from dojo_opt.plant.ground_plane import GroundPlane
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import Tick
 from sim.mechanism import checks
@@ -179,7 +180,8 @@ def _closed_loop(run: _LoopRecord, controller: Controller, plant: Plant, referen
     h, count = plant.sim.time_step, len(run.u)
     own, tracked = getattr(controller, "references", None), None
     if reference is None and own is not None and own.state is not None:
-        reference, tracked = Raised(own.state, h * np.arange(float(len(run.rise))), np.array(run.rise)), own.tracked
+        times = h * np.arange(float(len(run.planes)))
+        reference, tracked = OnPlanes(own.state, times, run.planes, plant.sim.nq), own.tracked
     return ClosedLoop(
         simulator=plant.simulator,
         time=h * np.arange(count + 1.0),
@@ -196,19 +198,20 @@ def _closed_loop(run: _LoopRecord, controller: Controller, plant: Plant, referen
     )
 
 
-class Raised:
-    """States over time, the third coordinate raised by the height of the ground learnt until then."""
+class OnPlanes:
+    """States over time, carried onto the ground that was learnt until then."""
 
-    def __init__(self, level: Any, time: Vector, rise: Vector) -> None:
-        self._level, self._time, self._rise = level, time, rise
+    def __init__(self, level: Any, time: Vector, planes: Sequence[GroundPlane], nq: int) -> None:
+        self._level, self._time, self._planes, self._nq = level, time, planes, nq
 
     def __call__(self, times: ArrayLike) -> Matrix:
         """(n, nx) at the times (n,) [s]."""
-        x = np.asarray(self._level(times))
-        if not self._rise.any():
-            return x
-        x = x.copy()
-        x[:, 2] += self._rise[np.maximum(np.searchsorted(self._time, np.asarray(times) + 1e-9) - 1, 0)]
+        x = np.array(self._level(times))
+        at = np.maximum(np.searchsorted(self._time, np.asarray(times) + 1e-9) - 1, 0)
+        planes = [self._planes[k] for k in at]
+        for plane in set(planes) - {GroundPlane()}:
+            rows = np.array([other == plane for other in planes])
+            x[rows] = plane.carry(x[rows], self._nq)
         return x
 
 
@@ -221,7 +224,7 @@ class _LoopRecord:
     contacts: list[Contacts] = field(default_factory=list)
     status: list[int] = field(default_factory=list)
     log: list[Tick] = field(default_factory=list)
-    rise: list[float] = field(default_factory=list)  # of the reference [m]
+    planes: list[GroundPlane] = field(default_factory=list)  # that the reference was carried onto
     survived: bool = True
     message: str = "Ran to the end."
 
@@ -237,7 +240,7 @@ def _drive(
             answer = controller(plant.time, plant.measure().copy())  # a controller may write into its argument
             command = checks.array("closed_loop: controller's u", answer, (plant.sim.nu,))
             run.log += [tick for tick in log[-1:] if not run.log or tick is not run.log[-1]]
-        run.rise.append(0.0 if own is None else own.rise)
+        run.planes.append(GroundPlane() if own is None else own.plane)
         u, result = plant.step(command)
         run.status.append(int(result.status))
         if result.status != Status.SOLVED:

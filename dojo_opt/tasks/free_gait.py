@@ -32,6 +32,7 @@ _ALIKE = 1e-2  # [1/(N m)^2]
 _SLIP, _NEAR = 3.0, 0.03  # [1/(m/s)^2], [m]
 _SERVO = 40.0, 1.0  # [N m/rad], [N m s/rad]
 _DIAGONAL = ((0, 3), (1, 2))  # legs in the order of the inputs
+_CAREFUL = 0.75  # share of the friction that plans count on: with half of it a robot on a slope expects to creep
 _LEG = 3  # inputs of a leg: hip, thigh and calf
 
 
@@ -107,7 +108,9 @@ def free_gait_mpc(
     end; torques weigh `effort`, the slip of feet near the ground 3, differences of torques between diagonal legs .01.
     Costs are those of Kim et al. 2023 (arXiv 2312.08961), but for a slip that weighs three times as much, and no term
     for long swings. Plans are made at a kappa of .01, where contact acts at a distance of a centimetre: it is this
-    smoothing that lets a foot leave the ground. Servos follow them on the plant, whose contact is hard.
+    smoothing that lets a foot leave the ground. Servos follow them on the plant, whose contact is hard. Plans count on
+    three quarters of the friction, and the slope of the ground is learnt from the feet that stand; the pose goes with
+    it.
 
     Args:
         velocity: (3,) velocity forward and to the left, and rate of the heading [m/s, m/s, rad/s].
@@ -139,6 +142,7 @@ def free_gait_mpc(
     ]
     problem = Problem(sim, pose, _HORIZON, cost=cost, controls0=equilibrium(sim, pose)[1])
     usual: dict[str, Any] = {"iterations": _ITERATIONS, "kappa": _KAPPA, "servo": _SERVO}
+    usual |= {"learn_ground": "slope", "friction": _CAREFUL * min(c.friction for c in sim.mechanism.contacts)}
     usual |= {"first": Options(stages=(Stage(_KAPPA, _KAPPA),))}
     return MPC(problem, reference={0: Lead(pose, velocity, lead)}, **{**usual, **settings})
 

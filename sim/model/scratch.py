@@ -21,10 +21,16 @@ class Scratch:
     def __init__(self, sizes: Sizes, contact_frame: Vector) -> None:
         self._sizes, self._contact_frame = sizes, contact_frame
         self._kept = threading.local()
+        self._turns = 0  # of the contact frames
 
     def tables(self, count: int) -> Table:
         """Tables of `count` Works, (count, ...)."""
-        works = self._kept.__dict__.setdefault("works", [])
+        kept = self._kept.__dict__
+        works = kept.setdefault("works", [])
+        if kept.setdefault("turns", self._turns) != self._turns:
+            for data in works:
+                data.contact_frame[:] = self._contact_frame
+            kept["turns"] = self._turns
         while len(works) < count:
             works.append(allocate_data(self._sizes))
             works[-1].contact_frame[:] = self._contact_frame
@@ -35,10 +41,15 @@ class Scratch:
 
     def table(self) -> Table:
         """Table of the first Data."""
-        first: Table | None = getattr(self._kept, "first", None)
-        if first is None:
-            first = self._kept.first = self.tables(1)[0]
+        kept = self._kept.__dict__
+        first: Table | None = kept.get("first")
+        if first is None or kept["turns"] != self._turns:
+            first = kept["first"] = self.tables(1)[0]
         return first
+
+    def turn(self) -> None:
+        """Take the contact frames of the model anew, which were turned; every thread does so before its next call."""
+        self._turns += 1
 
     def chunks(self, count: int) -> Table:
         """Tables for a parallel call over `count` items, one per chunk."""

@@ -75,6 +75,12 @@ class DividingEngine(Engine):
             self._engines[1] = Engine(self.model, self.settings._replace(loss=math.inf))
         return self._engines[1]
 
+    def turn_ground(self, frame: Floats) -> None:
+        """As Engine.turn_ground."""
+        super().turn_ground(frame)
+        for engine in self._engines.values():
+            engine.turn_ground(frame)
+
     def part(self, parts: int) -> Engine:
         """The engine of the parts of a step."""
         if parts not in self._engines:

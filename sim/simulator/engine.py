@@ -238,6 +238,11 @@ class Engine:
         """Tables of this thread's Data for a parallel call over `count` items, one per chunk."""
         return self._scratch.chunks(count)
 
+    def turn_ground(self, frame: Floats) -> None:
+        """Give all contacts with half-spaces the frame (3, 3): rows normal and two tangents."""
+        self.model.contact_frame[self.model.contact_terrain == 0] = frame.ravel()
+        self._scratch.turn()
+
     def _settings_of(self, steps: int, kappa: float | None) -> Vector:
         """Settings of a call of so many steps: a single one has no deadline, and shares them with others."""
         return self._settings if steps <= 1 and kappa is None else self.settings.array(kappa)

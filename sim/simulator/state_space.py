@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.dynamics.loops.loop_rank import LoopRank
 from sim.mechanism import checks
+from sim.mechanism.axes import contact_frame
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes, pack
 from sim.model.model import Model
@@ -113,6 +114,24 @@ class StateSpace:
         from sim.simulator.parameter_engine import ParameterEngine
 
         return ParameterEngine(self._engine, self.mechanism, self.time_step)
+
+    def turn_ground(self, normal: ArrayLike) -> None:
+        """Turn the half-spaces under all contacts, in place.
+
+        It is for loops that learn their ground in a simulator of their own. `mechanism` keeps the normals that it was
+        made with; heights along the normals stay.
+
+        Args:
+            normal: (3,) outward normal.
+
+        Raises:
+            ValueError: the normal is zero, a body that cannot move freely has a contact, or the simulator has steps of
+                a higher order or an accuracy.
+        """
+        unit = checks.direction("Simulator.turn_ground(normal)", normal)
+        if np.any(self.model.contact_hold) or self.order != 2 or self.accuracy:
+            raise ValueError("Simulator.turn_ground: expected steps of order 2, and contacts that move freely")
+        self._engine.turn_ground(contact_frame(unit))
 
     def neutral(self) -> Floats:
         """The standing or hanging state of the mechanism, at rest, its loops closed as by `close`.

@@ -7,6 +7,7 @@ import dojo_opt as dojo
 from dojo_opt.mpc.horizon import shift_multipliers, tail
 from dojo_opt.mpc.moving import References, Sampled
 from dojo_opt.mpc.policy import Policy
+from dojo_opt.plant.ground_plane import GroundPlane
 from support.standing_hopper import HOPPER, random_policy, standing_problem
 
 
@@ -58,7 +59,7 @@ def test_references_move_with_time_and_with_the_ground():
     problem = standing_problem()
     moved = dojo.MPC(problem)  # MPC's own terms; the terms of the user's problem stay
     references = References(moved.problem, {0: Sampled([0.0, 1.0], _ahead(1.0), HOPPER), 1: np.zeros((3, 3))})
-    references.move(0.5, 0.02)
+    references.move(0.5, GroundPlane(0.02))
     term = moved.problem.costs[0]
     np.testing.assert_allclose(term.reference[:, 0], 0.5 + 0.05 * np.arange(9), atol=1e-12)
     np.testing.assert_allclose(term.reference[:, 2], 0.57, atol=1e-12)

@@ -1,0 +1,76 @@
+"""GroundPlane: the plane that a controller takes the ground for, and references that go with it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+__all__ = ["GroundPlane"]
+
+
+class GroundPlane(NamedTuple):
+    """The plane z = height + slope . (x, y).
+
+    Attributes:
+        height: height at the origin [m].
+        slope: (2,) rise along x and along y [m/m].
+    """
+
+    height: float = 0.0
+    slope: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def normal(self) -> Vector:
+        """(3,) upward unit normal."""
+        a, b = self.slope
+        return np.array([-a, -b, 1.0]) / np.sqrt(1.0 + a * a + b * b)
+
+    @property
+    def level(self) -> bool:
+        """Whether it does not slope."""
+        return self.slope == (0.0, 0.0)
+
+    def carry(self, x: ArrayLike, nq: int) -> Matrix:
+        """States of a robot on the ground z = 0, carried onto the plane: turned with it above the same x and y.
+
+        On a level plane the third coordinate is raised, whatever the base; only a floating base can be turned.
+
+        Args:
+            x: (n, nx) states, their velocities behind nq coordinates.
+            nq: number of coordinates.
+
+        Returns:
+            (n, nx) states.
+        """
+        out = np.array(x, dtype=np.float64)
+        n = self.normal
+        out[:, 2] = self.height + out[:, :2] @ np.asarray(self.slope) + out[:, 2] / n[2]
+        if self.level:
+            return out
+        turn = _upright(n)
+        out[:, 3:7] = _product(turn, out[:, 3:7])
+        out[:, nq : nq + 3] = _turned(turn, out[:, nq : nq + 3])
+        return out
+
+
+def _upright(n: Vector) -> Vector:
+    """(4,) quaternion of the shortest turn from the vertical to n."""
+    half = np.array([1.0 + n[2], -n[1], n[0], 0.0])
+    return np.asarray(half / np.linalg.norm(half))
+
+
+def _product(a: Vector, b: Matrix) -> Matrix:
+    """Hamilton products of a quaternion (4,) with others (..., 4)."""
+    w, r, x, s = a[0], a[1:], b[..., :1], b[..., 1:]
+    return np.concatenate([w * x - (s @ r)[..., None], w * s + x * r + np.cross(r, s)], axis=-1)
+
+
+def _turned(q: Vector, v: Matrix) -> Matrix:
+    """Vectors (n, 3) turned by a quaternion (4,)."""
+    twice = 2.0 * np.cross(q[1:], v)
+    return np.asarray(v + q[0] * twice + np.cross(q[1:], twice))
