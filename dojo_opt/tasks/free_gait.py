@@ -32,6 +32,7 @@ _ALIKE = 1e-2  # [1/(N m)^2]
 _SLIP, _NEAR = 3.0, 0.03  # [1/(m/s)^2], [m]
 _SERVO = 40.0, 1.0  # [N m/rad], [N m s/rad]
 _DIAGONAL = ((0, 3), (1, 2))  # legs in the order of the inputs
+_LEAD, _AHEAD = 0.35, 1.0  # [m], [s] with .35 m a robot that is asked for .6 m/s walks at .45 to .5
 _CAREFUL = 0.75  # share of the friction that plans count on: with half of it a robot on a slope expects to creep
 _LEG = 3  # inputs of a leg: hip, thigh and calf
 
@@ -97,7 +98,7 @@ def free_gait_mpc(
     velocity: ArrayLike = (0.3, 0.0, 0.0),
     *,
     robot: Mechanism | None = None,
-    lead: float = 0.35,
+    lead: float | None = None,
     effort: float = 2e-4,
     **settings: Any,
 ) -> MPC:
@@ -115,7 +116,8 @@ def free_gait_mpc(
     Args:
         velocity: (3,) velocity forward and to the left, and rate of the heading [m/s, m/s, rad/s].
         robot: a mechanism with the joints and inputs of `models.quadruped` (default None: that).
-        lead: largest distance from the robot to the pose that it follows [m].
+        lead: largest distance from the robot to the pose that it follows [m] (default None: that of one second, and .35
+            at least).
         effort: weight of the torques [1/(N m)^2].
         **settings: settings of `dojo.MPC`.
 
@@ -141,10 +143,12 @@ def free_gait_mpc(
         _alike(sim),
     ]
     problem = Problem(sim, pose, _HORIZON, cost=cost, controls0=equilibrium(sim, pose)[1])
+    command = checks.array("tasks.free_gait_mpc(velocity)", velocity, (3,))
+    ahead = max(_LEAD, _AHEAD * float(np.hypot(*command[:2]))) if lead is None else lead
     usual: dict[str, Any] = {"iterations": _ITERATIONS, "kappa": _KAPPA, "servo": _SERVO}
     usual |= {"learn_ground": "slope", "friction": _CAREFUL * min(c.friction for c in sim.mechanism.contacts)}
     usual |= {"first": Options(stages=(Stage(_KAPPA, _KAPPA),))}
-    return MPC(problem, reference={0: Lead(pose, velocity, lead)}, **{**usual, **settings})
+    return MPC(problem, reference={0: Lead(pose, command, ahead)}, **{**usual, **settings})
 
 
 def _alike(sim: Simulator) -> ResidualCost:
