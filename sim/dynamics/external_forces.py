@@ -8,7 +8,7 @@ from sim.model.model import InputKind, Model
 from solvers.compiler import kernel
 from solvers.dense import copy, dot
 from solvers.rotation import cross, rotate
-from solvers.types import Cube, Integers, Matrix, Vector
+from solvers.types import Cube, Matrix, Vector
 
 
 @kernel
@@ -105,7 +105,7 @@ def outer_slopes(model: Model, data: Data, u: Vector, out: Matrix) -> None:
 
 
 @kernel
-def input_slopes(model: Model, data: Data, free: Integers, out: Matrix) -> None:
+def input_slopes(model: Model, data: Data, out: Matrix) -> None:
     """out = df/du: the gain at the dof of a JOINT input, S_d . wrench above the body of the others."""
     w = data.wrench[0]
     for j in range(out.shape[1]):
@@ -118,5 +118,5 @@ def input_slopes(model: Model, data: Data, free: Integers, out: Matrix) -> None:
         input_wrench(model, data, j, w)
         while i >= 0:
             for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-                out[d, j] = w[d - model.body_vadr[i]] if free[i] == 1 else dot(data.S2[d], w)
+                out[d, j] = w[d - model.body_vadr[i]] if model.root_free[i] == 1 else dot(data.S2[d], w)
             i = model.body_parent[i]

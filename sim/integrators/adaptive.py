@@ -31,7 +31,7 @@ from sim.integrators.halved_step import FAILED, LANDS, shorten_impact, try_short
 from sim.integrators.hamilton import coordinate_rates
 from sim.integrators.landing import NEVER
 from sim.integrators.phases import leave, left_out, report_apart
-from sim.integrators.runge_kutta import Scheme, advance
+from sim.integrators.runge_kutta import advance
 from sim.integrators.runge_kutta import begin as begin_node
 from sim.integrators.stretch import Clock, Embedded, Stretch, keep, rest_contacts
 from sim.model.columns import Apart
@@ -40,7 +40,7 @@ from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.pace import is_due, start_pace
 from solvers.compiler import Table, kernel
-from solvers.dense import copy_vector
+from solvers.dense import clear, copy_vector
 from solvers.status import Status
 from solvers.types import Vector
 
@@ -55,26 +55,27 @@ _SUDDEN = 8.0  # ratio of the lengths of steps on a kink and before it
 
 
 @kernel
-def _embedded_error(model: Model, data: Data, scheme: Scheme, embedded: Embedded, h: float) -> float:
+def _embedded_error(model: Model, data: Data, embedded: Embedded, h: float) -> float:
     """h e5^2/sqrt(e5^2 + e3^2/100) of the coordinate where that is largest, after a step [m, rad]."""
-    coordinate_rates(model, scheme.shift, data.nu, embedded.rate)
-    s, fifth, third = scheme.b.shape[0], 0.0, 0.0
+    coordinate_rates(model, data.stage_shift, data.nu, embedded.rate)
+    s, fifth, third = model.stage_b.shape[0], 0.0, 0.0
     for d in range(embedded.rate.shape[0]):
         a, b = embedded.fifth[s] * embedded.rate[d], embedded.third[s] * embedded.rate[d]
         for j in range(s):
-            a += embedded.fifth[j] * scheme.rates_r[j, d]
-            b += embedded.third[j] * scheme.rates_r[j, d]
+            a += embedded.fifth[j] * data.stage_dr[j, d]
+            b += embedded.third[j] * data.stage_dr[j, d]
         fifth, third = max(fifth, abs(a)), max(third, abs(b))
     return h * fifth * fifth / sqrt(fifth * fifth + 0.01 * third * third) if fifth > 0.0 else 0.0
 
 
 @kernel
-def stand(models: Table, works: Table, scheme: Scheme, line: Stretch, goal: Vector) -> float:
+def stand(models: Table, works: Table, line: Stretch, goal: Vector) -> float:
     """Time for which a flight from the node may go on before something could touch, 0 where it is near [s]."""
     model, data = model_view(models[0]), data_view(works[1])
     nq = data.theta1.shape[0]
     if line.clock[Clock.READY] == 0.0:
-        begin_node(model, data, scheme, line.x)
+        clear(data.external)
+        begin_node(model, data, line.x)
         set_external(data, line.wrench, 0)
         line.clock[Clock.READY] = 1.0
     if left_out(model, data, 1.0, line.x[nq:], -1.0) > 10.0 / goal[0]:
@@ -91,7 +92,7 @@ def stand(models: Table, works: Table, scheme: Scheme, line: Stretch, goal: Vect
 
 @kernel
 def try_long(
-    models: Table, works: Table, goal: Vector, scheme: Scheme, line: Stretch, embedded: Embedded, h: float
+    models: Table, works: Table, goal: Vector, line: Stretch, embedded: Embedded, h: float
 ) -> tuple[int, float]:  # fmt: skip
     """line.trial = the node a step of order 8 after line.x, at which `stand` stands; (Status or NEAR, error ratio)."""
     model, data = model_view(models[0]), data_view(works[1])
@@ -99,13 +100,13 @@ def try_long(
     copy_vector(line.x, line.trial)
     line.clock[Clock.READY] = 0.0
     leave(data)
-    status = advance(model, data, scheme, h, line.u, line.trial, None)
-    line.report[1] += scheme.b.shape[0]
+    status = advance(model, data, h, line.u, line.trial, None)
+    line.report[1] += model.stage_b.shape[0]
     if status != _SOLVED:
         return status, FAILED
     if left_out(model, data, 1.0, line.trial[nq:], h) > 10.0 / goal[0]:
         return NEAR, FAILED
-    return _SOLVED, _embedded_error(model, data, scheme, embedded, h) / (goal[0] * h)
+    return _SOLVED, _embedded_error(model, data, embedded, h) / (goal[0] * h)
 
 
 @kernel
@@ -171,11 +172,11 @@ def take_short(
 
 @kernel
 def take_long(
-    models: Table, works: Table, goal: Vector, scheme: Scheme, line: Stretch, embedded: Embedded, h: float
+    models: Table, works: Table, goal: Vector, line: Stretch, embedded: Embedded, h: float
 ) -> int:  # fmt: skip
     """One attempt of order 8, kept where its error is allowed; the Status."""
     clock = line.clock
-    status, ratio = try_long(models, works, goal, scheme, line, embedded, h)
+    status, ratio = try_long(models, works, goal, line, embedded, h)
     if status == _SOLVED:
         length = next_length(h, ratio, clock[Clock.LONG_RATIO], 7.0)
         if ratio <= 1.0:
@@ -198,7 +199,7 @@ def take_long(
 
 @kernel
 def go_on(
-    models: Table, works: Table, settings: Vector, goal: Vector, scheme: Scheme, embedded: Embedded, line: Stretch
+    models: Table, works: Table, settings: Vector, goal: Vector, embedded: Embedded, line: Stretch
 ) -> int:  # fmt: skip
     """Sub-steps until the end of the stretch, a full list of them or the deadline; the Status.
 
@@ -210,7 +211,7 @@ def go_on(
     line.taken[0] = 0
     while clock[Clock.TIME] < goal[2] and line.taken[0] < line.lengths.shape[0]:
         rest = goal[2] - clock[Clock.TIME]
-        reach = 0.9 * stand(models, works, scheme, line, goal) if trees else 0.0
+        reach = 0.9 * stand(models, works, line, goal) if trees else 0.0
         long = min(clock[Clock.LONG], rest, reach)
         if long < rest < 2.0 * long:
             long = 0.5 * rest
@@ -221,7 +222,7 @@ def go_on(
             short = 0.5 * rest
         effort = line.report[1]
         if long >= min(0.5 * short, rest) and long > goal[3]:
-            status = take_long(models, works, goal, scheme, line, embedded, long)
+            status = take_long(models, works, goal, line, embedded, long)
         else:
             status = take_short(models, works, settings, goal, line, embedded, short)
         if goal[2] - clock[Clock.TIME] < 1e-12 * goal[2]:

@@ -29,7 +29,7 @@ from sim.model.data import Data
 from sim.model.model import InputKind, Model
 from solvers.compiler import kernel
 from solvers.rotation import cross, inverse_right_jacobian
-from solvers.types import Integers, Vector
+from solvers.types import Vector
 
 _JOINT = int(InputKind.JOINT)
 
@@ -67,27 +67,27 @@ def subtree_momenta(model: Model, data: Data) -> None:
 
 
 @kernel
-def momenta_of_velocity(model: Model, data: Data, free: Integers, v: Vector, out: Vector) -> None:
+def momenta_of_velocity(model: Model, data: Data, v: Vector, out: Vector) -> None:
     """out = the momenta of joint velocities v at the configuration in `data`."""
     joint_twists(model, data, v)
     subtree_momenta(model, data)
     project(model, data.S2, data.subtree, out)
     for d in range(v.shape[0]):
         out[d] += model.dof_armature[d] * v[d]
-    for i in range(free.shape[0]):
-        if free[i] == 1:
+    for i in range(model.root_free.shape[0]):
+        if model.root_free[i] == 1:
             for k in range(6):
                 out[model.body_vadr[i] + k] = data.subtree[i, k]
 
 
 @kernel
-def velocity_of_momenta(model: Model, data: Data, free: Integers, momenta: Vector) -> bool:
+def velocity_of_momenta(model: Model, data: Data, momenta: Vector) -> bool:
     """data.nu = M^-1 p at the configuration in `data`, with the twists and momenta of the bodies; False if singular."""
     p = data.rhs
     for d in range(momenta.shape[0]):
         p[d] = momenta[d]
-    for i in range(free.shape[0]):
-        if free[i] == 1:
+    for i in range(model.root_free.shape[0]):
+        if model.root_free[i] == 1:
             d = model.body_vadr[i]
             for k in range(d, d + 6):
                 S = data.S2[k]
@@ -158,14 +158,14 @@ def joint_forces(model: Model, q: Vector, v: Vector, u: Vector, out: Vector) -> 
 
 
 @kernel
-def momentum_rates(model: Model, data: Data, free: Integers, u: Vector, out: Vector) -> None:
+def momentum_rates(model: Model, data: Data, u: Vector, out: Vector) -> None:
     """out = p' with the velocity and the momenta of the bodies in `data`."""
     F = data.balance
     outer_wrenches(model, data, u, F)
     joint_forces(model, data.theta1, data.nu, u, out)
-    for i in range(free.shape[0]):
+    for i in range(model.root_free.shape[0]):
         P, f = data.subtree[i], F[i]
-        if free[i] == 1:
+        if model.root_free[i] == 1:
             for k in range(6):
                 out[model.body_vadr[i] + k] = f[k]
             continue

@@ -28,7 +28,7 @@ from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.dense import dot
 from solvers.rotation import cross
-from solvers.types import Integers, Matrix, Vector
+from solvers.types import Matrix, Vector
 
 
 class Slopes(NamedTuple):
@@ -107,7 +107,7 @@ def _pair(S: Matrix, slopes: Slopes, d: int, k: int, behind: bool) -> None:
 
 
 @kernel
-def _tree_pairs(model: Model, data: Data, free: Integers, slopes: Slopes) -> None:
+def _tree_pairs(model: Model, data: Data, slopes: Slopes) -> None:
     """p_q, p_v, f_q, f_v without joint forces."""
     S = data.S2
     for d in range(model.dof_body.shape[0]):
@@ -125,7 +125,7 @@ def _tree_pairs(model: Model, data: Data, free: Integers, slopes: Slopes) -> Non
         root = model.dof_body[d]
         while model.body_parent[root] >= 0:
             root = model.body_parent[root]
-        if free[root] == 1:
+        if model.root_free[root] == 1:
             c = slopes.column[d]
             for r in range(6):
                 e = model.body_vadr[root] + r
@@ -157,7 +157,7 @@ def _add_joint_slopes(model: Model, q: Vector, slopes: Slopes) -> None:
 
 
 @kernel
-def slopes_at(model: Model, data: Data, free: Integers, u: Vector, out: Slopes) -> bool:
+def slopes_at(model: Model, data: Data, u: Vector, out: Slopes) -> bool:
     """All derivatives at the evaluation that is in `data`, and the factors of M; False when that is singular."""
     spatial_inertia(model, data.origin, data.pos2, data.inertia_world, data.A1)
     spatial_inertia(model, data.origin, data.pos2, data.inertia_world, data.A)
@@ -167,9 +167,9 @@ def slopes_at(model: Model, data: Data, free: Integers, u: Vector, out: Slopes) 
     for d in range(out.p_q.shape[0]):
         for k in range(out.p_q.shape[0]):
             out.p_q[d, k] = out.p_v[d, k] = out.f_q[d, k] = out.f_v[d, k] = 0.0
-    _tree_pairs(model, data, free, out)
+    _tree_pairs(model, data, out)
     _add_joint_slopes(model, data.theta1, out)
-    input_slopes(model, data, free, out.f_u)
+    input_slopes(model, data, out.f_u)
     for d in range(data.nu.shape[0]):
         for k in range(6):
             data.S3nu[d, k] = data.S2[d, k]
@@ -178,7 +178,7 @@ def slopes_at(model: Model, data: Data, free: Integers, u: Vector, out: Slopes) 
 
 
 @kernel
-def velocity_slopes(model: Model, data: Data, free: Integers, slopes: Slopes, dq: Matrix, dp: Matrix) -> None:
+def velocity_slopes(model: Model, data: Data, slopes: Slopes, dq: Matrix, dp: Matrix) -> None:
     """data.columns = dv of every direction (dq, dp), p_v dv = dp - p_q dq.   dq: tangent; both (nv, n)."""
     X, n = data.columns, dq.shape[1]
     for d in range(X.shape[0]):
@@ -189,8 +189,8 @@ def velocity_slopes(model: Model, data: Data, free: Integers, slopes: Slopes, dq
             if c != 0.0:
                 for k in range(n):
                     X[d, k] -= c * dq[e, k]
-    for i in range(free.shape[0]):
-        if free[i] == 1:
+    for i in range(model.root_free.shape[0]):
+        if model.root_free[i] == 1:
             d, w = model.body_vadr[i], data.wrench[0]
             for k in range(n):
                 for r in range(6):

@@ -11,16 +11,16 @@ from sim.integrators.hamilton import momenta_of_velocity, place
 from sim.integrators.hamilton_gradient import Slopes, slopes_at
 from sim.model.layout import data_view, model_view
 from solvers.compiler import Table, kernel
-from solvers.types import Integers, Matrix, Vector
+from solvers.types import Matrix, Vector
 
 
 @kernel
 def legendre_slopes(
-    model_at: Table, data_at: Table, h: float, none: Integers, x: Vector, slopes: Slopes, p_q: Matrix, p_v: Matrix
+    model_at: Table, data_at: Table, h: float, x: Vector, slopes: Slopes, p_q: Matrix, p_v: Matrix
 ) -> bool:  # fmt: skip
     """p_q, p_v of the state x = (q, v15), and in `slopes` those of M(q) v at its node; False when M is singular.
 
-    none: (nbody,) zeros, no root of whose momenta others are kept.
+    The model is one of order 2, no root of which has the momenta of its tree.
     """
     model = model_view(model_at)
     data = data_view(data_at)
@@ -36,10 +36,10 @@ def legendre_slopes(
     for k in range(nq):
         data.theta1[k] = q[k]
     place(model, data)
-    momenta_of_velocity(model, data, none, data.nu_trial, data.rhs)
+    momenta_of_velocity(model, data, data.nu_trial, data.rhs)
     for d in range(v.shape[0]):
         data.nu[d] = data.nu_trial[d]
     for i in range(data.balance.shape[0]):
         for k in range(6):
             data.balance[i, k] = 0.0
-    return slopes_at(model, data, none, x[:0], slopes)
+    return slopes_at(model, data, x[:0], slopes)

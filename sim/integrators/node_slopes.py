@@ -16,11 +16,11 @@ from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from solvers.compiler import Table, kernel
 from solvers.dense import clear
-from solvers.types import Cube, Integers, Matrix, Vector
+from solvers.types import Cube, Matrix, Vector
 
 
 @kernel
-def _evaluate(model: Model, data: Data, none: Integers, x: Vector, moving: bool) -> None:
+def _evaluate(model: Model, data: Data, x: Vector, moving: bool) -> None:
     """Configuration 2 and momenta of the node x = (q, v), or at rest there; wrenches from outside are cleared."""
     nq = data.theta1.shape[0]
     for k in range(nq):
@@ -28,14 +28,14 @@ def _evaluate(model: Model, data: Data, none: Integers, x: Vector, moving: bool)
     place(model, data)
     for d in range(data.nu.shape[0]):
         data.nu_trial[d] = data.nu[d] = x[nq + d] if moving else 0.0
-    momenta_of_velocity(model, data, none, data.nu_trial, data.rhs)
+    momenta_of_velocity(model, data, data.nu_trial, data.rhs)
     clear(data.balance)
     clear(data.external)
 
 
 @kernel
 def node_slopes(
-    model_at: Table, data_at: Table, none: Integers, u: Vector, wrench: Cube, x: Vector, out: Slopes, f_q: Matrix
+    model_at: Table, data_at: Table, u: Vector, wrench: Cube, x: Vector, out: Slopes, f_q: Matrix
 ) -> bool:  # fmt: skip
     """Of the node x = (q, v): out.p_q, out.p_v of M(q) v; f_q, and out.f_u, of the forces of inputs and wrenches.
 
@@ -45,20 +45,20 @@ def node_slopes(
     data = data_view(data_at)
     for k in range(3):
         data.origin[k] = 0.0
-    _evaluate(model, data, none, x, False)
+    _evaluate(model, data, x, False)
     outer_wrenches(model, data, u[:0], data.balance)
-    if not slopes_at(model, data, none, u[:0], out):
+    if not slopes_at(model, data, u[:0], out):
         return False
     for d in range(f_q.shape[0]):
         for k in range(f_q.shape[1]):
             f_q[d, k] = -out.f_q[d, k]
-    _evaluate(model, data, none, x, False)
+    _evaluate(model, data, x, False)
     set_external(data, wrench, 0)
     outer_wrenches(model, data, u, data.balance)
-    if not slopes_at(model, data, none, u, out):
+    if not slopes_at(model, data, u, out):
         return False
     for d in range(f_q.shape[0]):
         for k in range(f_q.shape[1]):
             f_q[d, k] += out.f_q[d, k]
-    _evaluate(model, data, none, x, True)
-    return slopes_at(model, data, none, u, out)
+    _evaluate(model, data, x, True)
+    return slopes_at(model, data, u, out)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 from sim.contact.contact_report import report_contacts
 from sim.contact.inactive import cluster_gap, highest
 from sim.dynamics.external_forces import set_external
-from sim.integrators.runge_kutta import Scheme, advance, begin
+from sim.integrators.runge_kutta import advance, begin
 from sim.mechanism.confined import IDLE
 from sim.model.columns import Apart
 from sim.model.data import Data
@@ -27,7 +27,7 @@ from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.pace import is_due, start_pace
 from solvers.compiler import Table, kernel
-from solvers.dense import copy, copy_vector
+from solvers.dense import clear, copy, copy_vector
 from solvers.rotation import cross, quat_matrix, quat_turn
 from solvers.status import Status
 from solvers.types import Cube, Matrix, Vector
@@ -93,23 +93,23 @@ def left_out(model: Model, data: Data, kappa: float, v: Vector, h: float) -> flo
 
 
 @kernel
-def _allowed(scheme: Scheme, tolerance: float) -> float:
-    """tolerance (1 + largest momentum) of the node in `scheme`."""
+def _allowed(data: Data, tolerance: float) -> float:
+    """tolerance (1 + largest momentum) of the node in `data`."""
     most = 0.0
-    for d in range(scheme.momenta.shape[0]):
-        most = max(most, abs(scheme.momenta[d]))
+    for d in range(data.momenta.shape[0]):
+        most = max(most, abs(data.momenta[d]))
     return tolerance * (1.0 + most)
 
 
 @kernel
-def first_far(model_at: Table, data_at: Table, settings: Vector, scheme: Scheme, xs: Matrix) -> int:
+def first_far(model_at: Table, data_at: Table, settings: Vector, xs: Matrix) -> int:
     """The first of the states xs (n, nx) at which all is inactive; n if there is none."""
     model = model_view(model_at)
     data = data_view(data_at)
     nq = data.theta1.shape[0]
     for t in range(xs.shape[0]):
-        begin(model, data, scheme, xs[t])
-        if left_out(model, data, settings[1], xs[t, nq:], -1.0) <= _allowed(scheme, settings[2]):
+        begin(model, data, xs[t])
+        if left_out(model, data, settings[1], xs[t, nq:], -1.0) <= _allowed(data, settings[2]):
             return t
     return xs.shape[0]
 
@@ -160,9 +160,7 @@ class Flight(NamedTuple):
 
 
 @kernel
-def roll_far(
-    model_at: Table, data_at: Table, settings: Vector, scheme: Scheme, flight: Flight, first: int
-) -> tuple[int, int]:
+def roll_far(model_at: Table, data_at: Table, settings: Vector, flight: Flight, first: int) -> tuple[int, int]:
     """xs[t + 1] = step(xs[t], us[t]) from t = first on while all is inactive.
 
     Returns how many steps were taken, and why no more: SOLVED at the end of us or after the deadline, NEAR, or the
@@ -175,17 +173,18 @@ def roll_far(
     us, xs, reports = flight.us, flight.xs, flight.reports
     start_pace(data, settings)
     if first == 0:
-        begin(model, data, scheme, xs[0])
+        clear(data.external)
+        begin(model, data, xs[0])
     for t in range(first, us.shape[0]):
         x = xs[t + 1]
         copy_vector(xs[t], x)
-        allowed = _allowed(scheme, settings[2])
+        allowed = _allowed(data, settings[2])
         if left_out(model, data, kappa, x[nq:], -1.0) > allowed:
             return t, NEAR
         leave(data)
         set_external(data, flight.wrenches, t)
-        status = advance(model, data, scheme, h, us[t], x, None)
-        reports[t, 0], reports[t, 1], reports[t, 4] = status, scheme.b.shape[0], -1.0
+        status = advance(model, data, h, us[t], x, None)
+        reports[t, 0], reports[t, 1], reports[t, 4] = status, model.stage_b.shape[0], -1.0
         if status != _SOLVED:
             return t, status
         if left_out(model, data, kappa, x[nq:], h) > allowed:

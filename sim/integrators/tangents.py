@@ -11,7 +11,7 @@ from typing import NamedTuple
 from sim.integrators.hamilton_gradient import Slopes, slopes_at, velocity_slopes
 from sim.model.data import Data
 from sim.model.model import Model
-from solvers.compiler import kernel
+from solvers.compiler import inlined, kernel
 from solvers.rotation import (
     cross,
     inverse_right_jacobian,
@@ -20,7 +20,7 @@ from solvers.rotation import (
     quat_matrix,
     so3_coefficients,
 )
-from solvers.types import Cube, Integers, Matrix, Vector
+from solvers.types import Matrix, Vector
 
 
 class Tangents(NamedTuple):
@@ -32,8 +32,23 @@ class Tangents(NamedTuple):
     shift: Matrix  # (nv, n) of the shift from the node to the stage
     stage_q: Matrix  # (nv, n)
     stage_p: Matrix  # (nv, n)
-    rates_r: Cube  # (s, nv, n)
-    rates_p: Cube  # (s, nv, n)
+    rates_r: Matrix  # (s nv, n) of the shift, stage by stage
+    rates_p: Matrix  # (s nv, n) of the momenta
+
+
+@inlined
+def tangents_of(data: Data) -> Tangents:
+    """Those in `data`."""
+    return Tangents(
+        Slopes(data.slope_p_q, data.slope_p_v, data.slope_f_q, data.slope_f_v, data.slope_f_u, data.slope_column),
+        data.tangent_q,
+        data.tangent_p,
+        data.tangent_shift,
+        data.tangent_stage_q,
+        data.tangent_stage_p,
+        data.tangent_dr,
+        data.tangent_dp,
+    )
 
 
 @kernel
@@ -49,11 +64,11 @@ def move_tangents(model: Model, r: Vector, tangents: Tangents, h: float, weights
             dr[d, k] = 0.0
             dp[d, k] = tangents.node_p[d, k]
         for j in range(count):
-            c = h * weights[j]
+            c, row = h * weights[j], j * dr.shape[0] + d
             if c != 0.0:
                 for k in range(dr.shape[1]):
-                    dr[d, k] += c * tangents.rates_r[j, d, k]
-                    dp[d, k] += c * tangents.rates_p[j, d, k]
+                    dr[d, k] += c * tangents.rates_r[row, k]
+                    dp[d, k] += c * tangents.rates_p[row, k]
         for k in range(dr.shape[1]):
             dq[d, k] = tangents.node_q[d, k] + dr[d, k]
     for i in range(model.body_parent.shape[0]):
@@ -70,20 +85,19 @@ def move_tangents(model: Model, r: Vector, tangents: Tangents, h: float, weights
 
 
 @kernel
-def tangent_rates(
-    model: Model, data: Data, free: Integers, u: Vector, r: Vector, tangents: Tangents, stage: int
-) -> bool:
+def tangent_rates(model: Model, data: Data, u: Vector, r: Vector, tangents: Tangents, stage: int) -> bool:
     """Rates of the directions at the evaluation in `data`:  dp' = f_q dq + f_v dv + f_u du,  and dr'."""
     slopes, dq = tangents.slopes, tangents.stage_q
-    if not slopes_at(model, data, free, u, slopes):
+    if not slopes_at(model, data, u, slopes):
         return False
-    velocity_slopes(model, data, free, slopes, dq, tangents.stage_p)
-    dv, out = data.columns, tangents.rates_p[stage]
-    nv, n = out.shape
+    velocity_slopes(model, data, slopes, dq, tangents.stage_p)
+    nv, n = dq.shape
+    dv, rows = data.columns, slice(stage * nv, (stage + 1) * nv)
+    rates, out = tangents.rates_r[rows], tangents.rates_p[rows]
     for d in range(nv):
         for k in range(n):
             out[d, k] = 0.0
-            tangents.rates_r[stage, d, k] = dv[d, k]
+            rates[d, k] = dv[d, k]
         for k in range(u.shape[0]):
             out[d, 2 * nv + k] = slopes.f_u[d, k]
         for e in range(nv):
@@ -93,7 +107,7 @@ def tangent_rates(
                     out[d, k] += a * dq[e, k] + b * dv[e, k]
     for i in range(model.body_parent.shape[0]):
         if model.joint_nrot[i] == 3:
-            _turn_rates(data, model.body_vadr[i + 1] - 3, r, tangents.shift, tangents.rates_r[stage])
+            _turn_rates(data, model.body_vadr[i + 1] - 3, r, tangents.shift, rates)
     return True
 
 
@@ -144,10 +158,10 @@ def keep_tangents(tangents: Tangents) -> None:
 
 
 @kernel
-def first_tangents(model: Model, data: Data, free: Integers, u: Vector, tangents: Tangents) -> bool:
+def first_tangents(model: Model, data: Data, u: Vector, tangents: Tangents) -> bool:
     """Directions of the state that is in `data`: those of q and v themselves; none of u yet."""
     slopes = tangents.slopes
-    if not slopes_at(model, data, free, u, slopes):
+    if not slopes_at(model, data, u, slopes):
         return False
     nv = tangents.node_q.shape[0]
     for d in range(nv):
@@ -160,9 +174,9 @@ def first_tangents(model: Model, data: Data, free: Integers, u: Vector, tangents
 
 
 @kernel
-def last_tangents(model: Model, data: Data, free: Integers, u: Vector, tangents: Tangents) -> bool:
+def last_tangents(model: Model, data: Data, u: Vector, tangents: Tangents) -> bool:
     """data.columns = dv of the node in `data`."""
-    if not slopes_at(model, data, free, u, tangents.slopes):
+    if not slopes_at(model, data, u, tangents.slopes):
         return False
-    velocity_slopes(model, data, free, tangents.slopes, tangents.node_q, tangents.node_p)
+    velocity_slopes(model, data, tangents.slopes, tangents.node_q, tangents.node_p)
     return True

@@ -208,3 +208,25 @@ class Data(NamedTuple):
     step_x: Matrix  # (2, nq + nv) states inside a knot
     report: Vector  # (6,) report of an internal step
     pace: Vector  # (2,) when to go back to Python, work done since the last look at the clock: sim/model/pace.py
+    # steps of higher order, without rows in the Data of the others: integrators/runge_kutta.py, tangents.py
+    held_x: Matrix  # (2, nx) the state where the step began, and its copy that moves
+    held_u: Vector  # (nu,) the input of the step
+    held_momenta: Vector  # (nv,) momenta where the step began
+    momenta: Vector  # (nv,) at the node
+    stage_shift: Vector  # (nv,) of the coordinates, from the node to the stage
+    stage_momenta: Vector  # (nv,)
+    stage_dr: Matrix  # (nstage, nv) rates of the shift
+    stage_dp: Matrix  # (nstage, nv) rates of the momenta
+    slope_p_q: Matrix  # (nv, nv) derivatives of momenta p and their rates f by coordinates, velocities, inputs
+    slope_p_v: Matrix  # (nv, nv)
+    slope_f_q: Matrix  # (nv, nv)
+    slope_f_v: Matrix  # (nv, nv)
+    slope_f_u: Matrix  # (nv, nu)
+    slope_column: Matrix  # (nv, 42) vectors of every column, see hamilton_gradient.py
+    tangent_q: Matrix  # (nv, 2 nv + nu) directions of the coordinates of the node
+    tangent_p: Matrix  # (nv, 2 nv + nu) of its momenta
+    tangent_shift: Matrix  # (nv, 2 nv + nu) of the shift from the node to the stage
+    tangent_stage_q: Matrix  # (nv, 2 nv + nu)
+    tangent_stage_p: Matrix  # (nv, 2 nv + nu)
+    tangent_dr: Matrix  # (nstage nv, 2 nv + nu) their rates at every stage
+    tangent_dp: Matrix  # (nstage nv, 2 nv + nu)

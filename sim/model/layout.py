@@ -36,7 +36,8 @@ MODEL_INTS = _shapes(
     contact_terrain nground, contact_hold nground, terrain_size nterrain 3,
     pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
     loop_ntrans nloop, loop_nrot nloop, gear_dof ngear 2,
-    limit_dof nlimit, limit_cone nlimit, dry_dof ndry, dry_input ndry, input_kind nu, input_index nu
+    limit_dof nlimit, limit_cone nlimit, dry_dof ndry, dry_input ndry, input_kind nu, input_index nu,
+    root_free nbody
     """
 )
 
@@ -51,7 +52,7 @@ MODEL_FLOATS = _shapes(
     body_reach nbody, hull nhull 4, loop_point nloop 6, loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9,
     gear_ratio ngear, gear_offset ngear, limit_sign nlimit, limit_bound nlimit, dry_force ndry, dry_middle ndry,
     dry_gain ndry 3,
-    input_wrench nu 6, gravity 3
+    input_wrench nu 6, gravity 3, stage_a nstage nstage, stage_b nstage
     """
 )
 
@@ -109,7 +110,12 @@ DATA_FLOATS = CARRY_FLOATS | _shapes(
     dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel,
     step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 6, pace 2,
     inactive nground 38, inactive_share 1,
-    reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach
+    reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach,
+    held_x 2 nheldx, held_u nheldu, held_momenta nhigh, momenta nhigh, stage_shift nhigh, stage_momenta nhigh,
+    stage_dr nstage nhigh, stage_dp nstage nhigh, slope_p_q nhigh nhigh, slope_p_v nhigh nhigh, slope_f_q nhigh nhigh,
+    slope_f_v nhigh nhigh, slope_f_u nhigh nheldu, slope_column nhigh 42, tangent_q nhigh ntangent,
+    tangent_p nhigh ntangent, tangent_shift nhigh ntangent, tangent_stage_q nhigh ntangent,
+    tangent_stage_p nhigh ntangent, tangent_dr nstagenv ntangent, tangent_dp nstagenv ntangent
     """
 )
 
@@ -135,11 +141,13 @@ class Sizes(NamedTuple):
     nterrain: int = 0  # height fields: one per terrain and radius of its contacts
     nheight: int = 0  # their coefficients
     ndry: int = 0  # dry friction of degrees of freedom, and servos with limits of their force
+    nstage: int = 0  # stages of steps of higher order, 0 of those of order 2
 
 
 def _lengths(sizes: Sizes) -> dict[str, int]:
     """Numbers of rows and columns by the names that the shapes of fields use."""
     nv, nu = sizes.nv, sizes.nu
+    high = 1 if sizes.nstage else 0
     columns = max(2 * nv + whole(nu), nv + whole(nv))  # with the numbers that lanes write behind dR_dv and the inputs
     columns = -(-columns // SIDE) * SIDE
     couple = sizes.ncoupling + sizes.ngear
@@ -163,6 +171,11 @@ def _lengths(sizes: Sizes) -> dict[str, int]:
         "nwide": whole(nv),
         "ncolumn": columns,
         "npanel": columns if sizes.nrow else LANES,
+        "nhigh": high * nv,
+        "nheldx": high * (sizes.nq + nv),
+        "nheldu": high * nu,
+        "ntangent": high * (2 * nv + nu),
+        "nstagenv": sizes.nstage * nv,
         "nreach": min(3 * (sizes.ncontact - sizes.npair) + sizes.nlimit, _REACH),
     }
 
@@ -218,6 +231,7 @@ def sizes_of(model: Model) -> Sizes:
         nterrain=len(model.terrain_size),
         nheight=len(model.terrain_heights),
         ndry=len(model.dry_dof),
+        nstage=len(model.stage_b),
     )
 
 

@@ -77,6 +77,7 @@ class Model(NamedTuple):
     limit_cone: Integers  # (nlimit,) 1 where the angle between the axes of parent and child is limited
     input_kind: Integers  # (nu,) InputKind
     input_index: Integers  # (nu,) degree of freedom, or body
+    root_free: Integers  # (nbody,) 1 of a root whose momenta are those of its tree, in steps of higher order
     # numbers
     body_mass: Vector  # (nbody,) [kg]
     body_weight: Vector  # (nbody,) share of gravity that acts, 1 without compensation
@@ -121,3 +122,5 @@ class Model(NamedTuple):
     limit_bound: Vector  # (nlimit,) [m, rad]; of a cone, its half angle
     input_wrench: Matrix  # (nu, 6) force and torque per unit of a WORLD or BODY input; gain of a JOINT input, first
     gravity: Vector  # (3,) [m/s^2]
+    stage_a: Matrix  # (nstage, nstage) coefficients of the stages of steps of higher order, strictly lower
+    stage_b: Vector  # (nstage,) weights of their rates in the step

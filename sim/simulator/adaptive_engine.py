@@ -17,14 +17,12 @@ from numpy.typing import NDArray
 
 from sim.derivatives.momentum_gradient import momentum_jacobian
 from sim.dynamics.joints.damper import node_dampings
-from sim.integrators import runge_kutta
 from sim.integrators.adaptive import go_on
 from sim.integrators.hamilton_gradient import Slopes
 from sim.integrators.landing import BEGINS
 from sim.integrators.node_slopes import node_slopes
 from sim.integrators.node_step import begin_work, mean_of_node, node_at
 from sim.integrators.rollout import Linearized, MotionBuffers, linearize, roll
-from sim.integrators.runge_kutta import Scheme
 from sim.integrators.stretch import Clock, Embedded, Stretch
 from sim.integrators.tableau import embedded
 from sim.mechanism.mechanism import Mechanism
@@ -33,7 +31,7 @@ from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, refuse
 from sim.simulator.knot_engine import KnotEngine
-from sim.simulator.link import link_gradient, link_smooth, link_step
+from sim.simulator.link import link_curvature, link_terms
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
 from solvers.compiler import Table
@@ -77,7 +75,7 @@ class AdaptiveEngine(KnotEngine):
         self._settling = (_SETTLED / self._lightest) ** 0.5 / g
         self._kept = threading.local()  # scratch, and `contacts` (ncontact, 11) of the last step
 
-    def _line(self) -> tuple[Table, Scheme, Embedded, Stretch]:
+    def _line(self) -> tuple[Table, Embedded, Stretch]:
         """Scratch of this thread."""
         if not hasattr(self._kept, "line"):
             nx, nv, ncontact = self.nx, self.sizes.nv, self.sizes.ncontact
@@ -103,16 +101,16 @@ class AdaptiveEngine(KnotEngine):
                 np.zeros(_ROWS, dtype=np.int64),
                 np.zeros(1, dtype=np.int64),
             )
-            models = np.stack([self.linked(link_smooth, link_step), self._second.linked(link_step)])
-            self._kept.line = models, self._scheme(), errors, line
-        found: tuple[Table, Scheme, Embedded, Stretch] = self._kept.line
+            models = np.stack([self.linked(link_curvature, link_terms), self._second.step_table()])
+            self._kept.line = models, errors, line
+        found: tuple[Table, Embedded, Stretch] = self._kept.line
         return found
 
     def take(
         self, x: Vector, u: Vector, wrench: Cube, kappa: float | None = None, length: float | None = None
     ) -> Substeps:
         """The step from x (nx,) under u (nu,) and external wrenches (1 or 0, nbody, 6)."""
-        s, (models, scheme, errors, line) = self.settings, self._line()
+        s, (models, errors, line) = self.settings, self._line()
         end = s.time_step
         settings = s.array(kappa)
         pressing = settings[1] / s.time_step  # [N m]
@@ -127,7 +125,7 @@ class AdaptiveEngine(KnotEngine):
         line.slips[:], line.contacts[:] = BEGINS, 0.0
         works, rows, status = self._scratch.tables(2), [], int(Status.SOLVED)
         for _ in pieces(settings, 2):
-            status = int(go_on(models, works, settings, goal, scheme, errors, line))
+            status = int(go_on(models, works, settings, goal, errors, line))
             n = int(line.taken[0])
             rows.append((line.starts[:n].copy(), line.lengths[:n].copy(), line.orders[:n].copy()))
             if status != Status.SOLVED or line.clock[Clock.TIME] >= end:
@@ -162,7 +160,7 @@ class AdaptiveEngine(KnotEngine):
         xs[0] = self._mean(x, held, h)
         contacts = np.zeros((1, self.sizes.ncontact, CONTACT))
         line = MotionBuffers(xs, u[None], wrench, np.zeros((1, REPORT)), contacts, *self.unknown[:2])
-        model, data = self._second.linked(link_step), self._scratch.table()
+        model, data = self._second.step_table(), self._scratch.table()
         if roll(model, data, self._part_settings(h, kappa), line, 0) < 1:
             return np.full(self.nx, np.nan)
         return self._node(xs[1], held, h)
@@ -175,7 +173,7 @@ class AdaptiveEngine(KnotEngine):
             return self._long(x, held, h, True)
         u, wrench = held
         by_x, by_u = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
-        model, data = self._second.linked(link_step, link_gradient), self._scratch.table()
+        model, data = self._second.gradient_table(), self._scratch.table()
         A, B = np.zeros((1, self.ndx, self.ndx)), np.zeros((1, self.ndx, self.nu))
         half, reports = 0.5 * h, np.zeros((1, REPORT))
         for _ in range(2):
@@ -193,16 +191,14 @@ class AdaptiveEngine(KnotEngine):
         """As part_slopes, of order 8; without derivatives these are empty."""
         (u, wrench), settings = held, self.settings.array()
         settings[0] = h
-        model, data, scheme = self.linked(link_smooth), self._scratch.table(), self._scheme()
-        reports, (A, B) = np.zeros((1, REPORT)), self.unknown[:2]
+        data, reports, (contacts, A, B) = self._scratch.table(), np.zeros((1, REPORT)), self.unkept
         if derivatives:
             A, B, ends = np.zeros((1, self.ndx, self.ndx)), np.zeros((1, self.ndx, self.nu)), np.zeros((1, self.nx))
             line = Linearized(x[None], u[None], wrench, A, B, ends, reports)
-            runge_kutta.linearize(model, data, settings, scheme, 1, line, self._tangents(), 0)
+            linearize(self.gradient_table(), data, settings, (0, 0, 1), 1, line)
             return ends[0], A[0], B[0], reports[0]
         xs = np.stack([x, np.full(self.nx, np.nan)])
-        motion = MotionBuffers(xs, u[None], wrench, reports, np.zeros((1, 0, CONTACT)), A, B)
-        if runge_kutta.roll(model, data, settings, scheme, motion, 0) == 0:
+        if roll(self.step_table(), data, settings, MotionBuffers(xs, u[None], wrench, reports, contacts, A, B), 0) == 0:
             xs[1] = np.nan
         return xs[1], A, B, reports[0]
 
@@ -210,35 +206,34 @@ class AdaptiveEngine(KnotEngine):
         """The mean state of the node x before a step of length h; NaN where there is none."""
         (u, wrench), mean, data = held, np.zeros(self.nx), self._scratch.table()
         begin_work(data, wrench)
-        status = mean_of_node(self._second.linked(link_step), data, h, u, x, mean)
+        status = mean_of_node(self._second.step_table(), data, h, u, x, mean)
         return mean if status == Status.SOLVED else np.full(self.nx, np.nan)
 
     def _node(self, mean: Vector, held: Held, h: float) -> Vector:
         """The node at the end of a step of length h to the mean state."""
         (u, wrench), x, data = held, np.zeros(self.nx), self._scratch.table()
         begin_work(data, wrench)
-        status = node_at(self._second.linked(link_step), data, h, u, mean, x)
+        status = node_at(self._second.step_table(), data, h, u, mean, x)
         return x if status == Status.SOLVED else np.full(self.nx, np.nan)
 
     def _node_terms(self, x: Vector, held: Held) -> tuple[Slopes, Floats]:
         """Derivatives of M(q) v and of the forces of inputs and wrenches, at the node x."""
         nv, (u, wrench) = self.sizes.nv, held
         slopes, by_q = Slopes(*(np.zeros((nv, k)) for k in (nv, nv, nv, nv, self.nu, 42))), np.zeros((nv, nv))
-        none: Integers = np.zeros(self.sizes.nbody, dtype=np.int64)
-        node_slopes(self.linked(link_smooth, link_step), self._scratch.table(), none, u, wrench, x, slopes, by_q)
+        node_slopes(self._second.gradient_table(), self._scratch.table(), u, wrench, x, slopes, by_q)
         return slopes, by_q
 
     def _momentum_slopes(self, h: float, mean: Vector) -> tuple[Floats, Floats]:
         """dp/dq, dp/dv of a mean state over h."""
         nv = self.sizes.nv
         by_q, by_v = np.zeros((nv, nv)), np.zeros((nv, nv))
-        momentum_jacobian(self._second.linked(link_step, link_gradient), self._scratch.table(), h, mean, by_q, by_v)
+        momentum_jacobian(self._second.gradient_table(), self._scratch.table(), h, mean, by_q, by_v)
         return by_q, by_v
 
     def _damping(self, h: float) -> Floats:
         """C of the dampers for a step of length h, (nv, nv)."""
         out = np.zeros(self.sizes.nv)
-        node_dampings(self._second.linked(link_step), h, out)
+        node_dampings(self._second.step_table(), h, out)
         return np.diag(out)
 
     def _mean_slopes(self, x: Vector, held: Held, h: float, mean: Vector) -> tuple[Floats, Floats]:

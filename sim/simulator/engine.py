@@ -180,6 +180,8 @@ def chained(A: Floats, rolled: Rolled) -> tuple[Floats, Floats]:
 class Engine:
     """The kernels of one packed mechanism, their scratch, and the arrays that cross the border."""
 
+    in_one_kernel = True  # whether a step is one call of the kernel `step`, so that compiled loops can make it
+
     def __init__(self, model: Model, settings: Settings) -> None:
         self.model, self.settings = model, settings
         self.sizes = sizes_of(model)
@@ -222,13 +224,21 @@ class Engine:
             self._linked.update(new)
         return self._model
 
+    def step_table(self) -> Table:
+        """Table of the Model, with the step of its order linked."""
+        return self.linked(link_step)
+
+    def gradient_table(self, *needs: Callable[[Model], None]) -> Table:
+        """The same with the derivatives of the step, and further needs of a call."""
+        return self.linked(link_step, link_gradient, *needs)
+
     def prepare(self) -> None:
-        """Link what rollouts and their derivatives need, at once: two processes can then compile it."""
-        self.linked(link_step, link_gradient)
+        """Link the kernels of rollouts and their derivatives at once: two processes can then compile them."""
+        self.gradient_table()
 
     def tables(self, *needs: Callable[[Model], None]) -> tuple[Table, Table]:
         """Tables of the Model, linked for derivatives and further needs of a call, and of this thread's first Data."""
-        return self.linked(link_step, link_gradient, *needs), self._scratch.table()
+        return self.gradient_table(*needs), self._scratch.table()
 
     def table(self) -> Table:
         """Table of this thread's first Data."""
@@ -274,10 +284,10 @@ class Engine:
         contacts = self._no_contacts
         if derivatives:
             A, B = np.empty((steps, self.ndx, self.ndx)), np.empty((steps, self.ndx, self.nu))
-            model = self.linked(link_step, link_gradient)
+            model = self.gradient_table()
         else:
             contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
-            model = self.linked(link_step)
+            model = self.step_table()
         motion = MotionBuffers(xs, us, self.external(wrenches), reports, contacts, A, B)
         division = Division.none(steps)
         try:
@@ -363,7 +373,7 @@ class Engine:
 
     def _follow(self, law: BoundedLaw, settings: Vector, substeps: int, path: Path, first: int) -> int:
         """The piece of a closed loop that begins at a step: the number of solved steps, those before included."""
-        model, data = self.linked(link_step), self._scratch.table()
+        model, data = self.step_table(), self._scratch.table()
         return int(closed_loop(model, data, settings, law, substeps, path, first))
 
     def linearize(
@@ -389,7 +399,7 @@ class Engine:
             if len(xs) == n:
                 x_next[-1:] = xs[-1:]
         line = rollout.Linearized(xs, us, self.external(wrenches), A, B, x_next, reports)
-        model, settings = self.linked(link_step, link_gradient), self._settings_of(n * substeps, kappa)
+        model, settings = self.gradient_table(), self._settings_of(n * substeps, kappa)
         if n * substeps * self.ndx < _WORTH_THREADS:
             data, step = self._scratch.table(), 0
             for _ in pieces(settings, n * substeps):
@@ -437,7 +447,7 @@ class Engine:
         n, steps = us.shape[:2]
         xs, reports, knots = np.zeros((n, steps + 1, self.nx)), np.zeros((n, 1, REPORT)), np.zeros(n, dtype=np.int64)
         motions = rollout.BatchBuffers(xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.unknown[:2])
-        model, works, settings = self.linked(link_step), self._scratch.chunks(n), self.settings.array()
+        model, works, settings = self.step_table(), self._scratch.chunks(n), self.settings.array()
         status = reports[:, 0, 0]
         try:
             xs[:, 0] = x0s  # the first touch of much memory takes its time

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NoReturn
 
 import numpy as np
 
 from sim.dynamics import bodies, coordinates
-from sim.integrators import runge_kutta
-from sim.integrators.feedback import FeedbackLaw, Path
-from sim.integrators.hamilton_gradient import Slopes
-from sim.integrators.rollout import Linearized, MotionBuffers
+from sim.integrators.runge_kutta import gradient_by_stages, step_by_stages
 from sim.integrators.tableau import stable, tableau
-from sim.integrators.tangents import Tangents
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.servos import limited_servos
 from sim.model.model import InputKind, Model
-from sim.model.pace import pieces
-from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, follow, interrupted
-from sim.simulator.link import link_smooth
-from sim.simulator.results import Interrupted
+from sim.simulator.engine import Engine, Floats
+from sim.simulator.link import link_curvature
 from sim.simulator.settings import Settings
+from solvers.compiler import Table, link
 from solvers.status import Status
-from solvers.types import Cube, Integers, Vector
+from solvers.types import Integers, Vector
 
 
 def free_roots(model: Model) -> Integers:
@@ -34,71 +30,43 @@ def free_roots(model: Model) -> Integers:
     return free.astype(np.int64)
 
 
+def link_stages(model: Model) -> None:
+    """Link the kernels of steps of higher order."""
+    link(model.optional, step_by_stages)
+    link_curvature(model)
+
+
+def link_tangents(model: Model) -> None:
+    """Link the derivatives of these steps."""
+    link(model.optional, gradient_by_stages)
+
+
 class HighOrderEngine(Engine):
     """The kernels of one packed mechanism without contacts and limits, with steps of the order of its settings."""
 
-    def _scheme(self) -> runge_kutta.Scheme:
-        """The method with scratch of its own."""
-        a, b = tableau(self.settings.order)
-        s, nv = len(b), self.sizes.nv
-        scratch = (*(np.zeros(nv) for _ in range(3)), *(np.zeros((s, nv)) for _ in range(2)))
-        return runge_kutta.Scheme(a, b, free_roots(self.model), *scratch)
+    def __init__(self, model: Model, settings: Settings) -> None:
+        a, b = tableau(settings.order)
+        slots = np.zeros_like(model.optional)  # its own, for the steps of order 2 beside it have others
+        own = model._replace(stage_a=a, stage_b=b, root_free=free_roots(model), optional=slots)
+        super().__init__(own, settings)
+
+    def step_table(self) -> Table:
+        """As Engine.step_table."""
+        return self.linked(link_stages)
 
     def prepare(self) -> None:
-        """Link what rollouts and their derivatives need."""
-        self.linked(link_smooth)
+        """As Engine.prepare."""
+        self.linked(link_stages, link_tangents)
 
-    def _tables(self) -> tuple[Integers, Integers, Vector]:
-        """Tables of the Model and of this thread's first Data, and settings."""
-        return self.linked(link_smooth), self._scratch.table(), self.settings.array()
-
-    def roll(
-        self,
-        x: Vector,
-        us: Floats,
-        wrenches: Cube | None = None,
-        *,
-        kappa: float | None = None,
-        derivatives: bool = False,
-    ) -> Rolled:
-        """As Engine.roll; without contacts and without a kappa; derivatives take a second pass."""
-        steps = len(us)
-        xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
-        xs[0], whole = x, Division.none(steps)
-        external = self.external(wrenches)
-        A, B = self.unknown[:2]
-        contacts = np.zeros((steps, 0, CONTACT))
-        motion = MotionBuffers(xs, us, external, reports, contacts, A, B)
-        model, data, settings, scheme = *self._tables(), self._scheme()
-        knot = 0
-        try:
-            for _ in pieces(settings, steps):
-                knot = int(runge_kutta.roll(model, data, settings, scheme, motion, knot))
-                if knot == steps or reports[knot, 0] != Status.SOLVED:
-                    break
-        except KeyboardInterrupt:
-            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, whole)) from None
-        if derivatives:
-            A, B, *_ = self.linearize(xs[:-1], us, 1, kappa, None, wrenches)
-        return Rolled(knot, xs, reports, contacts, A, B, whole)
-
-    def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
-        """As Engine.roll_batch, on one core."""
-        n, steps = us.shape[:2]
-        xs = np.zeros((n, steps + 1, self.nx))
-        status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-        xs[:, 0] = x0s
-        for i in range(n):
-            try:
-                rolled = self.roll(x0s[i], us[i])
-                knots[i], xs[i] = rolled.knot, rolled.xs
-            except KeyboardInterrupt as stop:
-                status[i:] = Status.INTERRUPTED
-                if isinstance(stop, Interrupted):
-                    knots[i], xs[i] = stop.result.knot, stop.result.xs
-                raise Interrupted((xs, status, knots)) from None
-            status[i] = rolled.reports[min(rolled.knot, steps - 1), 0] if steps else Status.SOLVED
-        return xs, status, knots
+    def gradient_table(self, *needs: Callable[[Model], None]) -> Table:
+        """As Engine.gradient_table; refuses joints with two rotations."""
+        swings = np.flatnonzero(self.model.joint_nrot == 2)
+        if len(swings):
+            raise ValueError(
+                f"Simulator of order {self.settings.order}: derivatives through joint {swings[0]}, with two rotations "
+                "(orbital), are those of order 2; use replace(order=2)"
+            )
+        return self.linked(link_stages, link_tangents, *needs)
 
     def start(self, q: Vector, v: Vector, h: float | None = None) -> tuple[int, Vector]:
         """The state is that of the node."""
@@ -149,71 +117,6 @@ class HighOrderEngine(Engine):
         angular = np.einsum("bij,nbj->nbi", inertia, z[..., 10:])
         columns = np.concatenate([z[..., 3:6], z[..., 10:]], axis=2)
         return columns.reshape(len(z), -1), np.concatenate([linear, angular], axis=2).reshape(len(z), -1)
-
-    def _tangents(self) -> Tangents:
-        """Scratch of derivatives."""
-        nv, s = self.sizes.nv, len(tableau(self.settings.order)[1])
-        n = 2 * nv + self.nu
-        slopes = Slopes(*(np.zeros((nv, m)) for m in (nv, nv, nv, nv, self.nu, 42)))
-        one, all_stages = (np.zeros((nv, n)) for _ in range(5)), (np.zeros((s, nv, n)) for _ in range(2))
-        return Tangents(slopes, *one, *all_stages)
-
-    def linearize(
-        self,
-        xs: Floats,
-        us: Floats,
-        substeps: int,
-        kappa: float | None,
-        guess: Floats | None = None,
-        wrenches: Cube | None = None,
-    ) -> tuple[Floats, ...]:
-        """As Engine.linearize, on one core; without kappa or guess."""
-        self._check_swings()
-        n = len(us)
-        A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
-        x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
-        line = Linearized(xs, us, self.external(wrenches), A, B, x_next, reports)
-        model, data, settings, scheme, tangents = *self._tables(), self._scheme(), self._tangents()
-        step = 0
-        for _ in pieces(settings, n * substeps):
-            step = int(runge_kutta.linearize(model, data, settings, scheme, substeps, line, tangents, step))
-            if step == n * substeps:
-                break
-        unsolved = reports[:, 0] != Status.SOLVED
-        for array in (A, B, x_next):
-            array[unsolved] = 0.0
-        return A, B, x_next, reports
-
-    def _check_swings(self) -> None:
-        """Refuse derivatives through joints with two rotations."""
-        swings = np.flatnonzero(self.model.joint_nrot == 2)
-        if len(swings):
-            raise ValueError(
-                f"Simulator of order {self.settings.order}: derivatives through joint {swings[0]}, with two rotations "
-                "(orbital), are those of order 2; use replace(order=2)"
-            )
-
-    def closed_loop(
-        self,
-        x: Vector,
-        policy: FeedbackLaw,
-        alpha: float,
-        limits: tuple[Floats, Floats],
-        substeps: int,
-        kappa: float | None,
-        *,
-        keep: bool = False,
-    ) -> tuple[int, Path]:
-        """As Engine.closed_loop."""
-        path = self._path(len(policy.us), keep=keep)
-        path.xs[0] = x
-        model, data, settings, scheme = *self._tables(), self._scheme()
-
-        def go_on(first: int) -> int:
-            law = (policy, alpha, limits)
-            return int(runge_kutta.closed_loop(model, data, settings, scheme, law, substeps, path, first))
-
-        return follow(go_on, settings, path, substeps), path
 
     def maximal_jacobian(self, x: Vector, nbody: int, h: float | None = None) -> Floats:
         """Refused."""

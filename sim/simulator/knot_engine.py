@@ -1,4 +1,4 @@
-"""Engines whose closed loops and derivatives are those of one knot after another."""
+"""Engines whose steps are made of calls of several kernels, so that Python makes their loops."""
 
 from __future__ import annotations
 
@@ -8,11 +8,32 @@ from sim.integrators.feedback import FeedbackLaw, Path
 from sim.simulator.engine import REPORT, Floats, interrupted, knot_inputs
 from sim.simulator.high_order_engine import HighOrderEngine
 from sim.simulator.results import Interrupted
-from solvers.types import Cube, Vector
+from solvers.status import Status
+from solvers.types import Cube, Integers, Vector
 
 
 class KnotEngine(HighOrderEngine):
-    """A HighOrderEngine whose `roll` is made of calls of several kernels."""
+    """A HighOrderEngine with a `roll` and a `linearize_knot` of its own, from which everything else follows."""
+
+    in_one_kernel = False
+
+    def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
+        """As Engine.roll_batch, on one core."""
+        n, steps = us.shape[:2]
+        xs = np.zeros((n, steps + 1, self.nx))
+        status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+        xs[:, 0] = x0s
+        for i in range(n):
+            try:
+                rolled = self.roll(x0s[i], us[i])
+                knots[i], xs[i] = rolled.knot, rolled.xs
+            except KeyboardInterrupt as stop:
+                status[i:] = Status.INTERRUPTED
+                if isinstance(stop, Interrupted):
+                    knots[i], xs[i] = stop.result.knot, stop.result.xs
+                raise Interrupted((xs, status, knots)) from None
+            status[i] = rolled.reports[min(rolled.knot, steps - 1), 0] if steps else Status.SOLVED
+        return xs, status, knots
 
     def closed_loop(
         self,
@@ -57,7 +78,7 @@ class KnotEngine(HighOrderEngine):
         wrenches: Cube | None = None,
     ) -> tuple[Floats, ...]:
         """As Engine.linearize, on one core; without guess."""
-        self._check_swings()
+        self.gradient_table()  # which refuses joints without derivatives
         n, external = len(us), self.external(wrenches)
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))

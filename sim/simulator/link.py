@@ -257,22 +257,27 @@ def link_nodes(model: Model) -> None:
         link(model.optional, unit_gear_impulse, gear_response)
 
 
-def link_smooth(model: Model) -> None:
-    """Link the kernels of steps of higher order."""
-    if np.any(model.joint_nrot == 2):
-        link(model.optional, swing_curvature)
-
-
 def link_pairs(model: Model) -> None:
     """Link the kernels of each kind of pair of shapes."""
     for kind in np.unique(model.pair_kind % SWAPPED):
         link(model.optional, *KERNELS.get(Pair(kind), ()))  # those of cylinders have kernels for all points at once
 
 
+def link_curvature(model: Model) -> None:
+    """Link how the columns of joints with two rotations bend, which Hamilton's equations need."""
+    if np.any(model.joint_nrot == 2):
+        link(model.optional, swing_curvature)
+
+
 def link_step(model: Model) -> None:
-    """Link the kernels of a time step: the interior point only if there are contacts or limits."""
-    hard = len(model.contact_body) + len(model.limit_dof) + len(model.dry_dof) > 0
+    """Link the kernels of a time step of order 2."""
     link(model.optional, step)
+    link_terms(model)
+
+
+def link_terms(model: Model) -> None:
+    """Link the kernels that a step calls: the interior point only if there are contacts or limits."""
+    hard = len(model.contact_body) + len(model.limit_dof) + len(model.dry_dof) > 0
     if hard:
         link(model.optional, interior_point)
     else:
@@ -322,8 +327,7 @@ def link_gradient(model: Model) -> None:
         link(model.optional, add_drive_derivatives, add_drive_inputs)
     if np.any(model.limit_cone):
         link(model.optional, cone_derivative)
-    if np.any(model.joint_nrot == 2):
-        link(model.optional, swing_curvature)
+    link_curvature(model)
     if _has_ball_springs(model):
         link(model.optional, add_ball_spring_derivatives)
     if len(model.coupling_body) + len(model.gear_dof):

@@ -23,13 +23,13 @@ from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.dividing_engine import DividingEngine
 from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted
-from sim.simulator.high_order_engine import HighOrderEngine
 from sim.simulator.knot_engine import KnotEngine
-from sim.simulator.link import link_smooth, link_step
+from sim.simulator.link import link_curvature, link_terms
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
+from solvers.compiler import Table
 from solvers.status import Status
-from solvers.types import Cube, Integers, Vector
+from solvers.types import Cube, Vector
 
 _PIECE, _LARGEST = 16, 1024  # steps of order 2 at once; those after all is inactive again are discarded
 
@@ -92,14 +92,17 @@ class PhasedEngine(KnotEngine):
             np.nan_to_num(out.reports[t], copy=False, nan=np.inf, posinf=np.inf)
         return out._replace(knot=t)
 
+    def _flight_table(self) -> Table:
+        """Table of the Model for steps of higher order beside contacts."""
+        return self.linked(link_curvature, link_terms)
+
     def _fly(self, flight: phases.Flight, kappa: float | None) -> tuple[int, int]:
         """Steps of higher order while all is inactive: their number, and the reason for the end; see `roll_far`."""
-        model, data = self.linked(link_smooth, link_step), self._scratch.table()
-        settings, scheme = self.settings.array(kappa), self._scheme()
+        model, data, settings = self._flight_table(), self._scratch.table(), self.settings.array(kappa)
         taken, why = 0, int(Status.SOLVED)
         try:
             for _ in pieces(settings, len(flight.us)):
-                taken, why = phases.roll_far(model, data, settings, scheme, flight, taken)
+                taken, why = phases.roll_far(model, data, settings, flight, taken)
                 if taken == len(flight.us) or why != Status.SOLVED:
                     break
         except KeyboardInterrupt:
@@ -113,7 +116,7 @@ class PhasedEngine(KnotEngine):
 
         None in its place where a step is not solved. given: inputs, and external wrenches.
         """
-        model, settings = self.linked(link_step), self.settings.array(kappa)
+        model, settings = self._second.step_table(), self.settings.array(kappa)
         us, external = given
         t, piece, nq = first, _PIECE, self.sizes.nq
         while t < len(us):
@@ -130,7 +133,7 @@ class PhasedEngine(KnotEngine):
                 raise KeyboardInterrupt from None
             nodes = means[1 : solved + 1].copy()
             nodes[:, nq:] = self._second.node_velocities(nodes)
-            far = phases.first_far(self._model, self._scratch.table(), settings, self._scheme(), nodes)
+            far = phases.first_far(self._flight_table(), self._scratch.table(), settings, nodes)
             taken = min(far + 1, solved)
             out.xs[t + 1 : t + 1 + taken] = nodes[:taken]
             out.means[t : t + taken], out.near[t : t + taken] = means[:taken], True
@@ -188,7 +191,7 @@ class PhasedEngine(KnotEngine):
         """(d(next state)/d(state), by the input, report) of step s; given: input, external wrenches (1, nbody, 6)."""
         u, external = given
         if not m.near[s]:
-            A, B, _, report = HighOrderEngine.linearize(self, m.xs[s : s + 1], u[None], 1, kappa, None, external)
+            A, B, _, report = Engine.linearize(self, m.xs[s : s + 1], u[None], 1, kappa, None, external)
             return A[0], B[0], report[0]
         A, B, x_next, report = self._second.linearize(m.means[s : s + 1], u[None], 1, kappa, None, external)
         after = self._node_slopes(x_next[0])
@@ -199,10 +202,9 @@ class PhasedEngine(KnotEngine):
         nv = self.sizes.nv
         slopes = Slopes(*(np.zeros((nv, k)) for k in (nv, nv, nv, nv, self.nu, 42)))
         by_q, by_mean = np.zeros((nv, nv)), np.zeros((nv, nv))
-        none: Integers = np.zeros(self.sizes.nbody, dtype=np.int64)
-        out = np.eye(self.ndx)
+        out, model = np.eye(self.ndx), self._second.gradient_table()
         h, damping = self._second.interval(mean), np.zeros(nv)
-        legendre.legendre_slopes(self._model, self._scratch.table(), h, none, mean, slopes, by_q, by_mean)
-        node_dampings(self._model, h, damping)
+        legendre.legendre_slopes(model, self._scratch.table(), h, mean, slopes, by_q, by_mean)
+        node_dampings(model, h, damping)
         out[nv:] = np.linalg.solve(slopes.p_v + np.diag(damping), np.hstack([by_q - slopes.p_q, by_mean]))
         return out

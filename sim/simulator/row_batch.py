@@ -19,7 +19,6 @@ from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
 from sim.model.pace import DEADLINE, pieces
 from sim.simulator.engine import DIVISIBLE, REPORT, Division, Engine, finite_rows, refuse
-from sim.simulator.link import link_gradient, link_step
 from sim.simulator.results import Result, ended
 from sim.simulator.state_space import StateSpace
 from solvers.status import MESSAGES, Status
@@ -135,7 +134,7 @@ class RowBatch:
         n = len(self.us)
         A, B = (np.zeros((n if derivatives else 0, first.ndx, size)) for size in (first.ndx, first.nu))
         x_next, reports = np.array(self.xs), np.zeros((n, REPORT))
-        if first.settings.order > 2:
+        if not first.in_one_kernel:
             self._by_engine(derivatives, A, B, x_next, reports)
         elif n and derivatives:
             self._linearize(A, B, x_next, reports)
@@ -158,11 +157,11 @@ class RowBatch:
 
     def _tables(self, derivatives: bool) -> tuple[RowTables, int]:
         """Tables of all rows, and the number of chunks."""
-        n, needs = len(self.us), (link_step, link_gradient)[: 2 if derivatives else 1]
+        n = len(self.us)
         works = self.engines[0].chunks(n)
         count = len(works)
         chunk = np.searchsorted(np.arange(1, count + 1) * n // count, np.arange(n), side="right")
-        models = np.array([engine.linked(*needs) for engine in self.engines])[self.index]
+        models = [engine.gradient_table() if derivatives else engine.step_table() for engine in self.engines]
         scratch = works[chunk]
         for k, engine in enumerate(self.engines):  # a Data has the contact frames of its Model
             if k and not np.array_equal(engine.model.contact_frame, self.engines[0].model.contact_frame):
@@ -170,7 +169,7 @@ class RowBatch:
         settings = np.array([engine.settings.array() for engine in self.engines])[self.index]
         given = ~np.isnan(self.kappas)
         settings[given, 1] = self.kappas[given]
-        return RowTables(models, scratch, settings), count
+        return RowTables(np.array(models)[self.index], scratch, settings), count
 
     def _linearize(self, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
         """Steps and their derivatives."""
@@ -216,7 +215,7 @@ class RowBatch:
                 A[row], B[row] = dx @ A[row], dx @ B[row] + du
 
     def _by_engine(self, derivatives: bool, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
-        """Steps of higher order, the rows of an engine at a time."""
+        """Steps that compiled loops cannot make, the rows of an engine at a time."""
         for k, engine in enumerate(self.engines):
             rows = np.flatnonzero(self.index == k)
             xs, us = self.xs[rows], self.us[rows]
@@ -256,7 +255,7 @@ class SingleRow:
         motion = self._motion
         self._start[:], motion.us[:] = x, u
         motion.reports.fill(0.0)
-        self._knot = self._engine.take_steps(self._engine.linked(link_step), motion, None, self._division)
+        self._knot = self._engine.take_steps(self._engine.step_table(), motion, None, self._division)
         return self._knot == self._steps
 
     def step(self, states: Floats, inputs: Floats) -> BatchStep:
@@ -358,20 +357,23 @@ class RowStepping(StateSpace):
             SingleRow of this thread, whose `step(X, U)` takes finite (1, nx) and (1, nu).
 
         Raises:
-            ValueError: substeps is not a whole number above 0, or the steps have an accuracy or a higher order.
+            ValueError: substeps is not a whole number above 0, or the simulator has no single rows.
         """
         key = get_ident(), substeps
         if key not in self._single_rows:
             steps = checks.whole_number("Simulator.single_row(substeps)", substeps)
             if not self.has_single_rows:
-                raise ValueError("Simulator.single_row: expected a simulator of order 2 without an accuracy")
+                raise ValueError(
+                    "Simulator.single_row: expected a simulator without an accuracy, and of order 2 where there are "
+                    "contacts or limits"
+                )
             self._single_rows[key] = SingleRow(self._engine, steps)
         return self._single_rows[key]
 
     @property
     def has_single_rows(self) -> bool:
-        """Whether it has them: steps of order 2 without an accuracy."""
-        return self.order == 2
+        """Whether it has them: compiled loops make its steps, which have no accuracy and change no order."""
+        return self._engine.in_one_kernel
 
     @cached_property
     def _row_models(self) -> RowModels:

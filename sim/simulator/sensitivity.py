@@ -48,7 +48,7 @@ def parameter_columns(
 
 
 def adjoint_products(engine: Engine, line: Sweep, kappa: float | None) -> int:
-    """The sweep by state and input from the (A, B) of a piece of the trajectory at a time, for orders above 2:
+    """The sweep by state and input where steps are not one kernel, from (A, B) of a piece of the trajectory at a time:
 
     l_T = dL/dx_T,    l_t = A_t^T l_t+1 + dL/dx_t,    dL/du_t = B_t^T l_t+1;  the step that was not solved, or -1.
     """
@@ -233,7 +233,7 @@ def adjoint_sweep(
         places=np.zeros((1, 3 * (sizes.ncontact - sizes.npair))),
         heights=np.zeros((1, sizes.nheight if len(plan.heights) else 0)),
     )
-    if engine.settings.order > 2:
+    if not engine.in_one_kernel:
         return adjoint_products(engine, line, kappa), line
     needs = (link_parameters, link_heights) if len(plan.heights) else (link_parameters,)
     model, data = engine.tables(*needs[: 2 if plan.size else 0])
