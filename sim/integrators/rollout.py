@@ -16,6 +16,8 @@ from typing import NamedTuple
 
 from sim.contact.contact_report import report_contacts
 from sim.contact.pairs.pair_report import pairs_finite
+from sim.derivatives.parameters.directions import At
+from sim.derivatives.parameters.parameter_jacobian import parameter_jacobian
 from sim.derivatives.step_gradient import gradient
 from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import normalise_state
@@ -29,7 +31,7 @@ from solvers.compiler import Table, kernel, parallel_kernel, prange, seconds
 from solvers.dense import clear, copy_vector, is_finite
 from solvers.lanes import LANES, load, spread, total
 from solvers.status import Status
-from solvers.types import Cube, Integers, Matrix, Vector
+from solvers.types import Cube, IntegerMatrix, Integers, Matrix, Vector
 
 _SOLVED = int(Status.SOLVED)
 _SINGULAR = int(Status.SINGULAR)
@@ -61,6 +63,16 @@ class MotionBuffers(NamedTuple):
     contacts: Cube  # (T, ncontact, 11), or (0, ncontact, 11)
     A: Cube  # (T, ndx, ndx) derivatives of the steps, or (0, ndx, ndx)
     B: Cube  # (T, ndx, nu)
+
+
+class ParameterColumns(NamedTuple):
+    """Parameters as the terms of their columns, the columns of every step, and scratch."""
+
+    terms: IntegerMatrix
+    weights: Vector
+    J: Cube  # (T, ndx, n) d(next state)/d(parameters), out
+    twists: Matrix  # (12, 6)
+    below: Vector  # (nbody,)
 
 
 @kernel
@@ -117,10 +129,18 @@ def accept(model: Model, motion: MotionBuffers) -> bool:
 
 
 @kernel
-def roll(model_at: Table, data_at: Table, settings: Vector, motion: MotionBuffers, first: int) -> int:
+def roll(
+    model_at: Table,
+    data_at: Table,
+    settings: Vector,
+    motion: MotionBuffers,
+    first: int,
+    columns: ParameterColumns | None,
+) -> int:
     """xs[t + 1] = step(xs[t], us[t]) from t = first on; returns the number of solved steps, those before included.
 
-    A step is solved once, and differentiated where it ends. An invalid state has the status REFUSED.
+    A step is solved once, and differentiated where it ends; by parameters, too, if there are columns of them: without
+    these nothing of them is compiled. An invalid state has the status REFUSED.
     """
     model = model_view(model_at)
     data = data_view(data_at)
@@ -152,6 +172,10 @@ def roll(model_at: Table, data_at: Table, settings: Vector, motion: MotionBuffer
                 return t
             report[5] = ACCURACY * data.contact_hard[0]
             done += motion.A.shape[1]
+        if columns is not None:
+            at = At(options.h, x[:nq], x[nq:], motion.us[t], columns.twists, columns.below)
+            parameter_jacobian(model_at, data_at, at, motion.A[t], columns.terms, columns.weights, columns.J[t])
+            done += columns.J.shape[2]
         if is_due(data, done):
             return t + 1
     return steps
@@ -279,7 +303,7 @@ def _roll_rows(model_at: Table, data_at: Table, settings: Vector, rows: tuple[in
                 return
             x, u = motions.xs[i], motions.us[i]
             one = MotionBuffers(x, u, motions.wrenches, report, motions.contacts, motions.A, motions.B)
-            motions.knots[i] = roll(model_at, data_at, settings, one, motions.knots[i])
+            motions.knots[i] = roll(model_at, data_at, settings, one, motions.knots[i], None)
             if report[0, 0] == _SOLVED and motions.knots[i] < steps:
                 return
 

@@ -313,7 +313,7 @@ class Engine:
         settings = self._settings_of(steps, kappa)
         try:
             for _ in pieces(settings, steps):
-                knot = int(rollout.roll(model, data, settings, motion, knot))
+                knot = int(rollout.roll(model, data, settings, motion, knot, None))
                 if knot == steps or motion.reports[min(knot, len(motion.reports) - 1), 0] != Status.SOLVED:
                     break
         except KeyboardInterrupt:

@@ -14,8 +14,7 @@ from sim.derivatives.parameters.parameter_jacobian import parameter_jacobian
 from sim.derivatives.parameters.parameters import ParameterPlan
 from sim.derivatives.parameters.terrain_parameters import height_gradients
 from sim.integrators.adjoint import Sweep, sweep
-from sim.integrators.parameter_roll import ParameterColumns, roll_columns
-from sim.integrators.rollout import MotionBuffers
+from sim.integrators.rollout import MotionBuffers, ParameterColumns, roll
 from sim.mechanism.mechanism import Mechanism
 from sim.model.pace import pieces
 from sim.simulator.engine import CONTACT, DIVISIBLE, REPORT, Divided, Division, Engine, Rolled, refuse
@@ -185,10 +184,11 @@ def _whole_steps(engine: Engine, plan: ParameterPlan, motion: MotionBuffers, J: 
     """The number of steps, from the first one on, that are solved as a whole, with their derivatives."""
     steps, done = len(motion.us), 0
     model, data = engine.tables(link_parameters)
-    columns = ParameterColumns(plan.terms, plan.weights, J, np.zeros((_TWISTS, 6)), np.zeros(engine.sizes.nbody))
+    scratch = np.zeros((_TWISTS, 6)), np.zeros(engine.sizes.nbody)
+    columns = ParameterColumns(plan.terms, plan.weights, J, *scratch) if len(plan.weights) else None
     settings = engine.settings.array(kappa)
     for _ in pieces(settings, steps):
-        done = int(roll_columns(model, data, settings, motion, columns, done))
+        done = int(roll(model, data, settings, motion, done, columns))
         if done == steps or motion.reports[done, 0] != Status.SOLVED:
             break
     return refuse(motion.reports, done, motion.A[:done], motion.B[:done], J[:done])

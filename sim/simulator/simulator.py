@@ -159,7 +159,7 @@ class Simulator(RowStepping):
         """
         check = self._arguments
         control = self._no_input if u is None else u
-        plain = self.order == 2 and is_plain(x, (self.nx,)) and is_plain(control, (self.nu,))
+        plain = self._engine.in_one_kernel and is_plain(x, (self.nx,)) and is_plain(control, (self.nu,))
         state: Any = x if plain else check.state("step", x)
         us: Any = control if plain else check.inputs("step", "u", control, (self.nu,))
         external = None if wrenches is None else check.wrenches("step", wrenches, 1)
