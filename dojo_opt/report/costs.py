@@ -85,7 +85,8 @@ def _sizes(scene: CostScene, solved: bool) -> tuple[int, int, int, int]:
     laws = {name: Law(int(law)) for name, law in zip(sim.mechanism.contact_names, sim.model.contact_law, strict=True)}
     near = sum(_VARIABLES[law] for name, law in laws.items() if name not in far)
     near += 2 * len(sim.model.limit_dof)
-    size = sum(a.nbytes for a in sim.model) + sum(a.nbytes for a in allocate_data(sizes_of(sim.model)))
+    carry, *scratch = allocate_data(sizes_of(sim.model))
+    size = sum(array.nbytes for array in (*sim.model, *carry, *scratch))
     return sim.nv, near, len(far), size
 
 

@@ -56,7 +56,7 @@ def contacts_kinematics(model: Model, data: Data, h: float) -> None:
         contact_kinematics(model, data, h, data.active[m])
     update_inactive(model, data, h)
     pair_kinematics(model, data, h)
-    far_pair_impulses(model, data, h, data.inactive_kappa[0])
+    far_pair_impulses(model, data, h, data.carry.inactive_kappa[0])
     subtract_floors(model, data)
 
 
@@ -189,7 +189,7 @@ def move_contacts(model: Model, data: Data, alpha: float) -> None:
     for m in range(data.active_count[0]):
         c = data.active[m]
         for k in range(12):
-            data.cone[c, k] = data.cone_trial[c, k] + alpha * data.cone_step[c, k]
+            data.cone[c, k] = data.cone_trial[c, k] + alpha * data.carry.cone_step[c, k]
         keep_in_cone(model, data, c)
 
 

@@ -145,7 +145,7 @@ def cone_constant(model: Model, data: Data, c: int) -> None:
 @kernel
 def recover_cone(data: Data, c: int, a: float, x: float, y: float) -> None:
     """Step of beta from the rates (a, x, y) of gap and slip."""
-    d = data.cone_step[c]
+    d = data.carry.cone_step[c]
     W = data.contact_W[c]
     w = data.contact_w[c]
     d[Cone.FRICTION1] = W[3] * a + W[4] * x + W[5] * y + w[1]

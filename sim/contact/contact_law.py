@@ -141,7 +141,7 @@ def slip_noise(model: Model, data: Data, h: float) -> float:
 def contact_products_ahead(model: Model, data: Data, c: int, alpha: float) -> tuple[float, float]:
     """(sum, count) of the complementarity products after a step of length alpha."""
     z = data.cone[c]
-    d = data.cone_step[c]
+    d = data.carry.cone_step[c]
     p = (z[Cone.SLACK] + alpha * d[Cone.SLACK]) * (z[Cone.IMPULSE] + alpha * d[Cone.IMPULSE])
     if law_of(model, c) == Law.LINEAR:
         return p + pyramid_products_ahead(model, data, c, alpha), 6.0
@@ -162,7 +162,7 @@ def keep_in_cone(model: Model, data: Data, c: int) -> None:
 def contact_boundary(model: Model, data: Data, c: int) -> float:
     """Largest step that keeps the cone variables of contact c in their cones, or 1e30."""
     z = data.cone[c]
-    d = data.cone_step[c]
+    d = data.carry.cone_step[c]
     a = min(orthant_step(z[Cone.SLACK], d[Cone.SLACK]), orthant_step(z[Cone.IMPULSE], d[Cone.IMPULSE]))
     if law_of(model, c) == Law.LINEAR:
         a = min(a, pyramid_boundary(model, data, c))
@@ -209,7 +209,7 @@ def contact_constant(model: Model, data: Data, c: int, target: NewtonTarget) -> 
     `target.corrected`: how much of the second-order term of the affine step now in cone_step is subtracted (Mehrotra).
     """
     z = data.cone[c]
-    d = data.cone_step[c]
+    d = data.carry.cone_step[c]
     w = data.contact_w[c]
     r = target.kappa - z[Cone.SLACK] * z[Cone.IMPULSE]
     if target.corrected > 0.0:
@@ -228,7 +228,7 @@ def contact_constant(model: Model, data: Data, c: int, target: NewtonTarget) -> 
 def recover_contact(model: Model, data: Data, c: int, rate: Vec3, share: float) -> None:
     """cone_step of contact c, where its gap and slip change by `rate`: contact_rate, or pair_rate between bodies."""
     z = data.cone[c]
-    d = data.cone_step[c]
+    d = data.carry.cone_step[c]
     a, x, y = rate
     d[Cone.SLACK] = a + share * (data.contact_kin[c, Kin.GAP] - z[Cone.SLACK])
     d[Cone.IMPULSE] = data.contact_W[c, 0] * a + data.contact_w[c, 0]

@@ -86,8 +86,8 @@ def choose_active(model: Model, data: Data, options: StepOptions) -> None:
 
     Impulses of the step before stand until the motion changes them; a motion that begins forgets them (rollout.py).
     """
-    known = data.inactive_kappa[0] == options.kappa
-    data.inactive_kappa[0] = options.kappa
+    known = data.carry.inactive_kappa[0] == options.kappa
+    data.carry.inactive_kappa[0] = options.kappa
     count = model.contact_height.shape[0]
     least = STIFFNESS * options.tolerance / (max(1, count) * options.kappa)
     data.active_ground_count[0] = 0

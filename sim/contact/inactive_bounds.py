@@ -36,7 +36,7 @@ def bound_changes(model: Model, data: Data, c: int, gap: float) -> None:
     lever = 1.0 + model.cluster[c, Cluster.ARM]
     for k in range(3):
         lever += abs(data.pos2[i, k] - data.origin[k])
-    push = (model.cluster_end[c] - c) * data.inactive_kappa[0] / gap
+    push = (model.cluster_end[c] - c) * data.carry.inactive_kappa[0] / gap
     row = data.inactive[c]
     row[Inactive.BY_GAP] = lever * push * (1.0 + mu) / gap
     row[Inactive.BY_SLIP] = lever * push * mu * mu / gap

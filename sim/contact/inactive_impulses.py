@@ -127,7 +127,7 @@ def _evaluate(model: Model, data: Data, h: float, c: int) -> None:
     D = f[0] * row[Inactive.POSITION] + f[1] * row[Inactive.POSITION + 1] + f[2] * row[Inactive.POSITION + 2]
     N, X, Y, rX, rY = 0.0, 0.0, 0.0, 0.0, 0.0
     N0, N1, N2, X0, X1, X2, Y0, Y1, Y2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    kappa = data.inactive_kappa[0]
+    kappa = data.carry.inactive_kappa[0]
     least = 1e300
     for k in range(c, model.cluster_end[c]):
         if data.contact_out[k] == 0:

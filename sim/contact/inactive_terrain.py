@@ -27,7 +27,7 @@ def evaluate_on_terrain(model: Model, data: Data, h: float, c: int) -> None:
     row = data.inactive[c]
     keep_motion(data, h, i, row)
     contact_kinematics(model, data, h, c)
-    start_contact(model, data, c, data.inactive_kappa[0], row[Inactive.ACTIVATION])
+    start_contact(model, data, c, data.carry.inactive_kappa[0], row[Inactive.ACTIVATION])
     fn, f1, f2 = contact_impulse(model, data, c)
     k = data.contact_kin[c]
     F = data.contact_frame[c]
@@ -38,7 +38,7 @@ def evaluate_on_terrain(model: Model, data: Data, h: float, c: int) -> None:
     least = (1.0 - NEARER) * row[Inactive.LEAST_GAP]
     bound_changes(model, data, c, least)
     mu = model.contact_friction[c]
-    force = data.inactive_kappa[0] / least * (1.0 + mu)
+    force = data.carry.inactive_kappa[0] / least * (1.0 + mu)
     speed = sqrt(k[Kin.SLIP1] * k[Kin.SLIP1] + k[Kin.SLIP2] * k[Kin.SLIP2])
     x, y, z = three(row, Inactive.ANGULAR)
     turning = sqrt(x * x + y * y + z * z)

@@ -104,7 +104,7 @@ def pyramid_products(model: Model, data: Data, c: int) -> tuple[float, float, fl
 def pyramid_products_ahead(model: Model, data: Data, c: int, alpha: float) -> float:
     """Sum of the five products after a step of length alpha."""
     z = data.cone[c]
-    d = data.cone_step[c]
+    d = data.carry.cone_step[c]
     total = (z[Pyramid.SPEED] + alpha * d[Pyramid.SPEED]) * (z[Pyramid.CAP] + alpha * d[Pyramid.CAP])
     for e in range(4):
         total += (z[Pyramid.FRICTION + e] + alpha * d[Pyramid.FRICTION + e]) * (
@@ -118,7 +118,7 @@ def pyramid_boundary(model: Model, data: Data, c: int) -> float:
     """Largest step that keeps all ten variables positive, or 1e30."""
     a = 1e30
     for e in range(2, 12):
-        a = min(a, orthant_step(data.cone[c, e], data.cone_step[c, e]))
+        a = min(a, orthant_step(data.cone[c, e], data.carry.cone_step[c, e]))
     return a
 
 
@@ -165,7 +165,7 @@ def condense_pyramid(model: Model, data: Data, c: int) -> None:
 def pyramid_constant(model: Model, data: Data, c: int, target: NewtonTarget) -> None:
     """Friction part of contact_w, after its normal part."""
     z = data.cone[c]
-    d = data.cone_step[c]
+    d = data.carry.cone_step[c]
     k = data.contact_kin[c]
     w = data.contact_w[c]
     q = data.contact_scale[c]
@@ -191,7 +191,7 @@ def pyramid_constant(model: Model, data: Data, c: int, target: NewtonTarget) -> 
 def recover_pyramid(model: Model, data: Data, c: int, x: float, y: float, share: float) -> None:
     """Steps of the ten variables from the rates (x, y) of the slip, after the step of gamma."""
     z = data.cone[c]
-    d = data.cone_step[c]
+    d = data.carry.cone_step[c]
     k = data.contact_kin[c]
     q = data.contact_scale[c]
     mu = model.contact_friction[c]

@@ -95,7 +95,7 @@ def least_closing(model: Model, data: Data, h: float, c: int) -> float:
     g = model.gravity
     fall = 4.0 * h * h * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
     m = model.body_mass[model.contact_body[c]]
-    return h * sqrt(max(fall, data.inactive_kappa[0] / (h * m) if m > 0.0 else 0.0))
+    return h * sqrt(max(fall, data.carry.inactive_kappa[0] / (h * m) if m > 0.0 else 0.0))
 
 
 @kernel

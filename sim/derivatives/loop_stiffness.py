@@ -25,7 +25,7 @@ def loop_stiffness(model: Model, data: Data, m: int, K2: Matrix) -> Vec3:
     P = (A[0] - o[0], A[1] - o[1], A[2] - o[2])
     fx, fy, fz = 0.0, 0.0, 0.0
     for _ in range(3 - model.loop_ntrans[m]):
-        g = data.couple_force[row]
+        g = data.carry.couple_force[row]
         fx += g * data.couple_B[row, 0]
         fy += g * data.couple_B[row, 1]
         fz += g * data.couple_B[row, 2]
@@ -63,7 +63,7 @@ def _axis_torque_rate(model: Model, data: Data, m: int, a: int, row: int, e: Vec
     r = rotate(data.rot2, a, s[6], s[7], s[8])
     x, y, z = 0.0, 0.0, 0.0
     for i in range(2):
-        g = data.couple_force[row + i]
+        g = data.carry.couple_force[row + i]
         t = times(Q, g * s[3 * i], g * s[3 * i + 1], g * s[3 * i + 2])
         x += t[0]
         y += t[1]
@@ -81,7 +81,7 @@ def _weld_torque_rate(data: Data, m: int, a: int, row: int, e: Vec3, side: int) 
     Q = data.loop_frame[m]
     E = data.loop_turn[m]
     relative_rotation(Q, data.rot2, a, E)
-    f = (data.couple_force[row], data.couple_force[row + 1], data.couple_force[row + 2])
+    f = (data.carry.couple_force[row], data.carry.couple_force[row + 1], data.carry.couple_force[row + 2])
     sign = 1.0 if side == 0 else -1.0
     p = (  # Q^T e
         sign * (Q[0] * e[0] + Q[3] * e[1] + Q[6] * e[2]),

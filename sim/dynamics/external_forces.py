@@ -13,9 +13,9 @@ from solvers.types import Cube, Matrix, Vector
 
 @kernel
 def set_external(data: Data, wrenches: Cube, t: int) -> None:
-    """data.external = wrenches[t], of (T, nbody, 6); without any, (0, nbody, 6), it stays zero."""
+    """data.carry.external = wrenches[t], of (T, nbody, 6); without any, (0, nbody, 6), it stays zero."""
     if wrenches.shape[0] > 0:
-        copy(wrenches[t], data.external)
+        copy(wrenches[t], data.carry.external)
 
 
 @kernel
@@ -44,7 +44,7 @@ def outer_wrenches(model: Model, data: Data, u: Vector, out: Matrix) -> None:
     for i in range(n):
         m = model.body_mass[i] * model.body_weight[i]
         F = out[i]
-        e = data.external[i]
+        e = data.carry.external[i]
         F[0], F[1], F[2] = m * g[0] + e[0], m * g[1] + e[1], m * g[2] + e[2]
         x, y, z = data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2]
         t = cross(x, y, z, F[0], F[1], F[2])
@@ -80,7 +80,7 @@ def outer_slopes(model: Model, data: Data, u: Vector, out: Matrix) -> None:
         for k in range(36):
             out[i, k] = 0.0
         for k in range(3):
-            w[k] = model.body_mass[i] * model.body_weight[i] * model.gravity[k] + data.external[i, k]
+            w[k] = model.body_mass[i] * model.body_weight[i] * model.gravity[k] + data.carry.external[i, k]
         _add_force_slope(w, data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2], out[i])
     for j in range(u.shape[0]):
         if model.input_kind[j] == InputKind.JOINT:

@@ -65,7 +65,7 @@ def begin_step(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vect
         advance(model, data, h, q, v, before)
         world_inertia(model, data.rot2, data.inertia_world)
     else:
-        data.carried_steps[0] = 0
+        data.carry.carried_steps[0] = 0
         tree_poses(model, data, q)
         move_back(model, data, h, q, v)
         world_inertia(model, data.rot2, data.inertia_world)
@@ -74,8 +74,8 @@ def begin_step(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vect
         m = h * model.body_mass[i] * model.body_weight[i]
         for k in range(3):
             data.momentum_in[i, k] += m * model.gravity[k]
-            data.momentum_in[i, k] += h * data.external[i, k]
-            data.momentum_in[i, 3 + k] += h * data.external[i, 3 + k]
+            data.momentum_in[i, k] += h * data.carry.external[i, k]
+            data.momentum_in[i, 3 + k] += h * data.carry.external[i, 3 + k]
             data.body_impulse[i, k] = 0.0
             data.body_impulse[i, 3 + k] = 0.0
     representable = turns_below_half(model, data, h, v)

@@ -74,7 +74,7 @@ def stand(models: Table, works: Table, line: Stretch, goal: Vector) -> float:
     model, data = model_view(models[0]), data_view(works[1])
     nq = data.theta1.shape[0]
     if line.clock[Clock.READY] == 0.0:
-        clear(data.external)
+        clear(data.carry.external)
         begin_node(model, data, line.x)
         set_external(data, line.wrench, 0)
         line.clock[Clock.READY] = 1.0

@@ -30,7 +30,7 @@ def _evaluate(model: Model, data: Data, x: Vector, moving: bool) -> None:
         data.nu_trial[d] = data.nu[d] = x[nq + d] if moving else 0.0
     momenta_of_velocity(model, data, data.nu_trial, data.rhs)
     clear(data.balance)
-    clear(data.external)
+    clear(data.carry.external)
 
 
 @kernel

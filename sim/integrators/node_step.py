@@ -45,7 +45,7 @@ def add_forces(model: Model, data: Data, h: float, u: Vector, out: Vector) -> No
     """out += h f: generalized forces of inputs and external wrenches at configuration 2 in `data`.   out: (nv,)."""
     F = data.balance
     for i in range(model.body_parent.shape[0]):
-        e, o = data.external[i], data.origin
+        e, o = data.carry.external[i], data.origin
         x, y, z = data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2]
         for k in range(6):
             F[i, k] = e[k]
@@ -70,7 +70,7 @@ def add_forces(model: Model, data: Data, h: float, u: Vector, out: Vector) -> No
 def mean_of_node(model_at: Table, data_at: Table, h: float, u: Vector, x: Vector, mean: Vector) -> int:
     """mean = (q, v15) of the node x = (q, v), for a step of length h from there; returns the Status.
 
-    data.external: external wrenches.
+    data.carry.external: external wrenches.
     """
     model = model_view(model_at)
     data = data_view(data_at)
@@ -118,7 +118,7 @@ def step_mean(
     """out = (q, v25) one step after mean = (q, v15); the Status. Iterations are added up, the rest is the largest."""
     nq = data.theta1.shape[0]
     iterations, residual, violation = report[1], report[2], report[3]
-    follows = data.carried_steps[0] > 0
+    follows = data.carry.carried_steps[0] > 0
     status = step(model, data, options, mean, u, Guess(mean[nq:], follows), out, report)
     report[1] += iterations
     report[2], report[3] = max(report[2], residual), max(report[3], violation)

@@ -173,7 +173,7 @@ def roll_far(model_at: Table, data_at: Table, settings: Vector, flight: Flight, 
     us, xs, reports = flight.us, flight.xs, flight.reports
     start_pace(data, settings)
     if first == 0:
-        clear(data.external)
+        clear(data.carry.external)
         begin(model, data, xs[0])
     for t in range(first, us.shape[0]):
         x = xs[t + 1]

@@ -86,16 +86,17 @@ def options_of(data: Data, settings: Vector, begins: bool) -> StepOptions:
 
 @kernel
 def begin(data: Data) -> None:
-    """Forget the motion before: clear all fields of CARRY (sim/model/layout.py)."""
-    data.carried_steps[0] = 0
-    data.ways_known[0] = 0
-    data.inactive_kappa[0] = 0.0
-    clear(data.cone_step)
-    clear(data.bound_step)
-    clear(data.dry_step)
-    clear(data.external)
-    for row in range(data.couple_force.shape[0]):
-        data.couple_force[row] = 0.0
+    """Forget the motion before."""
+    carry = data.carry
+    carry.carried_steps[0] = 0
+    carry.ways_known[0] = 0
+    carry.inactive_kappa[0] = 0.0
+    clear(carry.cone_step)
+    clear(carry.bound_step)
+    clear(carry.dry_step)
+    clear(carry.external)
+    for row in range(carry.couple_force.shape[0]):
+        carry.couple_force[row] = 0.0
 
 
 @kernel

@@ -7,15 +7,9 @@ from typing import NamedTuple
 from solvers.types import IntegerMatrix, Integers, Matrix, Vector
 
 
-class Data(NamedTuple):
-    """Scratch of one step, allocated once per thread by `Simulator`; also holds intermediate results for derivatives.
+class Carry(NamedTuple):
+    """State between the steps of a motion; a new motion clears all of it."""
 
-    The first block is not scratch but the state between the steps of a motion (CARRY of layout.py), which a new motion
-    clears. The end of a step stays in configuration 3 and `nu`, its impulses in `cone` and `bound`; they are used again
-    only if a motion continues, as `carried_steps` and `Guess.impulses` say.
-    """
-
-    # state between steps
     carried_steps: Integers  # (1,) steps of this motion, 0 where configurations have to be computed, see carry_over.py
     ways_known: Integers  # (1,) whether pair_clear and body_way are those of this motion
     external: Matrix  # (nbody, 6) external force at the centre of mass and torque in this step, world axes [N, N m]
@@ -24,7 +18,16 @@ class Data(NamedTuple):
     bound_step: Matrix  # (nlimit, 2) and of limits
     dry_step: Matrix  # (ndry, 4) and of dry friction
     couple_force: Vector  # (nrow,) impulses of loops
-    # scratch
+
+
+class Data(NamedTuple):
+    """Scratch of one step, allocated once per thread by `Simulator`; also holds intermediate results for derivatives.
+
+    The end of a step stays in configuration 3 and `nu`, its impulses in `cone` and `bound`: a step uses them again only
+    if it continues a motion, as `carry.carried_steps` and `Guess.impulses` say.
+    """
+
+    carry: Carry
     origin: Vector  # (3,) the reference point O
     # configurations 1, 2 and 3, and the motion between them
     theta1: Vector  # (nq,) coordinates at 1
@@ -208,25 +211,28 @@ class Data(NamedTuple):
     step_x: Matrix  # (2, nq + nv) states inside a knot
     report: Vector  # (6,) report of an internal step
     pace: Vector  # (2,) when to go back to Python, work done since the last look at the clock: sim/model/pace.py
-    # steps of higher order, without rows in the Data of the others: integrators/runge_kutta.py, tangents.py
-    held_x: Matrix  # (2, nx) the state where the step began, and its copy that moves
-    held_u: Vector  # (nu,) the input of the step
-    held_momenta: Vector  # (nv,) momenta where the step began
-    momenta: Vector  # (nv,) at the node
-    stage_shift: Vector  # (nv,) of the coordinates, from the node to the stage
-    stage_momenta: Vector  # (nv,)
-    stage_dr: Matrix  # (nstage, nv) rates of the shift
-    stage_dp: Matrix  # (nstage, nv) rates of the momenta
-    slope_p_q: Matrix  # (nv, nv) derivatives of momenta p and their rates f by coordinates, velocities, inputs
-    slope_p_v: Matrix  # (nv, nv)
-    slope_f_q: Matrix  # (nv, nv)
-    slope_f_v: Matrix  # (nv, nv)
-    slope_f_u: Matrix  # (nv, nu)
-    slope_column: Matrix  # (nv, 42) vectors of every column, see hamilton_gradient.py
-    tangent_q: Matrix  # (nv, 2 nv + nu) directions of the coordinates of the node
-    tangent_p: Matrix  # (nv, 2 nv + nu) of its momenta
-    tangent_shift: Matrix  # (nv, 2 nv + nu) of the shift from the node to the stage
-    tangent_stage_q: Matrix  # (nv, 2 nv + nu)
-    tangent_stage_p: Matrix  # (nv, 2 nv + nu)
-    tangent_dr: Matrix  # (nstage nv, 2 nv + nu) their rates at every stage
-    tangent_dp: Matrix  # (nstage nv, 2 nv + nu)
+    # steps of higher order (integrators/runge_kutta.py, tangents.py): high_nv is nv, high_state nq + nv, high_nu nu and
+    # high_n 2 nv + nu, all of them 0 where steps have order 2
+    held_x: Matrix  # (2, high_state) the state where the step began, and its copy that moves
+    held_u: Vector  # (high_nu,) the input of the step
+    held_momenta: Vector  # (high_nv,) momenta where the step began
+    momenta: Vector  # (high_nv,) at the node
+    stage_shift: Vector  # (high_nv,) of the coordinates, from the node to the stage
+    stage_momenta: Vector  # (high_nv,)
+    stage_dr: Matrix  # (nstage, high_nv) rates of the shift
+    stage_dp: Matrix  # (nstage, high_nv) rates of the momenta
+    slope_p_q: (
+        Matrix  # (high_nv, high_nv) derivatives of momenta p and their rates f by coordinates, velocities, inputs
+    )
+    slope_p_v: Matrix  # (high_nv, high_nv)
+    slope_f_q: Matrix  # (high_nv, high_nv)
+    slope_f_v: Matrix  # (high_nv, high_nv)
+    slope_f_u: Matrix  # (high_nv, high_nu)
+    slope_column: Matrix  # (high_nv, 42) vectors of every column, see hamilton_gradient.py
+    tangent_q: Matrix  # (high_nv, high_n) directions of the coordinates of the node
+    tangent_p: Matrix  # (high_nv, high_n) of its momenta
+    tangent_shift: Matrix  # (high_nv, high_n) of the shift from the node to the stage
+    tangent_stage_q: Matrix  # (high_nv, high_n)
+    tangent_stage_p: Matrix  # (high_nv, high_n)
+    tangent_dr: Matrix  # (nstage_nv, high_n) their rates at every stage
+    tangent_dp: Matrix  # (nstage_nv, high_n)

@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.model.data import Data
+from sim.model.data import Carry, Data
 from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.compiler import Field, record, table
+from solvers.compiler import Field, Part, record, table
 from solvers.lanes import LANES, SIDE, whole
 
-__all__ = ["CARRY", "MODEL_FIELDS", "MODEL_INTS", "DATA_FIELDS", "DATA_INTS", "Shape", "Sizes", "allocate_model",
+__all__ = ["CARRY_FIELDS", "INTEGERS", "MODEL_FIELDS", "DATA_FIELDS", "Shape", "Sizes", "allocate_model",
            "allocate_data", "model_view", "sizes_of", "table", "data_view"]  # fmt: skip
 
 Shape = tuple[int | str, ...]
@@ -56,16 +56,14 @@ MODEL_FLOATS = _shapes(
     """
 )
 
-# state between the steps of a motion: `begin` of integrators/rollout.py clears all of it
 CARRY_INTS = _shapes("carried_steps 1, ways_known 1")
 CARRY_FLOATS = _shapes(
     """
     external nbody 6, inactive_kappa 1, cone_step ncontact 12, bound_step nlimit 2, dry_step ndry 4, couple_force nrow
     """
 )
-CARRY = (*CARRY_INTS, *CARRY_FLOATS)
 
-DATA_INTS = CARRY_INTS | _shapes(
+DATA_INTS = _shapes(
     """
     active_ground_count 1, active_count 1, inactive_count 1, active ncontact, inactive_first nground,
     contact_out nground,
@@ -77,7 +75,7 @@ DATA_INTS = CARRY_INTS | _shapes(
     """
 )
 
-DATA_FLOATS = CARRY_FLOATS | _shapes(
+DATA_FLOATS = _shapes(
     """
     origin 3, theta1 nq, theta3 nq, nu nv, nu_trial nv, dnu nv, pos1 nbody 3, quat1 nbody 4, rot1 nbody 9,
     pos2 nbody 3, quat2 nbody 4, rot2 nbody 9, pos3 nbody 3, quat3 nbody 4, rot3 nbody 9, S1 nv 6, S2 nv 6, S3 nv 6,
@@ -111,16 +109,19 @@ DATA_FLOATS = CARRY_FLOATS | _shapes(
     step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 6, pace 2,
     inactive nground 38, inactive_share 1,
     reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach,
-    held_x 2 nheldx, held_u nheldu, held_momenta nhigh, momenta nhigh, stage_shift nhigh, stage_momenta nhigh,
-    stage_dr nstage nhigh, stage_dp nstage nhigh, slope_p_q nhigh nhigh, slope_p_v nhigh nhigh, slope_f_q nhigh nhigh,
-    slope_f_v nhigh nhigh, slope_f_u nhigh nheldu, slope_column nhigh 42, tangent_q nhigh ntangent,
-    tangent_p nhigh ntangent, tangent_shift nhigh ntangent, tangent_stage_q nhigh ntangent,
-    tangent_stage_p nhigh ntangent, tangent_dr nstagenv ntangent, tangent_dp nstagenv ntangent
+    held_x 2 high_state, held_u high_nu, held_momenta high_nv, momenta high_nv, stage_shift high_nv,
+    stage_momenta high_nv, stage_dr nstage high_nv, stage_dp nstage high_nv, slope_p_q high_nv high_nv,
+    slope_p_v high_nv high_nv, slope_f_q high_nv high_nv, slope_f_v high_nv high_nv, slope_f_u high_nv high_nu,
+    slope_column high_nv 42, tangent_q high_nv high_n, tangent_p high_nv high_n, tangent_shift high_nv high_n,
+    tangent_stage_q high_nv high_n, tangent_stage_p high_nv high_n, tangent_dr nstage_nv high_n,
+    tangent_dp nstage_nv high_n
     """
 )
 
 MODEL_FIELDS = {**MODEL_INTS, **MODEL_FLOATS}
+CARRY_FIELDS = {**CARRY_INTS, **CARRY_FLOATS}
 DATA_FIELDS = {**DATA_INTS, **DATA_FLOATS}
+INTEGERS = {*MODEL_INTS, *CARRY_INTS, *DATA_INTS}
 
 
 class Sizes(NamedTuple):
@@ -171,11 +172,11 @@ def _lengths(sizes: Sizes) -> dict[str, int]:
         "nwide": whole(nv),
         "ncolumn": columns,
         "npanel": columns if sizes.nrow else LANES,
-        "nhigh": high * nv,
-        "nheldx": high * (sizes.nq + nv),
-        "nheldu": high * nu,
-        "ntangent": high * (2 * nv + nu),
-        "nstagenv": sizes.nstage * nv,
+        "high_nv": high * nv,
+        "high_state": high * (sizes.nq + nv),
+        "high_nu": high * nu,
+        "high_n": high * (2 * nv + nu),
+        "nstage_nv": sizes.nstage * nv,
         "nreach": min(3 * (sizes.ncontact - sizes.npair) + sizes.nlimit, _REACH),
     }
 
@@ -209,8 +210,10 @@ def allocate_model(sizes: Sizes) -> Model:
 
 
 def allocate_data(sizes: Sizes) -> Data:
-    """The scratch of one thread."""
-    return Data(**_carve(DATA_INTS, sizes, np.int64), **_carve(DATA_FLOATS, sizes, np.float64))
+    """The scratch of one thread, and the state between its steps."""
+    arrays = _carve(CARRY_INTS | DATA_INTS, sizes, np.int64) | _carve(CARRY_FLOATS | DATA_FLOATS, sizes, np.float64)
+    carry = Carry(**{name: arrays.pop(name) for name in CARRY_FIELDS})
+    return Data(carry=carry, **arrays)
 
 
 def sizes_of(model: Model) -> Sizes:
@@ -240,12 +243,14 @@ def _fields(cls: Any, shapes: dict[str, Shape]) -> list[Field]:
     return [
         Field(
             name,
-            name in MODEL_INTS or name in DATA_INTS,
+            name in INTEGERS,
             None if len(shapes[name]) == 1 else int(shapes[name][1]) if isinstance(shapes[name][1], int) else 0,
         )
         for name in cls._fields
+        if name in shapes
     ]
 
 
 model_view = record(Model, _fields(Model, MODEL_FIELDS))
-data_view = record(Data, _fields(Data, DATA_FIELDS))
+carry_view = record(Carry, _fields(Carry, CARRY_FIELDS))
+data_view = record(Data, [Part("carry", Carry), *_fields(Data, DATA_FIELDS)])

@@ -19,7 +19,6 @@ import numpy as np
 from sim.integrators.feedback import BoundedLaw, Path
 from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
-from sim.model.layout import CARRY
 from sim.model.model import Model
 from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, chained, knot_inputs
 from sim.simulator.intervals import Intervals
@@ -220,8 +219,8 @@ class DividingEngine(Engine):
         path.xs[t + 1] = divided.x
         path.report[:REPORT] = divided.report()
         path.report[REPORT] = total + path.report[1]
-        for name in CARRY:  # the next step does not continue the attempt that failed
-            getattr(data, name)[...] = 0
+        for array in data.carry:  # the next step does not continue the attempt that failed
+            array[...] = 0
         if s + 1 == substeps:
             parts = divided.engine.last()
             data.cone[...], data.bound[...] = parts.cone, parts.bound

@@ -191,7 +191,7 @@ def _loop_joint(mech: Mechanism, loop: Joint, m: int, model: Model, data: Data, 
     rotation = data.rot2[a].reshape(3, 3)
     point = data.pos2[a] + rotation @ np.asarray(loop.child_point)
     rows = slice(model.coupling_row[k], model.coupling_row[k + 1])
-    wrench = _at(point - data.origin, data.couple_force[rows] @ data.couple_B[rows] / h)
+    wrench = _at(point - data.origin, data.carry.couple_force[rows] @ data.couple_B[rows] / h)
     return _Row(point, wrench, wrench, _axes(loop, rotation, b, data, frame))
 
 

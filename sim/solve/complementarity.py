@@ -31,11 +31,11 @@ def products_ahead(model: Model, data: Data, alpha: float) -> float:
     total, count = contacts_products_ahead(model, data, alpha)
     for k in range(model.limit_dof.shape[0]):
         b = data.bound[k]
-        d = data.bound_step[k]
+        d = data.carry.bound_step[k]
         total += (b[Bound.SLACK] + alpha * d[Bound.SLACK]) * (b[Bound.IMPULSE] + alpha * d[Bound.IMPULSE])
         count += 1.0
     total, count = total + dry_products_ahead(model, data, alpha), count + 2.0 * model.dry_dof.shape[0]
-    return total / count if count > 0.0 else data.inactive_kappa[0]
+    return total / count if count > 0.0 else data.carry.inactive_kappa[0]
 
 
 @kernel
@@ -44,6 +44,6 @@ def boundary_step(model: Model, data: Data) -> float:
     a = min(contacts_boundary(model, data), dry_boundary(model, data))
     for k in range(model.limit_dof.shape[0]):
         b = data.bound[k]
-        d = data.bound_step[k]
+        d = data.carry.bound_step[k]
         a = min(a, orthant_step(b[Bound.SLACK], d[Bound.SLACK]), orthant_step(b[Bound.IMPULSE], d[Bound.IMPULSE]))
     return a

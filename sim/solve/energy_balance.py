@@ -174,7 +174,7 @@ def work_at_node(model: Model, data: Data, h: float, v: Vector, u: Vector) -> tu
             part = input_work(model, data, j, u[j])
             total, size = total + part, size + abs(part)
     for i in range(model.body_parent.shape[0]):
-        part, f = 0.0, data.external[i]
+        part, f = 0.0, data.carry.external[i]
         for k in range(3):
             part += 0.5 * f[k] * (data.move_in[i, k] + data.move[i, k])
             part += f[3 + k] * (data.turn_in[i, 1 + k] + data.turn[i, 1 + k])

@@ -181,8 +181,9 @@ def keep_inequalities(model: Model, data: Data) -> None:
 def move_inequalities(model: Model, data: Data, alpha: float) -> None:
     """cone = kept + alpha step."""
     move_contacts(model, data, alpha)
+    step = data.carry.bound_step
     for k in range(model.limit_dof.shape[0]):
-        data.bound[k, Bound.SLACK] = data.bound_trial[k, Bound.SLACK] + alpha * data.bound_step[k, Bound.SLACK]
-        data.bound[k, Bound.IMPULSE] = data.bound_trial[k, Bound.IMPULSE] + alpha * data.bound_step[k, Bound.IMPULSE]
+        data.bound[k, Bound.SLACK] = data.bound_trial[k, Bound.SLACK] + alpha * step[k, Bound.SLACK]
+        data.bound[k, Bound.IMPULSE] = data.bound_trial[k, Bound.IMPULSE] + alpha * step[k, Bound.IMPULSE]
     move_dry(model, data, alpha)
     move_loops(model, data, alpha)

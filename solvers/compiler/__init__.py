@@ -34,12 +34,13 @@ from solvers.compiler.kernels import (
 from solvers.compiler.notice import compiled
 from solvers.compiler.optional import link, optional
 from solvers.compiler.parallel import parallel_kernel, prange, threads
-from solvers.compiler.records import Field, Table, record, table
+from solvers.compiler.records import Field, Part, Table, record, table
 
 __all__ = [
     "PAUSE",
     "CompilationError",
     "Field",
+    "Part",
     "Table",
     "cache_folder",
     "compiled",

@@ -5,18 +5,18 @@ from __future__ import annotations
 import inspect
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from sim.integrators.rollout import begin
-from sim.model.data import Data
+from sim.model.data import Carry, Data
 from sim.model.layout import (
-    CARRY,
+    CARRY_FIELDS,
     DATA_FIELDS,
-    DATA_INTS,
+    INTEGERS,
     MODEL_FIELDS,
-    MODEL_INTS,
     Sizes,
     allocate_data,
     allocate_model,
@@ -28,7 +28,7 @@ from sim.model.layout import (
 from sim.model.model import Model
 from solvers.compiler import Table, kernel
 
-ALL = Sizes(nbody=3, nq=8, nv=7, ncontact=2, nlimit=4, nu=5)
+ALL = Sizes(nbody=3, nq=8, nv=7, ncontact=2, nlimit=4, nu=5, nstage=4)
 BARE = Sizes(nbody=1, nq=1, nv=1, ncontact=0, nlimit=0, nu=0)
 
 
@@ -42,20 +42,28 @@ def declared_shapes(cls: type) -> dict[str, list[str] | None]:
     return shapes
 
 
-@pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Data, DATA_FIELDS)])
+def arrays_of(record: Any) -> dict[str, Any]:
+    """All arrays of a record, those of its parts included."""
+    out = {}
+    for name, value in zip(record._fields, record, strict=True):
+        out.update(arrays_of(value) if isinstance(value, tuple) else {name: value})
+    return out
+
+
+@pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Carry, CARRY_FIELDS), (Data, DATA_FIELDS)])
 def test_table_matches_declaration(cls: type, table: dict[str, tuple[int | str, ...]]) -> None:
     stated = declared_shapes(cls)
-    assert set(table) == set(stated)
+    assert set(table) == set(stated) - {"carry"}
     for name, shape in table.items():
         written = stated[name]
         assert written is None or written == [str(n).replace("nx", "nq+nv") for n in shape], name
 
 
-@pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Data, DATA_FIELDS)])
+@pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Carry, CARRY_FIELDS), (Data, DATA_FIELDS)])
 def test_kind_matches_annotation(cls: type, table: dict[str, tuple[int | str, ...]]) -> None:
     kinds = {(True, 1): "Integers", (True, 2): "IntegerMatrix", (False, 1): "Vector", (False, 2): "Matrix"}
     for name, shape in table.items():
-        integer = name in MODEL_INTS or name in DATA_INTS
+        integer = name in INTEGERS
         assert cls.__annotations__[name].__forward_arg__ == kinds[integer, len(shape)], name
 
 
@@ -64,7 +72,7 @@ def test_fields_do_not_overlap(sizes: Sizes) -> None:
     model, work = allocate_model(sizes), allocate_data(sizes)
     assert sizes_of(allocate_model(sizes))._replace(nq=sizes.nq) == sizes
     for record in (model, work):
-        for name, value in zip(record._fields, record, strict=True):
+        for name, value in arrays_of(record).items():
             value[...] += 1
             assert np.all(value == 1), f"{name} overlaps another field"
 
@@ -89,6 +97,8 @@ def _mark_work(data_at: Table) -> int:
     w = data_view(data_at)
     for i in range(w.pos3.shape[0]):
         w.pos3[i, 2] = 5.0 + i
+    for k in range(6):
+        w.carry.external[0, k] = 7.0 + k
     for r in range(w.panel.shape[0]):
         for k in range(w.panel.shape[1]):
             w.panel[r, k] = r + 0.5 * k
@@ -106,6 +116,7 @@ def test_compiled_views_agree_with_python(sizes: Sizes) -> None:
 
     work = allocate_data(sizes)
     assert _mark_work(table(work)) == 1000 * work.columns.shape[1] + sizes.nbody
+    np.testing.assert_array_equal(work.carry.external[0], 7.0 + np.arange(6))
     np.testing.assert_array_equal(work.pos3[:, 2], 5.0 + np.arange(sizes.nbody))
     np.testing.assert_array_equal(
         work.panel, np.arange(6 * sizes.nbody)[:, None] + 0.5 * np.arange(work.panel.shape[1])
@@ -115,10 +126,11 @@ def test_compiled_views_agree_with_python(sizes: Sizes) -> None:
 @pytest.mark.parametrize("sizes", [ALL, BARE])
 def test_python_reads_the_same_arrays(sizes: Sizes) -> None:
     work = allocate_data(sizes)
-    for k, array in enumerate(work):
+    for k, array in enumerate(arrays_of(work).values()):
         array[...] = k
     seen = data_view(table(work))
-    for mine, theirs in zip(work, seen, strict=True):
+    assert isinstance(seen.carry, Carry)
+    for mine, theirs in zip(arrays_of(work).values(), arrays_of(seen).values(), strict=True):
         assert theirs.shape == mine.shape and theirs.dtype == mine.dtype
         np.testing.assert_array_equal(theirs, mine)
 
@@ -130,8 +142,8 @@ def _begin(data_at: Table) -> None:
 
 def test_a_motion_begins_without_the_state_of_the_one_before() -> None:
     work = allocate_data(ALL._replace(nrow=3, ndry=2))
-    for array in work:
+    for array in arrays_of(work).values():
         array[...] = 7
     _begin(table(work))
-    cleared = {name for name, array in zip(work._fields, work, strict=True) if array.size and not array.any()}
-    assert cleared == set(CARRY)
+    cleared = {name for name, array in arrays_of(work).items() if array.size and not array.any()}
+    assert cleared == set(Carry._fields)

@@ -57,8 +57,8 @@ def with_share(data: Data, j: int, gap: float, rate: Vec3, p: Vec3) -> Vec3:
 @kernel
 def follow_ways(model: Model, data: Data) -> None:
     """body_way at configuration 2, where a step begins; a new motion forgets the distances of its collisions."""
-    if data.ways_known[0] == 0:
-        data.ways_known[0] = 1
+    if data.carry.ways_known[0] == 0:
+        data.carry.ways_known[0] = 1
         data.pair_margin[0] = -1.0
         for j in range(model.pair_kind.shape[0]):
             data.pair_clear[j] = 0.0

@@ -242,7 +242,7 @@ def add_time_step(model: Model, data: Data, at: At, w: float, col: int) -> None:
     for i in range(model.body_parent.shape[0]):
         m = -2.0 * model.body_mass[i] * model.body_weight[i]
         b = data.balance[i]
-        e = data.external[i]
+        e = data.carry.external[i]
         f = (m * g[0] - 2.0 * e[0], m * g[1] - 2.0 * e[1], m * g[2] - 2.0 * e[2])
         t = moment(data, i, f, (-2.0 * e[3], -2.0 * e[4], -2.0 * e[5]))
         f = (f[0] - b[0] / h, f[1] - b[1] / h, f[2] - b[2] / h)

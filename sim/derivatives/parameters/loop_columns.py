@@ -43,7 +43,7 @@ def add_loop_geometry(model: Model, data: Data, effect: int, m: int, k: int, w: 
         u = model.loop_axes[m, 3 * r : 3 * r + 3]
         t = times(data.loop_frame[m], u[0], u[1], u[2])
         x = cross(d2[0], d2[1], d2[2], t[0], t[1], t[2])
-        f = w * data.couple_force[first + r]
+        f = w * data.carry.couple_force[first + r]
         add_wrench(model, data, a, (0.0, 0.0, 0.0), x, -f, col)
         add_wrench(model, data, b, (0.0, 0.0, 0.0), x, f, col)
 
@@ -73,7 +73,7 @@ def add_loop_turn(model: Model, data: Data, m: int, k: int, w: float, col: int) 
                 g = (A[0] - Q[9], A[1] - Q[10], A[2] - Q[11]) if r < n else axis
                 data.couple_panel[row, col] += w * (t[0] * g[0] + t[1] * g[1] + t[2] * g[2])
                 continue
-            f = w * data.couple_force[row]
+            f = w * data.carry.couple_force[row]
             x = (A[0] - O[0], A[1] - O[1], A[2] - O[2]) if r < n else axis
             x = cross(x[0], x[1], x[2], t[0], t[1], t[2])
             force = t if r < n else (0.0, 0.0, 0.0)
@@ -87,7 +87,7 @@ def add_gear_ratio(model: Model, data: Data, k: int, w: float, col: int) -> None
     b = model.gear_dof[k, 1]
     row = gear_row(model, k)
     data.couple_panel[row, col] -= w * data.theta3[model.dof_qadr[b]]
-    data.columns[b, col] -= w * data.couple_force[row]
+    data.columns[b, col] -= w * data.carry.couple_force[row]
 
 
 @kernel

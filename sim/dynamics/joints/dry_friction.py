@@ -203,7 +203,7 @@ def add_dry_blocks(model: Model, data: Data, h: float) -> None:
 def dry_constants(model: Model, data: Data, target: NewtonTarget) -> None:
     """dnu += w, with d lambda = w - (h/c) d nu; w and the constant parts of df and db kept in dry_w."""
     for k in range(model.dry_dof.shape[0]):
-        z, step = data.dry[k], data.dry_step[k]
+        z, step = data.dry[k], data.carry.dry_step[k]
         parts = data.dry_w[k]
         for side in range(2):
             a, p = z[2 * side], z[2 * side + 1]
@@ -217,7 +217,7 @@ def dry_constants(model: Model, data: Data, target: NewtonTarget) -> None:
 def recover_dry(model: Model, data: Data, h: float) -> None:
     """dry_step from dnu."""
     for k in range(model.dry_dof.shape[0]):
-        z, step, w = data.dry[k], data.dry_step[k], data.dry_w[k]
+        z, step, w = data.dry[k], data.carry.dry_step[k], data.dry_w[k]
         change = w[0] - h / dry_compliance(data, k) * data.dnu[model.dry_dof[k]]
         step[Dry.LEFT_FORWARD], step[Dry.LEFT_BACKWARD] = change, -change
         step[Dry.FORWARD] = w[1] - z[Dry.FORWARD] / z[Dry.LEFT_FORWARD] * change
@@ -237,7 +237,7 @@ def move_dry(model: Model, data: Data, alpha: float) -> None:
     """dry = kept + alpha step."""
     for k in range(model.dry_dof.shape[0]):
         for j in range(4):
-            data.dry[k, j] = data.dry_trial[k, j] + alpha * data.dry_step[k, j]
+            data.dry[k, j] = data.dry_trial[k, j] + alpha * data.carry.dry_step[k, j]
 
 
 @optional(Slot.DRY_PRODUCTS, default=(0.0, 0.0))
@@ -257,7 +257,7 @@ def dry_products_ahead(model: Model, data: Data, alpha: float) -> float:
     """Sum of the products after a step of length alpha."""
     total = 0.0
     for k in range(model.dry_dof.shape[0]):
-        z, d = data.dry[k], data.dry_step[k]
+        z, d = data.dry[k], data.carry.dry_step[k]
         for j in range(0, 4, 2):
             total += (z[j] + alpha * d[j]) * (z[j + 1] + alpha * d[j + 1])
     return total
@@ -269,7 +269,7 @@ def dry_boundary(model: Model, data: Data) -> float:
     a = 1e30
     for k in range(model.dry_dof.shape[0]):
         for j in range(4):
-            a = min(a, orthant_step(data.dry[k, j], data.dry_step[k, j]))
+            a = min(a, orthant_step(data.dry[k, j], data.carry.dry_step[k, j]))
     return a
 
 

@@ -63,7 +63,7 @@ def limit_constants(model: Model, data: Data, target: NewtonTarget) -> None:
         g = data.bound[k, Bound.IMPULSE]
         r = target.kappa - s * g
         if target.corrected > 0.0:
-            r -= target.corrected * data.bound_step[k, Bound.SLACK] * data.bound_step[k, Bound.IMPULSE]
+            r -= target.corrected * data.carry.bound_step[k, Bound.SLACK] * data.carry.bound_step[k, Bound.IMPULSE]
         w = (r - g * target.share * (data.bound_gap[k] - s)) / s
         data.bound_w[k] = w
         add_limit_impulse(model, data, k, w, data.dnu)
@@ -106,5 +106,5 @@ def recover_limits(model: Model, data: Data, h: float, share: float) -> None:
             )
         else:
             t = model.limit_sign[k] * h * data.dnu[d]
-        data.bound_step[k, Bound.SLACK] = t + share * (data.bound_gap[k] - s)
-        data.bound_step[k, Bound.IMPULSE] = data.bound_w[k] - data.bound[k, Bound.IMPULSE] / s * t
+        data.carry.bound_step[k, Bound.SLACK] = t + share * (data.bound_gap[k] - s)
+        data.carry.bound_step[k, Bound.IMPULSE] = data.bound_w[k] - data.bound[k, Bound.IMPULSE] / s * t

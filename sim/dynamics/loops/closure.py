@@ -103,8 +103,8 @@ def start_loops(model: Model, data: Data, keep: bool) -> None:
     """Force directions couple_B at configuration 2; forces at zero, or those of the step before."""
     direct_loops(model, data)
     if not keep:
-        for row in range(data.couple_force.shape[0]):
-            data.couple_force[row] = 0.0
+        for row in range(data.carry.couple_force.shape[0]):
+            data.carry.couple_force[row] = 0.0
     for row in range(data.couple_step.shape[0]):
         data.couple_step[row] = 0.0
         data.loop_open[row] = abs(data.couple_gap[row])
@@ -126,22 +126,22 @@ def apply_loops(model: Model, data: Data) -> float:
             for c in range(6):
                 data.couple_R[row, c] = data.couple_G[row, c]
                 data.couple_R[row, 6 + c] = -data.couple_G[row, c]
-                data.wrench[a, c] -= data.couple_force[row] * data.couple_B[row, c]
+                data.wrench[a, c] -= data.carry.couple_force[row] * data.couple_B[row, c]
                 if b >= 0:
-                    data.wrench[b, c] += data.couple_force[row] * data.couple_B[row, c]
+                    data.wrench[b, c] += data.carry.couple_force[row] * data.couple_B[row, c]
     return error
 
 
 @optional(Slot.KEEP_LOOPS)
 def keep_loops(model: Model, data: Data) -> None:
     """Remember the loop forces from which the line search starts."""
-    for row in range(data.couple_force.shape[0]):
-        data.couple_trial[row] = data.couple_force[row]
+    for row in range(data.carry.couple_force.shape[0]):
+        data.couple_trial[row] = data.carry.couple_force[row]
 
 
 @optional(Slot.MOVE_LOOPS)
 def move_loops(model: Model, data: Data, alpha: float) -> None:
     """force = kept + alpha step; pairs have none of their own."""
     first = model.coupling_row[model.coupling_body.shape[0] - model.loop_ntrans.shape[0]]
-    for row in range(first, data.couple_force.shape[0]):
-        data.couple_force[row] = data.couple_trial[row] + alpha * data.couple_step[row]
+    for row in range(first, data.carry.couple_force.shape[0]):
+        data.carry.couple_force[row] = data.couple_trial[row] + alpha * data.couple_step[row]

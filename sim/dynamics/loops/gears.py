@@ -36,13 +36,13 @@ def apply_gears(model: Model, data: Data, h: float) -> float:
         data.couple_gap[row] = gap - model.gear_offset[k]
         data.gear_rate[k, 0] = h
         data.gear_rate[k, 1] = -h * model.gear_ratio[k]
-        data.residual[a] -= data.couple_force[row]
-        data.residual[b] += model.gear_ratio[k] * data.couple_force[row]
+        data.residual[a] -= data.carry.couple_force[row]
+        data.residual[b] += model.gear_ratio[k] * data.carry.couple_force[row]
         error = max(error, abs(data.couple_gap[row]))
     if data.bifurcation_count[0] > 0:
         for row in range(gear_row(model, 0)):
             for d in range(data.residual.shape[0]):
-                data.residual[d] -= data.couple_force[row] * data.bifurcation_direction[row, d]
+                data.residual[d] -= data.carry.couple_force[row] * data.bifurcation_direction[row, d]
     return error
 
 

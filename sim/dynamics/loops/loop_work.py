@@ -41,7 +41,7 @@ def _loop_work(model: Model, data: Data) -> float:
         f = (0.0, 0.0, 0.0)
         t = (0.0, 0.0, 0.0)
         for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
-            g = data.couple_force[row]
+            g = data.carry.couple_force[row]
             b = data.couple_B[row]
             f = (f[0] + g * b[0], f[1] + g * b[1], f[2] + g * b[2])
             t = (t[0] + g * b[3], t[1] + g * b[4], t[2] + g * b[5])
@@ -57,7 +57,7 @@ def _closing_work(model: Model, data: Data, tolerance: float) -> float:
     total = 0.0
     pairs = model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
     for row in range(model.coupling_row[pairs], model.coupling_row[model.coupling_body.shape[0]]):
-        total += 2.0 * abs(data.couple_force[row]) * (data.loop_open[row] + abs(data.couple_gap[row]) + tolerance)
+        total += 2.0 * abs(data.carry.couple_force[row]) * (data.loop_open[row] + abs(data.couple_gap[row]) + tolerance)
     for m in range(model.loop_ntrans.shape[0]):
         loop_rows(model, data, m, data.pos3, data.rot3, data.couple_G)
     return total
