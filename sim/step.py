@@ -47,7 +47,7 @@ def step(
     report[4] = -1.0
     if status != Status.SOLVED and r.iterations > 0:
         report[4] = worst_contact(model, data, options.kappa)
-    data.carry.carried_steps[0] = data.carry.carried_steps[0] + 1 if status == Status.SOLVED else 0
+    data.carry.steps[0] = data.carry.steps[0] + 1 if status == Status.SOLVED else 0
     return status
 
 

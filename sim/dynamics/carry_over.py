@@ -17,7 +17,7 @@ _HANDED_ON = 16  # steps until poses are computed from coordinates
 @kernel
 def follows_on(data: Data, q: Vector, v: Vector) -> bool:
     """Whether (q, v) is where the last step of this motion ended, with its configurations still in `data`."""
-    if data.carry.carried_steps[0] == 0:
+    if data.carry.steps[0] == 0:
         return False
     for k in range(q.shape[0]):
         if q[k] != data.theta3[k]:
@@ -110,6 +110,6 @@ def advance(model: Model, data: Data, h: float, q: Vector, v: Vector, before: Ve
                 _axis(model, data, i, d + k, a, data.pos1, data.rot1, data.S1)
                 a = (data.rot2[i, k], data.rot2[i, 3 + k], data.rot2[i, 6 + k])
                 _axis(model, data, i, d + k, a, data.pos2, data.rot2, data.S2)
-    if data.carry.carried_steps[0] % _HANDED_ON == 0:
+    if data.carry.steps[0] % _HANDED_ON == 0:
         tree_poses(model, data, q)
     arriving_momenta(data)

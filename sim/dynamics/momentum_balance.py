@@ -65,7 +65,7 @@ def begin_step(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vect
         advance(model, data, h, q, v, before)
         world_inertia(model, data.rot2, data.inertia_world)
     else:
-        data.carry.carried_steps[0] = 0
+        data.carry.steps[0] = 0
         tree_poses(model, data, q)
         move_back(model, data, h, q, v)
         world_inertia(model, data.rot2, data.inertia_world)

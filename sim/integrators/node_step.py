@@ -118,7 +118,7 @@ def step_mean(
     """out = (q, v25) one step after mean = (q, v15); the Status. Iterations are added up, the rest is the largest."""
     nq = data.theta1.shape[0]
     iterations, residual, violation = report[1], report[2], report[3]
-    follows = data.carry.carried_steps[0] > 0
+    follows = data.carry.steps[0] > 0
     status = step(model, data, options, mean, u, Guess(mean[nq:], follows), out, report)
     report[1] += iterations
     report[2], report[3] = max(report[2], residual), max(report[3], violation)

@@ -88,7 +88,7 @@ def options_of(data: Data, settings: Vector, begins: bool) -> StepOptions:
 def begin(data: Data) -> None:
     """Forget the motion before."""
     carry = data.carry
-    carry.carried_steps[0] = 0
+    carry.steps[0] = 0
     carry.ways_known[0] = 0
     carry.inactive_kappa[0] = 0.0
     clear(carry.cone_step)

@@ -148,7 +148,7 @@ def advance(model: Model, data: Data, h: float, u: Vector, x: Vector, tangents: 
 @kernel
 def _stands_at(data: Data, x: Vector) -> bool:
     """Whether x is where the last step of this motion ended, with its evaluation still in `data`."""
-    if data.carry.carried_steps[0] == 0:
+    if data.carry.steps[0] == 0:
         return False
     nq = data.theta1.shape[0]
     for k in range(nq):
@@ -176,7 +176,7 @@ def step_by_stages(
     copy_vector(x, out)
     status = advance(model, data, options.h, u, out, None)
     report[0], report[1], report[2], report[3], report[4] = status, model.stage_b.shape[0], 0.0, 0.0, -1.0
-    data.carry.carried_steps[0] = data.carry.carried_steps[0] + 1 if status == _SOLVED else 0
+    data.carry.steps[0] = data.carry.steps[0] + 1 if status == _SOLVED else 0
     return status
 
 

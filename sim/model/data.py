@@ -10,7 +10,7 @@ from solvers.types import IntegerMatrix, Integers, Matrix, Vector
 class Carry(NamedTuple):
     """State between the steps of a motion; a new motion clears all of it."""
 
-    carried_steps: Integers  # (1,) steps of this motion, 0 where configurations have to be computed, see carry_over.py
+    steps: Integers  # (1,) steps of this motion, 0 where configurations have to be computed, see carry_over.py
     ways_known: Integers  # (1,) whether pair_clear and body_way are those of this motion
     external: Matrix  # (nbody, 6) external force at the centre of mass and torque in this step, world axes [N, N m]
     inactive_kappa: Vector  # (1,) kappa of the impulses of inactive contacts, 0 where none are known
@@ -24,7 +24,7 @@ class Data(NamedTuple):
     """Scratch of one step, allocated once per thread by `Simulator`; also holds intermediate results for derivatives.
 
     The end of a step stays in configuration 3 and `nu`, its impulses in `cone` and `bound`: a step uses them again only
-    if it continues a motion, as `carry.carried_steps` and `Guess.impulses` say.
+    if it continues a motion, as `carry.steps` and `Guess.impulses` say.
     """
 
     carry: Carry

@@ -36,7 +36,7 @@ _ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were n
 def loops_regular(model: Model, data: Data) -> bool:
     """Whether the last step of this motion was far from a bifurcation; clears its pivot and directions."""
     data.bifurcation_count[0] = 0
-    if data.carry.carried_steps[0] == 0:
+    if data.carry.steps[0] == 0:
         data.couple_rank[CoupleRank.DEFICIENCY] = 1e300
         return False
     deficiency = data.couple_rank[CoupleRank.SIZE] - data.couple_rank[CoupleRank.RANK]
