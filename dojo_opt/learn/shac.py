@@ -255,7 +255,7 @@ class _Shac(Training):
         p = self.policy
         return LearnedPolicy(p.network, p.weights.copy(), *self._scale(self.statistics), self.task)
 
-    _NUMBERS = (*Training._NUMBERS, "seed")
+    NUMBERS = (*Training.NUMBERS, "seed")
 
     def arrays(self) -> dict[str, Floats]:
         """As Training.arrays, with rows, values, statistics and the moments of Adam."""

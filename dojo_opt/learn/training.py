@@ -30,7 +30,7 @@ class Training:
     policy: LearnedPolicy  # moves in place
     chosen: LearnedPolicy  # the best so far
 
-    _NUMBERS: tuple[str, ...] = ("epoch", "steps", "unsolved", "infinite", "best")
+    NUMBERS: tuple[str, ...] = ("epoch", "steps", "unsolved", "infinite", "best")
 
     def __init__(self, task: Task, options: Any, seed: int) -> None:
         self.task, self.options, self.seed = task, options, seed
@@ -72,13 +72,13 @@ class Training:
 
     def state(self) -> dict[str, Any]:
         """All that `resume` needs."""
-        numbers = {name: getattr(self, name) for name in self._NUMBERS}
+        numbers = {name: getattr(self, name) for name in self.NUMBERS}
         arrays = {name: array.copy() for name, array in self.arrays().items()}
         return {**numbers, **arrays, "rng": self.rng.bit_generator.state}
 
     def resume(self, learned: Learned) -> None:
         """Go on where a run ended."""
-        for name in self._NUMBERS:
+        for name in self.NUMBERS:
             setattr(self, name, learned.state[name])
         for name, array in self.arrays().items():
             array[...] = learned.state[name]

@@ -173,14 +173,14 @@ class PairBound(IntEnum):
 
 
 class PairShare(IntEnum):
-    """pair_share: the part w of the impulse of a pair that acts within a reach (pairs/reach.py)."""
+    """pair_share: the part w of the impulse of a pair that acts within a reach (pairs/limited_reach.py)."""
 
     PART = 0
     RATE = 1  # d(log w)/d(gap)
 
 
 class Way(IntEnum):
-    """body_way: how far points of a body with collisions have moved, at most (pairs/reach.py)."""
+    """body_way: how far points of a body with collisions have moved, at most (pairs/limited_reach.py)."""
 
     BEFORE = 0  # since the motion began, along the configurations where steps began
     AHEAD = 1  # in this step, if it is like the one before

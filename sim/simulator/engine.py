@@ -326,6 +326,10 @@ class Engine:
         """None: this engine refuses steps that it cannot solve. See dividing_engine.py."""
         return None
 
+    def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Vector) -> Floats:
+        """(n, nx) states at any times of a motion; only engines with an accuracy have them."""
+        raise NotImplementedError
+
     def whole(self) -> Engine:
         """The engine that refuses steps which it cannot solve as a whole."""
         return self

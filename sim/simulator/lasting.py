@@ -10,10 +10,10 @@ from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 
 
-def lasting(sim: Any, us: Any, steps: int | None, duration: float) -> tuple[Any, int]:
+def lasting(sim: Any, kappa: float | None, us: Any, steps: int | None, duration: float) -> tuple[Any, int]:
     """(simulator, number of its steps) of a rollout of so many seconds: of one step for each input, or of `steps`.
 
-    sim: a Simulator.
+    sim: a Simulator; kappa: the one it was given, None for that of its time step.
     Contacts press with the same force kappa/(h gap), whatever the step h.
     """
     call = "Simulator.rollout(duration=...)"
@@ -22,5 +22,4 @@ def lasting(sim: Any, us: Any, steps: int | None, duration: float) -> tuple[Any,
     seconds = checks.number(call, duration, above=0.0)
     count = len(np.asarray(us)) if steps is None and us is not None and not callable(us) else steps
     h = seconds / whole_number("Simulator.rollout(steps=...)", 1 if count is None else count)
-    given = sim._given()["kappa"]
-    return sim.replace(time_step=h, kappa=None if given is None else given * h / sim.time_step), round(seconds / h)
+    return sim.replace(time_step=h, kappa=None if kappa is None else kappa * h / sim.time_step), round(seconds / h)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.contact.collision.witness import ABSENT
-from sim.contact.pairs.reach import BEYOND
+from sim.contact.pairs.limited_reach import BEYOND
 from sim.integrators.feedback import Path
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr, drawn
@@ -320,7 +320,7 @@ class Trajectory(Result):
         asked = checks.array("Trajectory.at(times)", times, ("n",))
         if np.any(asked < 0.0) or np.any(asked > self.time[-1] * (1.0 + 1e-12)):
             raise ValueError(f"Trajectory.at(times): expected times from 0 to {self.time[-1]:g} s, got {times!r}")
-        return np.asarray(self.simulator._engine.nodes_at((self.x, self.u, self.wrenches), asked))
+        return np.asarray(self.simulator.nodes_at((self.x, self.u, self.wrenches), asked))
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite
@@ -57,15 +57,16 @@ def _is_row(values: Any, size: int) -> bool:
 class RowModels:
     """Engines by values of parameters; those of the last rows are kept."""
 
-    def __init__(self, simulator: Any) -> None:
-        self._simulator = simulator
+    def __init__(self, own: Engine, size: Callable[[str], int], make: Callable[[dict[str, Floats]], Engine]) -> None:
+        """own: engine of rows without values; size: of a parameter; make: the engine of values."""
+        self._own, self._size_of, self._make = own, size, make
         self._kept: OrderedDict[bytes, Engine] = OrderedDict()
         self._sizes: dict[str, int] = {}
 
     def of(self, call: str, parameters: Mapping[str, ArrayLike] | None, count: int) -> tuple[list[Engine], Integers]:
         """Distinct engines, and which of them each of `count` rows has."""
         if not parameters:
-            return [self._simulator._engine], np.zeros(count, dtype=np.int64)
+            return [self._own], np.zeros(count, dtype=np.int64)
         sizes = {name: self._size(name) for name in parameters}
         columns = [self._columns(call, name, values, count) for name, values in parameters.items()]
         shared = all(len(column) == 1 for column in columns)
@@ -79,7 +80,7 @@ class RowModels:
             key = repr(tuple(sizes)).encode() + row.tobytes()
             if key not in self._kept:
                 own = {name: row[a:b] for name, a, b in zip(sizes, bounds[:-1], bounds[1:], strict=True)}
-                self._kept[key] = self._simulator.with_parameters(own)._engine
+                self._kept[key] = self._make(own)
             self._kept.move_to_end(key)
             engines.append(self._kept[key])
         while len(self._kept) > max(_KEPT, len(rows)):
@@ -103,7 +104,7 @@ class RowModels:
     def _size(self, name: str) -> int:
         """Number of components of a parameter."""
         if name not in self._sizes:
-            self._sizes[name] = len(self._simulator.parameters((name,)).values)
+            self._sizes[name] = self._size_of(name)
         return self._sizes[name]
 
 
@@ -378,4 +379,9 @@ class RowStepping(StateSpace):
     @cached_property
     def _row_models(self) -> RowModels:
         """Models of rows with other parameters."""
-        return RowModels(self)
+        simulator: Any = self
+        return RowModels(
+            self._engine,
+            lambda name: len(self.parameters((name,)).values),
+            lambda values: simulator.with_parameters(values)._engine,
+        )

@@ -199,7 +199,7 @@ class Simulator(RowStepping):
             Trajectory of the solved steps.
         """
         if duration is not None:
-            sim, steps = lasting(self, us, steps, duration)
+            sim, steps = lasting(self, self._kappa, us, steps, duration)
             return sim.rollout(x, us, steps=steps, throw=throw, wrenches=wrenches)
         state = self._arguments.state("rollout", x)
         if callable(us):

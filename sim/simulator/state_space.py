@@ -416,3 +416,15 @@ class StateSpace:
             momenta = self._engine.momenta(xs)
         p = self._arguments.finite("momentum(x)", momenta, xs).reshape(*lead, 6)
         return p[..., :3].copy(), p[..., 3:].copy()
+
+    def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Floats) -> Floats:
+        """States at any times of a motion of a simulator with an accuracy; `Trajectory.at` checks its arguments.
+
+        Args:
+            motion: states (T + 1, nx), inputs (T, nu), external wrenches (T, nbody, 6) or None.
+            times: (n,) since its beginning [s].
+
+        Returns:
+            States (n, nx).
+        """
+        return self._engine.nodes_at(motion, times)

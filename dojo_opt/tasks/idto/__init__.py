@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 from dojo_opt.tasks.idto.acrobot import acrobot
 from dojo_opt.tasks.idto.allegro import allegro
-from dojo_opt.tasks.idto.hopper import hopper
 from dojo_opt.tasks.idto.jaco_ball import jaco_ball
 from dojo_opt.tasks.idto.mini_cheetah import mini_cheetah
+from dojo_opt.tasks.idto.planar_hopper import hopper
 from dojo_opt.tasks.idto.spinner import spinner
 from sim.mechanism.checks import nearest
 

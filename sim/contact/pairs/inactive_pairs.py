@@ -22,9 +22,7 @@ from sim.contact.collision.edge_axes import OPEN
 from sim.contact.contact_law import contact_impulse, start_contact
 from sim.contact.inactive_bounds import ANGLE
 from sim.contact.pairs.active_features import choose_shapes, distance, open_pairs
-from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, point_kinematics
-from sim.contact.pairs.pair_pose import place_shapes
-from sim.contact.pairs.reach import (
+from sim.contact.pairs.limited_reach import (
     FAR,
     end_of,
     enlist_near,
@@ -36,6 +34,8 @@ from sim.contact.pairs.reach import (
     sort_pairs,
     stay_beyond,
 )
+from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, point_kinematics
+from sim.contact.pairs.pair_pose import place_shapes
 from sim.dynamics.displacements import third_quaternion
 from sim.model.columns import PairBound, RelativePose, Witness
 from sim.model.data import Data
@@ -44,7 +44,7 @@ from sim.model.options import StepOptions
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 
-_STEEPEST = 3.75  # reaches times the largest rate of the part that acts (reach.py)
+_STEEPEST = 3.75  # reaches times the largest rate of the part that acts (limited_reach.py)
 COUPLED = 1e-2  # largest sum of e over the inactive collisions of a body
 
 

@@ -18,8 +18,8 @@ from math import cos, sin
 from sim.contact.collision.collide import collide_chosen
 from sim.contact.pairs.active_features import choose_shapes
 from sim.contact.pairs.cylinder_pairs import collide_cylinders, on_cylinder
+from sim.contact.pairs.limited_reach import fit_share
 from sim.contact.pairs.pair_pose import place_shapes
-from sim.contact.pairs.reach import fit_share
 from sim.contact.pairs.string import is_taut, pull_from_before, string_arm
 from sim.model.columns import Kin, PairFrame, PairShare, Witness
 from sim.model.data import Data
@@ -180,7 +180,7 @@ def gap_normal(model: Model, data: Data, j: int) -> Vec3:
 
 @kernel
 def pair_force(data: Data, j: int, fn: float, f1: float, f2: float) -> Vec3:
-    """w (n fn + t1 f1 + t2 f2), w the part that acts within the reach of the collision (reach.py)."""
+    """w (n fn + t1 f1 + t2 f2), w the part that acts within the reach of the collision (limited_reach.py)."""
     w = data.pair_share[j, PairShare.PART]
     return transposed_times(data.pair_frame[j], w * fn, w * f1, w * f2)
 

@@ -16,9 +16,9 @@ Taut strings pass through nothing.
 from __future__ import annotations
 
 from sim.contact.contact_law import contact_impulse
+from sim.contact.pairs.limited_reach import end_of
 from sim.contact.pairs.pair_contact import is_absent, pair_arm, pair_force
 from sim.contact.pairs.previous_features import least_size, overlap_before, rounding_of_rims
-from sim.contact.pairs.reach import end_of
 from sim.contact.pairs.string import is_taut
 from sim.contact.restitution import impulse_work
 from sim.dynamics.energy import twice_kinetic

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sim.contact.contact_law import report_contact
+from sim.contact.pairs.limited_reach import BEYOND, end_of
 from sim.contact.pairs.pair_contact import is_absent
-from sim.contact.pairs.reach import BEYOND, end_of
 from sim.model.columns import PairShare, Witness
 from sim.model.data import Data
 from sim.model.model import Model

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from sim.contact.contact_law import condense_contact, contact_constant, contact_error, contact_impulse
 from sim.contact.pairs.inactive_pairs import add_inactive_pairs
+from sim.contact.pairs.limited_reach import with_share
 from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
 from sim.contact.pairs.pair_jacobian import pair_jacobian
-from sim.contact.pairs.reach import with_share
 from sim.contact.pairs.string import is_taut
 from sim.contact.pairs.string_stiffness import add_string_stiffness, add_string_turn
 from sim.contact.pairs.wrench_columns import add_wrench_column, centre_shift, point_shift, unit_vector

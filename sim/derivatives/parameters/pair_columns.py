@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from sim.contact.collision.witness import NOWHERE, dot
 from sim.contact.contact_law import contact_impulse
+from sim.contact.pairs.limited_reach import with_share
 from sim.contact.pairs.pair_contact import POLE, is_absent, pair_force, shape_b
-from sim.contact.pairs.reach import with_share
 from sim.contact.pairs.string import is_taut
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.contact_columns import add_pair, floor_change, impulse_change, is_active, turning
