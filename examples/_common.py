@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# MuJoCo beside ours, from benchmarks/; behind what is installed, so that an installed dojo_opt is the one that runs
+# MuJoCo beside ours, from benchmarks/; behind installed packages, so that an installed dojo_opt is the one that runs
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
 QUICK = "--quick" in sys.argv[1:]  # used by the tests: the same claim, less of it

@@ -1,9 +1,9 @@
 """A chaser in free fall closes two jaws on a tumbling piece of debris: contact between bodies, and no ground.
 
-python examples/debris.py        prints what is conserved, writes debris.png
+python examples/debris.py        prints conserved quantities, writes debris.png
 
 Captured: relative to the chaser, the debris ends with less than a thousandth of the speed and spin it came with.
-Nothing acts from outside: what the debris loses of its momentum the chaser gains, to the tolerance of the steps.
+Nothing acts from outside: the chaser gains the momentum that the debris loses, to the tolerance of the steps.
 """
 
 import numpy as np

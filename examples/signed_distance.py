@@ -1,4 +1,4 @@
-"""Drop, push and slide an object that is known as a density alone, and fit its friction to what was seen.
+"""Drop, push and slide an object that is known as a density alone, and fit its friction to the measured motion.
 
 python examples/signed_distance.py        prints the motion and the fit, writes signed_distance.png
 """

@@ -2,7 +2,7 @@
 
     min over theta and the starts s_k    sum_k sum_t rho(|r_kt|^2) + max(1, rms^2) sum_i ((theta_i - m_i)/s_i)^2
 
-with r of windows.py, and what is known beforehand of some parameters, m_i +- s_i. Models err more than the noise says:
+with r of windows.py, and prior knowledge of some parameters, m_i +- s_i. Models err more than the noise says:
 the mean square of the errors, rms^2, is by how much, and the data count that much less.
 
 Starts are eliminated window by window (Schur complement), so the work grows with the data and not with its square. rho
@@ -124,7 +124,7 @@ class Identified:
 
 
 class Prior:
-    """What is known of parameters before: independent and normal.
+    """Prior knowledge of parameters: independent and normal.
 
     mean (n,); precision (n,) the inverse of the variance, 0 where nothing is known
     """
@@ -197,7 +197,7 @@ class _Fit:
     def system(
         self, found: list[WindowErrors], weights: list[Floats], damping: float
     ) -> tuple[Floats, Floats, list[Any]]:
-        """(matrix, right side) of the parameters over their units, and what the starts need to follow."""
+        """(matrix, right side) of the parameters over their units, and the terms from which the starts follow."""
         n, kept = len(self.theta), []
         H, g = np.zeros((n, n)), np.zeros(n)
         for w, weight in zip(found, weights, strict=True):
@@ -289,7 +289,7 @@ def identify(
         prior: {name: deviation} or {name: (mean, deviation)} of parameters, of which more is known than bounds: from a
             ruler, scales, a data sheet. A name covers all its components; the mean is that of `sim` by default, or one
             number or one for each component. Few motions determine few parameters; the rest stay at their priors.
-        noise: standard deviation of the measurement of a state, one or (ndx,); infinite for what is not measured.
+        noise: standard deviation of the measurement of a state, one or (ndx,); infinite where there is none.
         **options: fields of `IdentifyOptions`.
 
     Returns:

@@ -1,4 +1,4 @@
-"""imitate: a policy that does what plans do, their feedback included.
+"""imitate: a policy that repeats plans, their feedback included.
 
     min over weights    mean over knots t, and displacements d ~ N(0, spread^2) of states, of
                         |a(x_t (+) d) - a_t - G_t d|^2,    G_t = K_t over half the range of inputs

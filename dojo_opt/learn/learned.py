@@ -128,7 +128,7 @@ class Learned:
 
         Args:
             path: of the file.
-            task: what was learnt (default None).
+            task: the task that it has learnt (default None).
 
         Returns:
             The run.

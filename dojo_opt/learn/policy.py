@@ -167,7 +167,7 @@ class LearnedPolicy:
 
         Args:
             path: of the file.
-            task: what the policy is for (default None).
+            task: the task of the policy (default None).
 
         Returns:
             The policy.

@@ -71,7 +71,7 @@ class PolicyGradient:
 
 
 class PolicyRollout:
-    """A rollout (T steps, n rows), and what its derivatives need.
+    """A rollout (T steps, n rows), and the buffers of its derivatives.
 
     x            (T + 1, n, nx) states; where a row started anew, its new state
     after        (T, n, nx) states after each step

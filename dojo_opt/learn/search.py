@@ -204,7 +204,7 @@ class RandomSearch(WeightSearch):
 
     @cached_property
     def shared(self) -> Shared:
-        """What every worker needs."""
+        """Data of every worker."""
         return Shared((self.task, self.models))
 
 
@@ -240,7 +240,7 @@ def ars(
     """Augmented random search, without derivatives: see the module, and `RandomSearchOptions` for the options.
 
     Args:
-        task: what to learn.
+        task: the task to learn.
         seed: of all random numbers; the same seed gives the same policy, to the last bit.
         resume: a run to go on with, of the same task, seed and options.
         executor: anything with the interface of `concurrent.futures.Executor`, as for `dojo.monte_carlo`; its workers
@@ -261,7 +261,7 @@ def gradient_search(task: Task, *, seed: int = 0, resume: Learned | None = None,
     """Ascend the gradient of the return of whole episodes: see the module, and `GradientSearchOptions`.
 
     Args:
-        task: what to learn.
+        task: the task to learn.
         seed: of all random numbers; the same seed gives the same policy, to the last bit.
         resume: a run to go on with, of the same task, seed and options.
         **options: fields of `GradientSearchOptions`.

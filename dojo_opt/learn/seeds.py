@@ -31,7 +31,7 @@ def seeds(
 
     Args:
         algorithm: `shac`, `ars`, `gradient_search`, or another function of (task, seed=, **options).
-        task: what to learn.
+        task: the task to learn.
         numbers: seeds (default 0 to 4).
         executor: anything with the interface of `concurrent.futures.Executor`, as for `dojo.monte_carlo` (default None:
             one run after the other).
@@ -90,7 +90,7 @@ def best_of(
 
     Args:
         algorithm: `shac`, `ars` or `gradient_search`.
-        task: what to learn.
+        task: the task to learn.
         numbers: seeds (default 0 to 2).
         epochs: of the run that goes on.
         share: of these epochs after which it is chosen (default 0.2).

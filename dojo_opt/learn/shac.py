@@ -59,7 +59,7 @@ class ShacOptions:
         norm: largest length of the gradient (default 1).
         costate: largest length of the costate of a row; longer ones are shortened and counted (default 100).
         saturation: cost of outputs y of the network beyond 1.5, this times (|y| - 1.5)^2 in each step: squashed to
-            actions of nearly 1, they have hardly a derivative, and what a policy does there it can no longer unlearn
+            actions of nearly 1, they have hardly a derivative, and a policy cannot unlearn an action there
             (default 0).
         deviation: first and last standard deviation of the noise of actions, before they are squashed (default .4, .3).
         passes: passes of the critic over the data of an epoch (default 4).
@@ -277,7 +277,7 @@ def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options:
     """Learn a policy with the derivatives of the simulator: see the module, and `ShacOptions` for the options.
 
     Args:
-        task: what to learn.
+        task: the task to learn.
         seed: of all random numbers; the same seed gives the same policy, to the last bit, on any number of cores.
         resume: a run to go on with, of the same task, seed and options: epochs that are done are not done again.
         **options: fields of `ShacOptions`; by default those of `task.settings`.

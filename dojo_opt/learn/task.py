@@ -1,4 +1,4 @@
-"""Task: what a policy is to do, as compiled functions of states and actions, and its motion in batches."""
+"""Task: the aim of a policy, as compiled functions of states and actions, and its motion in batches."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def _loop(make: Callable[..., Any], *functions: Callable[..., Any]) -> Any:
 
 @dataclass(frozen=True)
 class Task:
-    """What a policy observes, what it is rewarded for, and when an episode ends. Actions are in [-1, 1].
+    """The observations and the reward of a policy, and the ends of episodes. Actions are in [-1, 1].
 
     The functions are compiled, as by `dojo.kernel`, and differentiated by central differences on the manifold of
     states; they must not write into their arguments other than `out`. With a command, such as a velocity to keep, the
@@ -163,7 +163,7 @@ class Task:
         name: its name (default "task").
         survival_probability: function of x with a smooth probability, from 0 to 1, that the episode goes on there: near
             1 in safe states, small where `terminated` says that it ends. Where an episode ends is not differentiable:
-            `shac` learns in its place that what follows x counts times this probability (default None: 1 or 0).
+            `shac` learns in its place that rewards after x count times this probability (default None: 1 or 0).
         commands: number of entries of a command (default 0).
         command: function of a generator that draws a command (commands,) (default None).
         hold: actions after which a command is drawn anew (default None: never; random search does not, either).
@@ -323,7 +323,7 @@ class Task:
         return out
 
     def judge(self, x: Floats, action: Floats, after: Floats) -> tuple[Floats, float, bool]:
-        """What follows from one action: (observation (no,), reward, whether the episode ends).
+        """The outcome of one action: (observation (no,), reward, whether the episode ends).
 
         Args:
             x: (nx,) state.

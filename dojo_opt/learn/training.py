@@ -17,10 +17,10 @@ Floats = NDArray[np.float64]
 
 
 class Training:
-    """What all algorithms keep; a subclass sets `policy` and `chosen`, and has `train`, which makes one epoch.
+    """The state of all algorithms; a subclass sets `policy` and `chosen`, and has `train`, which makes one epoch.
 
     Args:
-        task: what to learn.
+        task: the task to learn.
         options: settings of the algorithm.
         seed: of all random numbers.
     """

@@ -73,7 +73,7 @@ def _observation(nq: int, home: tuple[float, ...]) -> Callable[..., Any]:
 
 
 def _reward(nq: int, height: float) -> Callable[..., Any]:
-    """Minus smooth distances from the command, what a trunk should not do, and effort."""
+    """Minus smooth distances from the command, unwanted motion of the trunk, and effort."""
     width = _WIDTH
 
     def reward(x, a, after):  # type: ignore[no-untyped-def]

@@ -12,7 +12,7 @@ __all__ = ["check_executor", "results_in_order"]
 
 
 def check_executor(call: str, executor: Any) -> None:
-    """Refuse what has no submit(); None is no executor."""
+    """Refuse objects without submit(); None is no executor."""
     if executor is not None and not hasattr(executor, "submit"):
         raise TypeError(f"{call}(executor=...): expected an Executor, with submit(), got {executor!r}")
 

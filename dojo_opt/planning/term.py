@@ -80,7 +80,7 @@ class Term:
         self._add(xs, us, g, H)
 
     def entry_name(self, sim: Any, entry: int) -> str:
-        """What an entry of the residual is about."""
+        """The subject of an entry of the residual, in words."""
         return f"entry {entry}" if self.columns is None else component_name(sim, int(self.columns[entry]))
 
     def at_kappa(self, kappa: float | None) -> None:

@@ -1,4 +1,4 @@
-"""SuiteTask: a task of a published suite: controller, plant, starts, and what counts as success."""
+"""SuiteTask: a task of a published suite: controller, plant, starts, and the criterion of success."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Vector = NDArray[np.float64]
 
 __all__ = ["TaskOutcome", "SuiteTask", "held", "lifted", "quadratic", "servo_effort", "timed"]
 
-_CLEAR = 1e-6  # [m] between a lifted start and what it was inside of
+_CLEAR = 1e-6  # [m] between a lifted start and the obstacle around it
 _RAISED = 3  # times that a start is lifted: the coordinate may raise the deepest contact by less than its own change
 
 
@@ -33,7 +33,7 @@ class TaskOutcome(NamedTuple):
     """How a run of a task ended.
 
     Attributes:
-        success: whether it lasted to its end and did what the task asks for.
+        success: whether it lasted to its end and achieved the aim of the task.
         measures: numbers that decide it, by name with unit.
         median: median of the processor times of the ticks [ms].
         late: 99th percentile of them [ms].

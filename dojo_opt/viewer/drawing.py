@@ -1,4 +1,4 @@
-"""What is drawn of a body: its visuals with their colours, or its shapes, and bones between its joints."""
+"""The drawing of a body: its visuals with their colours, or its shapes, and bones between its joints."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 TRIANGLES = 36_000  # of a picture at most: about 2 MB of a page
 _FINEST, _COARSER = 500.0, 1.4  # cells along the longest side of the robot, and the growth of a cell
 _BONE = 0.025  # radius of a bone over the size of the robot
-_DOT = 0.02  # [m] radius of what has no extent
+_DOT = 0.02  # [m] radius of points
 
 
 class Piece(NamedTuple):
@@ -34,7 +34,7 @@ class Piece(NamedTuple):
 
 
 def pieces(mech: Mechanism) -> dict[str, list[Piece]]:
-    """By body, and for the world, what is drawn of it."""
+    """The drawings by body, and that of the world."""
     out: dict[str, list[Piece]] = {}
     bones = _bones(mech)
     for body in mech.bodies:
@@ -89,7 +89,7 @@ def _lighter(found: dict[str, list[Piece]]) -> dict[str, list[Piece]]:
 def _bones(mech: Mechanism) -> dict[str, list[Solid]]:
     """Rods from the joint that carries a body, or its centre of mass, to the joints that it carries.
 
-    What slides carries the rod on which it does, as long as it is in the neutral state.
+    A body that slides carries its rod, as long as it is in the neutral state.
     """
     ends: dict[str, list[Floats]] = {body.name: [] for body in mech.bodies}
     for joint in (*mech.joints, *mech.loops):

@@ -48,7 +48,7 @@ class Motion:
 
     @cached_property
     def pieces(self) -> dict[str, list[Piece]]:
-        """What is drawn of every body."""
+        """The drawing of every body."""
         return pieces(self.mechanism)
 
     __repr__ = brief_repr

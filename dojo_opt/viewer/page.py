@@ -88,9 +88,9 @@ track();
 
 
 def _path(m: Motion) -> tuple[Array, float]:
-    """Where the middle of what moves is at even times (n, 3), and its radius [m].
+    """The middle of the moving parts at even times (n, 3), and their radius [m].
 
-    What stays within a radius in one direction is looked at with a camera that does not move in that direction.
+    The camera does not move in a direction in which the parts stay within a radius.
     """
     turn = [rotation_matrix(q) for q in m.quaternion[0]]
     points = np.concatenate(

@@ -34,13 +34,13 @@ def add_show(commands: Any) -> None:
         nargs="+",
         metavar="LINK",
         help="links of ROBOT.urdf that touch the ground, LINK=RADIUS for a ball about a link's origin [m]; of a model, "
-        "feet or all (all is what --drop takes where a model has it)",
+        "feet or all (all by default with --drop, where a model has it)",
     )
     parser.add_argument(
         "--meshes",
         choices=("hull", "decompose", "sphere", "box", "capsule", "none"),
         default="hull",
-        help="what stands for the collision meshes of ROBOT.urdf, hull by default",
+        help="shapes in place of the collision meshes of ROBOT.urdf, hull by default",
     )
     parser.add_argument(
         "--seconds", type=float, default=2.0, metavar="S", help="length of the motion [s], 2 by default"

@@ -1,4 +1,4 @@
-"""Videos and pictures of a motion: what the page of `save_html` shows, drawn by a browser without a window."""
+"""Videos and pictures of a motion: the page of `save_html`, drawn by a browser without a window."""
 
 from __future__ import annotations
 

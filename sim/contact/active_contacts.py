@@ -1,7 +1,7 @@
 """All active contacts of a step at once, those of pairs included: one kernel per operation of the interior point.
 
 Every kernel here is optional: a scene with joint limits alone compiles none of them, nor anything below them. An empty
-slot returns what a sum over no contact would. Inactive contacts (inactive.py) have no part in the variables and the
+slot returns the sum over no contact. Inactive contacts (inactive.py) have no part in the variables and the
 matrix of the interior point; they only add their impulses.
 """
 

@@ -118,8 +118,8 @@ def next_length(h: float, ratio: float, before: float, order: float) -> float:
 
 @kernel
 def _allows(clock: Vector, h: float, shortest: float, ratio: float) -> bool:
-    """Whether a solved step of order 2 is kept. Steps on kinks, and those beyond what cannot be solved, count as such:
-    after a rebound there is no kink, for the velocity stays wrong.
+    """Whether a solved step of order 2 is kept. A step on a kink has a larger allowance, and so has one across lengths
+    that have no solution; after a rebound there is no kink, for the velocity stays wrong.
     """
     error = ratio * h  # in accuracies
     sudden = _SUDDEN * h < clock[Clock.RECENT] and clock[Clock.LEAST] > 0.0
@@ -157,7 +157,7 @@ def take_short(
         clock[Clock.BEYOND] = 1.7 * h
         failed = _TOLERANCE_STEP if status == _SOLVED or status == LANDS else status
         return _SOLVED if h < rest else failed
-    if status == _SOLVED and clock[Clock.HIT] > 0.0:  # its error is h times what is left of the accuracy for it
+    if status == _SOLVED and clock[Clock.HIT] > 0.0:  # its error is h times the rest of the accuracy for it
         shorten_impact(clock, h, max(h * min(0.5, max(0.01, 0.8 * _KINK / (ratio * h))), shortest))
     elif status == _SOLVED:
         clock[Clock.SHORT] = max(min(next_length(h, ratio, 1.0, 2.0), 0.9 * h), shortest)

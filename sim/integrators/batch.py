@@ -17,7 +17,7 @@ _SOLVED = int(Status.SOLVED)
 
 
 class RowTables(NamedTuple):
-    """What differs between the rows of a batch."""
+    """Models, scratch and settings of the rows of a batch."""
 
     models: Table  # (n, ...) tables of their Models
     scratch: Table  # (n, ...) tables of their Data; rows of one chunk may share one

@@ -21,7 +21,7 @@ _SOLVED = int(Status.SOLVED)
 _TOUCHING = 0.125  # gap of a contact that closes, in accuracies
 _PRESSED = 8.0
 _NOISE = 1e-10  # [m, rad] error that is not seen: the gap of a contact on the central path is as exact
-_OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes what is deeper, whatever its length
+_OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes deeper ones, whatever its length
 _AHEAD = 1e-3  # [s] least length of the steps behind an impact whose velocities are compared
 
 
@@ -71,7 +71,7 @@ def _difference(
 
     v, v': after an impact, as means of another step, in which the ground has acted. Without an impact these do not
     count: they are as different as the gap of a contact is, over the length of the step.
-    t: what is left of the stretch, at least half a second: for so long an error of the velocity goes on.
+    t: the rest of the stretch, at least half a second: for so long an error of the velocity goes on.
     """
     model, data = model_view(model_at), data_view(data_at)
     nq, hits = data.theta1.shape[0], line.clock[Clock.HIT] > 0.0

@@ -24,7 +24,7 @@ _HIT = 1e2  # [m/s^2, rad/s^2] of impacts at least
 
 
 class Landing(NamedTuple):
-    """What a step reaches."""
+    """The first contact or limit that a step reaches."""
 
     error: float  # [m, rad] that it makes
     ahead: float  # [s] until the first contact or limit is reached
@@ -68,8 +68,8 @@ def landing(
 ) -> Landing:  # fmt: skip
     """The Landing of the step just solved, which began at mean = (q, v15); configuration 3 is used up.
 
-    Its error is twice the gap at the beginning, or what the jump of velocity makes in the time of the step: that by
-    more than twice the impulse kappa/gap which was there before. Contacts that land have no slip before.
+    Its error is twice the gap at the beginning, or the way of the velocity's jump in the time of the step: the jump by more
+    than twice the impulse kappa/gap of the step before. Contacts that land have no slip before.
     """
     h, nq = options.h, data.theta1.shape[0]
     error, ahead, longest, depth, hits = 0.0, NEVER, NEVER, 0.0, False

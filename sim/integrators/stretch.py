@@ -1,4 +1,4 @@
-"""Stretch: a motion under one input, divided into sub-steps, and what it knows of those to come."""
+"""Stretch: a motion under one input, divided into sub-steps, with the lengths to try next."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""ContactChoices: what all contacts of a file share, by the arguments of its loader."""
+"""ContactChoices: properties that all contacts of a file share, from the arguments of its loader."""
 
 from __future__ import annotations
 

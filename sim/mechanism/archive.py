@@ -81,7 +81,7 @@ def packed_part(value: Any, arrays: Arrays) -> Any:
 
 
 def part_of(data: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
-    """What `packed_part` packed; lists come back as tuples.
+    """The inverse of `packed_part`; lists come back as tuples.
 
     Args:
         data: numbers, texts, lists and tables.

@@ -50,7 +50,7 @@ def _plain(values: Iterable[Any]) -> bool:
 def drawn(result: Any) -> str:
     """HTML for a notebook: the animation of a motion; "" where the drawing is not installed, or has nothing to draw.
 
-    Drawing is looked up by name: what is simulated does not depend on it.
+    Drawing is looked up by name: the simulation does not depend on it.
     """
     try:
         inline = import_module("dojo_opt.viewer.inline")

@@ -277,7 +277,7 @@ class Mechanism:
         return replace(self, collisions=[*self.collisions, *collisions])
 
     def self_collisions(self) -> tuple[list[Collision], list[str]]:
-        """What `collisions="self"` stands for: all pairs of shapes of bodies that no joint connects.
+        """The pairs of `collisions="self"`: all of shapes of bodies that no joint connects.
 
         Returns:
             (the collisions, the names of the pairs that overlap in the neutral state and are left out).
@@ -467,7 +467,7 @@ def _moved_obstacle(collision: Collision, point: Floats, quat: Floats) -> Collis
 
 
 def _moved_visual(visual: Visual, point: Floats, quat: Floats) -> Visual:
-    """What belongs to the picture of the world moves with the scene it comes with."""
+    """The pictures of the world move with the scene that they belong to."""
     part: Any = visual if visual.shape is None else visual.shape
     centre = point + rotation_matrix(quat) @ np.asarray(part.center)
     moved = replace(part, center=centre, orientation=_product(quat, part.orientation))

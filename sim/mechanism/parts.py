@@ -322,7 +322,7 @@ class Input:
             limits of problems and plants; a simulator does not clip [N, N m; m, rad; m/s, rad/s] (default inf).
         speed: largest speed of the joint's coordinate, see `dojo.constraint.SpeedLimits`; nothing else holds it [m/s,
             rad/s] (default inf).
-        servo: "position" or "velocity": the input is what its joint is driven to (default None: a force or torque).
+        servo: "position" or "velocity": the input is the target of its joint (default None: a force or torque).
         stiffness: kp of a position servo [N/m, N m/rad] (default 0).
         damping: kd of a servo [N s/m, N m s/rad] (default 0).
         force_limits: (lo, hi) of the force of a servo, both finite [N, N m] (default inf: it has none).

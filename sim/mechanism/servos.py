@@ -1,4 +1,4 @@
-"""Servos as what they are in a time step: a spring and a damper of the joint, and a force proportional to the input."""
+"""Servos in a time step: a spring and a damper of the joint, and a force proportional to the input."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def passive(mech: Mechanism) -> Mechanism:
 
     Returns:
         A mechanism that moves in the same way under u times the gains of the servos; `mech` itself without a servo.
-        Servos with limits of their force stay what they are.
+        Servos with limits of their force stay servos.
     """
     inputs = mech.inputs or ()
     if all(part.servo is None for part in inputs):

@@ -50,7 +50,7 @@ class Primitive(NamedTuple):
 class Stance(NamedTuple):
     """The points and balls by which a shape stands on ground, in the frame of the shape."""
 
-    part: str  # what one is called
+    part: str  # name of one of them
     points: Floats  # (n, 3) [m]
     radius: float  # around each [m]
 

@@ -12,7 +12,7 @@ from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.shapes import Solid
 
-STEEL = (0.56, 0.64, 0.72)  # colour of what has none
+STEEL = (0.56, 0.64, 0.72)  # colour of parts without one
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 
 
-# what shorter steps may solve; a number that is not finite and a contact below the ground stay what they are
+# reasons that shorter steps may remove; they remove neither NaN nor contacts below the ground
 DIVISIBLE = frozenset(
     int(status)
     for status in (

@@ -116,7 +116,7 @@ def ik(
 
 
 class _Search(NamedTuple):
-    """What the iterations need."""
+    """Data of the iterations."""
 
     kin: Kinematics
     wanted: Mapping[str, Target]

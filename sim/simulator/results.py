@@ -120,7 +120,7 @@ class Contacts:
         time_step: time step [s].
         impulse: (..., ncontact, 3) impulse on the body [N s].
         point: (..., ncontact, 3) its point of action at the end of the step [m].
-        gap: (..., ncontact) distance from the ground at the end of the step, 1e9 of what is beyond its reach (see
+        gap: (..., ncontact) distance from the ground at the end of the step, 1e9 beyond its reach (see
             Collision) or does not exist in this configuration [m].
         slip: (..., ncontact) sliding speed [m/s].
     """

@@ -263,7 +263,7 @@ class SingleRow:
         """The knot of a row.
 
         Args:
-            states: (1, nx) finite state; what follows it, as a command, is left aside.
+            states: (1, nx) finite state; columns behind it, as of a command, are ignored.
             inputs: (1, nu) finite inputs [N, N m].
 
         Returns:
@@ -349,7 +349,7 @@ class RowStepping(StateSpace):
         return {}
 
     def single_row(self, substeps: int = 1) -> SingleRow:
-        """What `step_batch` uses for a single row, without checks of arguments: for loops of many short calls.
+        """The steps of a single row, as `step_batch` takes them, without checks of arguments: for many short calls.
 
         Args:
             substeps: time steps per knot.

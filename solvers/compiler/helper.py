@@ -1,6 +1,6 @@
 """A helper: a second process that compiles optional kernels beside this one, into the same cache, on another core.
 
-Each of the two takes the largest kernel that is left, and what the helper compiled is loaded from the cache. A helper
+Each of the two takes the largest kernel that is left, and loads the results of the helper from the cache. A helper
 that fails, or ends, leaves its kernels to this process. Nothing is started where one core is available, where the code
 is not kept on disk, or where fewer than two kernels have to be compiled.
 
@@ -64,7 +64,7 @@ def divided(jobs: Sequence[J]) -> Generator[J, None, None]:
             except IndexError:  # the helper was faster
                 break
             yield job
-    except BaseException:  # of the caller, too, who compiles what it is given
+    except BaseException:  # of the caller, too, who compiles the rest
         helper.stop()
         raise
     yield from helper.finish()

@@ -1,4 +1,4 @@
-"""TaskSpec: what costs and constraints in task space have in common: aims, bounds, weights, knots."""
+"""TaskSpec: the common part of costs and constraints in task space: aims, bounds, weights, knots."""
 
 from __future__ import annotations
 

@@ -7,8 +7,8 @@ Every builder returns a `SuiteTask`:
     print(task.outcome(loop))
 
 Theirs are contacts by springs that act at a distance, where ours are hard; the plans of both take effect one tick after
-the measurement, and PD controllers follow them in between. The publication gives rates and no rates of success: what
-counts as one is ours, and is said with each task. Models are typed from their files, in axes of our own.
+the measurement, and PD controllers follow them in between. The publication gives rates and no rates of success:
+the criteria are ours, and each task states its own. Models are typed from their files, in axes of our own.
 """
 
 from typing import TYPE_CHECKING, Any

@@ -10,8 +10,8 @@ derivative is in that of the wrench.
 
 The broad phase knows of every collision how far its shapes were apart once, and how far points of both bodies have
 moved since, at most. From twice the reach on, all gaps are beyond it: separations along the axes of polytopes are at
-least the distance over sqrt(3). Only what this does not exclude is placed, and measured; and while no two bodies have
-moved by more than the least margin of all (pair_margin), no collision is looked at but those within their reach.
+least the distance over sqrt(3). Collisions that this excludes are neither placed nor measured; and while no two bodies
+have moved by more than the least margin of all (pair_margin), only those within their reach are evaluated.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def keep_distance(model: Model, data: Data, j: int, apart: float) -> None:
 
 @kernel
 def is_beyond(model: Model, data: Data, j: int) -> bool:
-    """Whether the collision that begins at pair j stays beyond its reach on the ways ahead, by what is known of it."""
+    """Whether the collision that begins at pair j stays beyond its reach on the ways ahead, by the last measurement."""
     ways = _ways(model, data, j, Way.BEFORE.value) + _ways(model, data, j, Way.AHEAD.value)
     return data.pair_clear[j] - ways > _APART * model.pair_far[j, PairBound.REACH]
 

@@ -3,9 +3,9 @@
 With the twists V_b of the bodies in the motion x_d, about the origin of the world, and H the momentum of the bodies
 that joint j carries, a geometry that displaces these by a twist X changes 2 T = x_d.M x_d by
 
-    2 H.(V x X)      V: twist of what lies before the displacement
+    2 H.(V x X)      V: twist of the bodies before the displacement
 
-An axis that turns takes along what lies behind it, which turns back about its joint point.
+An axis that turns takes along the bodies behind it, which turn back about its joint point.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def _body_rates(at: Bent, i: int, V: Floats) -> Rates:
 
 
 def _joint_rates(model: Model, at: Bent, i: int, motion: tuple[Floats, Floats, Floats], x: Floats) -> Rates:
-    """By the geometry of joint i.   motion: twists before and behind it, momentum of what it carries, (n, 6) each."""
+    """By the geometry of joint i.   motion: twists before and behind it, momentum of its bodies, (n, 6) each."""
     before, behind, H = motion
     parent = at.rotation[model.body_parent[i]] if model.body_parent[i] >= 0 else np.eye(3)
     lead = BEND * model.joint_lead[i] * at.frame[i] @ model.joint_axis[i]

@@ -12,10 +12,10 @@ inertia I, with nothing but the damper, slows down by
 in a step: exp(-z) to third order, positive for every z, and zero in the limit.
 
 The lag is at most h d/2. With a = h d/2 - lag >= 0 the impulse is h d (v + nu)/2 + a (nu - v): a damper that takes
-h d |v + nu|^2/4, and a rotor of inertia a, which keeps what it takes. So kinetic energy and a v^2/2 together only fall,
+h d |v + nu|^2/4, and a rotor of inertia a, which keeps its share. So kinetic energy and a v^2/2 together only fall,
 whatever h, d and I are.
 
-What a damper takes from a body in all is d times its way, if the momentum of the body at a node is I v - lag v, with
+In all a damper takes d times the way of a body from it, if the momentum of the body at a node is I v - lag v, with
 half the impulse behind it. The velocity of the node is that of this momentum, I v2 = (I - lag) v, written such that the
 mass matrix M may be any, also one beside which the lag is large:
 

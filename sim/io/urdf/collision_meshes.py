@@ -19,13 +19,13 @@ from sim.mechanism import checks
 from sim.mechanism.pose import HERE
 
 CHOICES = ("hull", "decompose", "sphere", "box", "capsule", "none")
-Choice = tuple[dict[str, str], int]  # by link what stands for its meshes; corners of hulls
+Choice = tuple[dict[str, str], int]  # by link the shapes that replace its meshes; corners of hulls
 Key = tuple[str, tuple[float, ...], str]
 Shapes = tuple[list[Geometry], float]  # in the frame of the mesh, and how far they are from it [m]
 
 
 def mesh_choices(given: str | Mapping[str, str], links: Mapping[str, object]) -> dict[str, str]:
-    """By link, what stands for its meshes; "*" of a table is all the links that it does not name."""
+    """By link, the shapes that replace its meshes; "*" of a table is all the links that it does not name."""
     call = "load_urdf(meshes=...)"
     table = {"*": given} if isinstance(given, str) else dict(given)
     for name, choice in table.items():

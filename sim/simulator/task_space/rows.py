@@ -15,7 +15,7 @@ from solvers.types import Cube, Integers, Matrix, Vector
 
 
 class Rows(NamedTuple):
-    """Knots, and what a kernel writes for each."""
+    """Knots, and the buffers that a kernel fills for each."""
 
     xs: Matrix  # (T + 1, nx) states, in
     us: Matrix  # (T, nu) inputs, in
