@@ -58,7 +58,8 @@ def _roll_some(rows: RowTables, part: tuple[int, int], motions: BatchBuffers) ->
                 return
             x, u = motions.xs[i], motions.us[i]
             one = MotionBuffers(x, u, motions.wrenches, report, motions.contacts, motions.A, motions.B)
-            motions.knots[i] = roll(rows.models[i], rows.scratch[i], rows.settings[i], one, motions.knots[i], None)
+            knot = motions.knots[i]
+            motions.knots[i] = roll(rows.models[i], rows.scratch[i], rows.settings[i], one, knot, None, None)
             if report[0, 0] == _SOLVED and motions.knots[i] < steps:
                 return
 

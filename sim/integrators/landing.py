@@ -68,8 +68,8 @@ def landing(
 ) -> Landing:  # fmt: skip
     """The Landing of the step just solved, which began at mean = (q, v15); configuration 3 is used up.
 
-    Its error is twice the gap at the beginning, or the way of the velocity's jump in the time of the step: the jump by more
-    than twice the impulse kappa/gap of the step before. Contacts that land have no slip before.
+    Its error is twice the gap at the beginning, or the way of the velocity's jump in the time of the step: the jump by
+    more than twice the impulse kappa/gap of the step before. Contacts that land have no slip before.
     """
     h, nq = options.h, data.theta1.shape[0]
     error, ahead, longest, depth, hits = 0.0, NEVER, NEVER, 0.0, False

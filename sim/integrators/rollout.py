@@ -21,6 +21,7 @@ from sim.derivatives.parameters.parameter_jacobian import parameter_jacobian
 from sim.derivatives.step_gradient import gradient
 from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import normalise_state
+from sim.integrators.feedback import Following, begin_knot, end_knot
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
@@ -137,49 +138,72 @@ def roll(
     motion: MotionBuffers,
     first: int,
     columns: ParameterColumns | None,
+    following: Following | None,
 ) -> int:
-    """xs[t + 1] = step(xs[t], us[t]) from t = first on; returns the number of solved steps, those before included.
+    """xs[t + 1] = step(xs[t], us[t]) from the step `first` on; returns how many are solved, those before included.
 
-    A step is solved once, and differentiated where it ends; by parameters, too, if there are columns of them: without
-    these nothing of them is compiled. An invalid state has the status REFUSED.
+    A step is solved once, and differentiated where it ends; by parameters, too, if there are columns of them. Inputs
+    are written if the motion follows a law, with several steps per knot if it says so, and reports (1, 7) whose last
+    number adds up the iterations. Without columns or a law nothing of them is compiled. An invalid state is REFUSED.
     """
-    model = model_view(model_at)
-    data = data_view(data_at)
-    if first == 0 and not accept(model, motion):
+    model, data, n = model_view(model_at), data_view(data_at), 1
+    if following is not None:
+        n = following.substeps
+    elif first == 0 and not accept(model, motion):
         motion.reports[0, 0] = REFUSED
         return 0
     options = options_of(data, settings, first == 0)
     nq = data.theta1.shape[0]
-    steps = motion.us.shape[0]
-    for t in range(first, steps):
-        x = motion.xs[t]
-        report = motion.reports[min(t, motion.reports.shape[0] - 1)]
+    for t in range(first // n, motion.us.shape[0]):
+        x, report = motion.xs[t], motion.reports[min(t, motion.reports.shape[0] - 1)]
+        velocity, known = x[nq:], t > 0
+        if following is not None:
+            begin_knot(model, data, following, x, motion.us[t], t)
+            velocity = data.step_x[1, nq:] if n == 1 else velocity
+            known = known or following.law.cones.shape[0] > 0
         set_external(data, motion.wrenches, t)
-        if step(model, data, options, x, motion.us[t], Guess(x[nq:], t > 0), motion.xs[t + 1], report) != _SOLVED:
+        for s in range(max(first - t * n, 0), n):
+            if s > 0:
+                copy_vector(motion.xs[t + 1], data.step_x[0])
+                x, known = data.step_x[0], True
+                velocity = x[nq:]
+            if step(model, data, options, x, motion.us[t], Guess(velocity, known), motion.xs[t + 1], report) != _SOLVED:
+                return t * n + s
+            if following is not None:
+                report[6] += report[1]
+            if s + 1 < n and is_due(data, report[1]):
+                return t * n + s + 1
+        if not _report(model, data, options, motion, t, report):
             return t
-        done = report[1]
-        if motion.contacts.shape[0] > 0:
-            report_contacts(model, data, options.h, motion.contacts[t])
-            for c in range(model.contact_height.shape[0]):
-                if not is_finite(motion.contacts[t, c]):
-                    report[0] = _NOT_FINITE
-                    return t
-            if not pairs_finite(model, data, motion.contacts[t]):
-                report[0] = _NOT_FINITE
-                return t
-        if motion.A.shape[0] > 0:
-            if not gradient(model, data, options.h, options.kappa, x[:nq], x[nq:], motion.A[t], motion.B[t]):
-                report[0] = _SINGULAR
-                return t
-            report[5] = ACCURACY * data.contact_hard[0]
-            done += motion.A.shape[1]
         if columns is not None:
             at = At(options.h, x[:nq], x[nq:], motion.us[t], columns.twists, columns.below)
             parameter_jacobian(model_at, data_at, at, motion.A[t], columns.terms, columns.weights, columns.J[t])
-            done += columns.J.shape[2]
-        if is_due(data, done):
-            return t + 1
-    return steps
+        if following is not None:
+            end_knot(model, data, following, motion.xs[t + 1], t)
+        if is_due(data, report[1] + (motion.A.shape[1] if motion.A.shape[0] > 0 else 0)):
+            return (t + 1) * n
+    return motion.us.shape[0] * n
+
+
+@kernel
+def _report(model: Model, data: Data, options: StepOptions, motion: MotionBuffers, t: int, report: Vector) -> bool:
+    """Contacts and derivatives of step t, where there are buffers for them; False where they are not finite."""
+    x, nq = motion.xs[t], data.theta1.shape[0]
+    if motion.contacts.shape[0] > 0:
+        report_contacts(model, data, options.h, motion.contacts[t])
+        for c in range(model.contact_height.shape[0]):
+            if not is_finite(motion.contacts[t, c]):
+                report[0] = _NOT_FINITE
+                return False
+        if not pairs_finite(model, data, motion.contacts[t]):
+            report[0] = _NOT_FINITE
+            return False
+    if motion.A.shape[0] > 0:
+        if not gradient(model, data, options.h, options.kappa, x[:nq], x[nq:], motion.A[t], motion.B[t]):
+            report[0] = _SINGULAR
+            return False
+        report[5] = ACCURACY * data.contact_hard[0]
+    return True
 
 
 @kernel
@@ -304,7 +328,7 @@ def _roll_rows(model_at: Table, data_at: Table, settings: Vector, rows: tuple[in
                 return
             x, u = motions.xs[i], motions.us[i]
             one = MotionBuffers(x, u, motions.wrenches, report, motions.contacts, motions.A, motions.B)
-            motions.knots[i] = roll(model_at, data_at, settings, one, motions.knots[i], None)
+            motions.knots[i] = roll(model_at, data_at, settings, one, motions.knots[i], None, None)
             if report[0, 0] == _SOLVED and motions.knots[i] < steps:
                 return
 

@@ -161,7 +161,7 @@ class AdaptiveEngine(KnotEngine):
         contacts = np.zeros((1, self.sizes.ncontact, CONTACT))
         line = MotionBuffers(xs, u[None], wrench, np.zeros((1, REPORT)), contacts, *self.unknown[:2])
         model, data = self._second.step_table(), self._scratch.table()
-        if roll(model, data, self._part_settings(h, kappa), line, 0, None) < 1:
+        if roll(model, data, self._part_settings(h, kappa), line, 0, None, None) < 1:
             return np.full(self.nx, np.nan)
         return self._node(xs[1], held, h)
 
@@ -198,12 +198,8 @@ class AdaptiveEngine(KnotEngine):
             linearize(self.gradient_table(), data, settings, (0, 0, 1), 1, line)
             return ends[0], A[0], B[0], reports[0]
         xs = np.stack([x, np.full(self.nx, np.nan)])
-        if (
-            roll(
-                self.step_table(), data, settings, MotionBuffers(xs, u[None], wrench, reports, contacts, A, B), 0, None
-            )
-            == 0
-        ):
+        motion = MotionBuffers(xs, u[None], wrench, reports, contacts, A, B)
+        if roll(self.step_table(), data, settings, motion, 0, None, None) == 0:
             xs[1] = np.nan
         return xs[1], A, B, reports[0]
 

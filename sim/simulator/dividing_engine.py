@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.integrators.feedback import BoundedLaw, Path
+from sim.integrators.feedback import Following
 from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
 from sim.model.model import Model
@@ -153,10 +153,29 @@ class DividingEngine(Engine):
 
     # -- motions -------------------------------------------------------------------------------------------------------
 
-    def take_steps(self, model: Table, motion: MotionBuffers, kappa: float | None, division: Division) -> int:
+    def take_steps(
+        self,
+        model: Table,
+        motion: MotionBuffers,
+        kappa: float | None,
+        division: Division,
+        following: Following | None = None,
+        first: int = 0,
+    ) -> int:
         """As Engine.take_steps, with division."""
         self._ended.parts = None
-        return self._go_on(model, motion, kappa, division, super().take_steps(model, motion, kappa, division))
+        done = super().take_steps(model, motion, kappa, division, following, first)
+        if following is None:
+            return self._go_on(model, motion, kappa, division, done)
+        steps = len(motion.us) * following.substeps
+        try:
+            while done < steps and self._divide_followed(motion, kappa, following, done):
+                done += 1
+                if done < steps:
+                    done = super().take_steps(model, motion, kappa, division, following, done)
+        except KeyboardInterrupt as stop:
+            raise (stop if isinstance(stop, Interrupted) else Interrupted(done)) from None
+        return done
 
     def _go_on(self, model: Table, motion: MotionBuffers, kappa: float | None, division: Division, knot: int) -> int:
         """Go on from the step `knot`, which was not solved."""
@@ -195,41 +214,29 @@ class DividingEngine(Engine):
             motion.A[knot], motion.B[knot] = self.slopes(x, divided)
         return True
 
-    def _follow(self, law: BoundedLaw, settings: Vector, substeps: int, path: Path, first: int) -> int:
-        """As Engine._follow, with division."""
-        steps = len(path.us) * substeps
-        done = super()._follow(law, settings, substeps, path, first)
-        while (
-            done < steps and int(path.report[0]) in DIVISIBLE and self._divide_shot(law, settings, substeps, path, done)
-        ):
-            done += 1
-            if done < steps:
-                done = super()._follow(law, settings, substeps, path, done)
-        return done
-
-    def _divide_shot(self, law: BoundedLaw, settings: Vector, substeps: int, path: Path, done: int) -> bool:
-        """Divide the unsolved step of a closed loop after `done` solved ones; False where that does not solve it."""
-        policy, alpha, _ = law
-        t, s = divmod(done, substeps)
+    def _divide_followed(self, motion: MotionBuffers, kappa: float | None, following: Following, done: int) -> bool:
+        """Divide the unsolved step after `done` solved ones of a motion that follows a law; False as in _divide_row."""
+        law, alpha, report = following.law, following.alpha, motion.reports[0]
+        if int(report[0]) not in DIVISIBLE:
+            return False
+        t, s = divmod(done, following.substeps)
         data = super().last()
-        x, total = data.step_x[0].copy(), path.report[REPORT]
-        divided = self.divide(x, path.us[t], policy.wrenches[t : t + 1], settings[1])
+        x, total = (data.step_x[0].copy() if s else motion.xs[t]), report[REPORT]
+        divided = self.divide(x, motion.us[t], motion.wrenches[t : t + 1], kappa)
         if divided is None:
             return False
-        path.xs[t + 1] = divided.x
-        path.report[:REPORT] = divided.report()
-        path.report[REPORT] = total + path.report[1]
+        motion.xs[t + 1] = divided.x
+        report[:REPORT] = divided.report()
+        report[REPORT] = total + report[1]
         for array in data.carry:  # the next step does not continue the attempt that failed
             array[...] = 0
-        if s + 1 == substeps:
+        if s + 1 == following.substeps:
             parts = divided.engine.last()
             data.cone[...], data.bound[...] = parts.cone, parts.bound
-            if len(path.cones):
-                path.cones[t], path.bounds[t] = parts.cone, parts.bound
+            if len(following.cones):
+                following.cones[t], following.bounds[t] = parts.cone, parts.bound
             if alpha < 1.0:
-                path.xs[t + 1] = self.integrate(path.xs[t + 1 : t + 2], (alpha - 1.0) * policy.gaps[t + 1 : t + 2])[0]
-        if done + 1 == len(path.us) * substeps:
-            path.report[1] = path.report[REPORT]
+                motion.xs[t + 1] = self.integrate(motion.xs[t + 1 : t + 2], (alpha - 1.0) * law.gaps[t + 1 : t + 2])[0]
         return True
 
     def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:

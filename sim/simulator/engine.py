@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from sim.dynamics import coordinates, coordinates_jacobian, energy, state, velocity
 from sim.integrators import rollout
-from sim.integrators.feedback import BoundedLaw, FeedbackLaw, Path, closed_loop
+from sim.integrators.feedback import FeedbackLaw, Following, Path
 from sim.integrators.rollout import MotionBuffers
 from sim.model.columns import Inactive
 from sim.model.data import Data
@@ -148,20 +148,6 @@ def interrupted(reports: Floats, knot: int) -> Floats:
     """The reports (T, 6), with that of the step `knot`, if there is one, saying that it was not tried."""
     reports[knot : knot + 1, :REPORT] = Status.INTERRUPTED, 0.0, 0.0, 0.0, -1.0, 0.0
     return reports
-
-
-def follow(go_on: Callable[[int], int], settings: Vector, path: Path, substeps: int) -> int:
-    """The number of solved knots of a rollout under a policy, which `go_on` continues after so many steps."""
-    done, steps = 0, len(path.us) * substeps
-    try:
-        for _ in pieces(settings, steps):
-            done = go_on(done)
-            if done == steps or path.report[0] != Status.SOLVED:
-                break
-    except KeyboardInterrupt:
-        interrupted(path.report[None], 0 if done < steps else 1)
-        raise Interrupted((done // substeps, path)) from None
-    return done // substeps
 
 
 def knot_inputs(us: Floats, wrenches: Cube, t: int, substeps: int) -> tuple[Floats, Cube]:
@@ -303,17 +289,26 @@ class Engine:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
         return Rolled(knot, xs, reports, contacts, A, B, division)
 
-    def take_steps(self, model: Table, motion: MotionBuffers, kappa: float | None, division: Division) -> int:
-        """Steps until the end or the first unsolved one: their number, which Interrupted carries, too.
+    def take_steps(
+        self,
+        model: Table,
+        motion: MotionBuffers,
+        kappa: float | None,
+        division: Division,
+        following: Following | None = None,
+        first: int = 0,
+    ) -> int:
+        """Steps from the one `first` until the end or the first unsolved one: the number of solved ones, those before
+        included, which Interrupted carries, too.
 
-        division: of whole steps, where a divided step leaves its numbers.
+        division: of whole steps, where a divided step leaves its numbers; following: the law of the motion, if any.
         """
-        steps, knot = len(motion.us), 0
+        steps, knot = len(motion.us) * (following.substeps if following else 1), first
         data = self._scratch.table()
         settings = self._settings_of(steps, kappa)
         try:
             for _ in pieces(settings, steps):
-                knot = int(rollout.roll(model, data, settings, motion, knot, None))
+                knot = int(rollout.roll(model, data, settings, motion, knot, None, following))
                 if knot == steps or motion.reports[min(knot, len(motion.reports) - 1), 0] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
@@ -366,19 +361,21 @@ class Engine:
         keep: bool = False,
     ) -> tuple[int, Path]:
         """(number of solved knots, rollout); with `keep` also the cone variables of its steps."""
-        path = self._path(len(policy.us), keep=keep)
-        path.xs[0] = x
-        settings = self.settings.array(kappa)
-        law = (policy, alpha, limits)
-        knot = follow(lambda first: self._follow(law, settings, substeps, path, first), settings, path, substeps)
-        if knot < len(policy.us):
+        knots = len(policy.us)
+        path = self._path(knots, keep=keep)
+        path.xs[0], steps = x, knots * substeps
+        motion = MotionBuffers(path.xs, path.us, policy.wrenches, path.report[None], *self.unkept)
+        following = Following(policy, float(alpha), *limits, substeps, path.cones, path.bounds)
+        try:
+            done = self.take_steps(self.step_table(), motion, kappa, Division.none(knots), following)
+        except Interrupted as stop:
+            interrupted(path.report[None], 0 if stop.result < steps else 1)
+            raise Interrupted((stop.result // substeps, path)) from None
+        if done < steps:
             np.nan_to_num(path.report, copy=False, nan=np.inf, posinf=np.inf)
-        return knot, path
-
-    def _follow(self, law: BoundedLaw, settings: Vector, substeps: int, path: Path, first: int) -> int:
-        """The piece of a closed loop that begins at a step: the number of solved steps, those before included."""
-        model, data = self.step_table(), self._scratch.table()
-        return int(closed_loop(model, data, settings, law, substeps, path, first))
+        else:
+            path.report[1] = path.report[REPORT]
+        return done // substeps, path
 
     def linearize(
         self,

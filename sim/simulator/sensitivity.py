@@ -188,7 +188,7 @@ def _whole_steps(engine: Engine, plan: ParameterPlan, motion: MotionBuffers, J: 
     columns = ParameterColumns(plan.terms, plan.weights, J, *scratch) if len(plan.weights) else None
     settings = engine.settings.array(kappa)
     for _ in pieces(settings, steps):
-        done = int(roll(model, data, settings, motion, done, columns))
+        done = int(roll(model, data, settings, motion, done, columns, None))
         if done == steps or motion.reports[done, 0] != Status.SOLVED:
             break
     return refuse(motion.reports, done, motion.A[:done], motion.B[:done], J[:done])

@@ -12,15 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from sim.contact.collision import box_axes, box_box, capsule_box, hulls, segment
+from sim.contact.collision import box_axes, box_box, capsule_box, ellipsoid, hulls, segment
 from sim.contact.collision.box_elements import put_elements
 from sim.contact.collision.edge_axes import Arrangement
-from sim.contact.collision.ellipsoid import (
-    cylinder_ellipsoid,
-    ellipsoid_ellipsoid,
-    ellipsoid_halfspace,
-    polytope_ellipsoid,
-)
 from sim.contact.collision.fields import capsule_field, choose_end, sphere_field
 from sim.contact.collision.halfspace import box_halfspace, capsule_halfspace, cylinder_halfspace, sphere_halfspace
 from sim.contact.collision.sphere import sphere_box, sphere_capsule, sphere_cylinder, sphere_sphere, string
@@ -105,28 +99,28 @@ def _string(model: Model, feature: int, code: int, sizes: Vector, R: Vector, r: 
 def _ellipsoid_halfspace(
     model: Model, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector
 ) -> None:
-    ellipsoid_halfspace(sizes, R, r, out)
+    ellipsoid.ellipsoid_halfspace(sizes, R, r, out)
 
 
 @optional(Slot.PUT_ELLIPSOID_ELLIPSOID)
 def _ellipsoid_ellipsoid(
     model: Model, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector
 ) -> None:
-    ellipsoid_ellipsoid(sizes, R, r, out)
+    ellipsoid.ellipsoid_ellipsoid(sizes, R, r, out)
 
 
 @optional(Slot.PUT_CYLINDER_ELLIPSOID)
 def _cylinder_ellipsoid(
     model: Model, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector
 ) -> None:
-    cylinder_ellipsoid(sizes, R, r, out)
+    ellipsoid.cylinder_ellipsoid(sizes, R, r, out)
 
 
 @optional(Slot.PUT_POLYTOPE_ELLIPSOID)
 def _polytope_ellipsoid(
     model: Model, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector
 ) -> None:
-    polytope_ellipsoid(sizes, model.hull, R, r, out)
+    ellipsoid.polytope_ellipsoid(sizes, model.hull, R, r, out)
 
 
 @optional(Slot.PUT_SPHERE_FIELD)
@@ -280,23 +274,10 @@ KERNELS: dict[Pair, tuple[Callable[..., Any], ...]] = {
     Pair.SPHERE_BOX: (_sphere_box,),
     Pair.SPHERE_CYLINDER: (_sphere_cylinder,),
     Pair.SPHERE_HALFSPACE: (_sphere_halfspace,),
-    Pair.CAPSULE_CAPSULE: (
-        _capsule_capsule,
-        choose_capsule_capsule,
-    ),
-    Pair.CAPSULE_BOX: (
-        _capsule_box,
-        arrange_capsule_box,
-        sides_capsule_box,
-        choose_capsule_box,
-    ),
+    Pair.CAPSULE_CAPSULE: (_capsule_capsule, choose_capsule_capsule),
+    Pair.CAPSULE_BOX: (_capsule_box, arrange_capsule_box, sides_capsule_box, choose_capsule_box),
     Pair.CAPSULE_HALFSPACE: (_capsule_halfspace,),
-    Pair.BOX_BOX: (
-        _box_box,
-        arrange_box_box,
-        sides_box_box,
-        choose_box_box,
-    ),
+    Pair.BOX_BOX: (_box_box, arrange_box_box, sides_box_box, choose_box_box),
     Pair.BOX_HALFSPACE: (_box_halfspace,),
     Pair.CYLINDER_HALFSPACE: (_cylinder_halfspace,),
     Pair.STRING: (_string,),
@@ -305,10 +286,7 @@ KERNELS: dict[Pair, tuple[Callable[..., Any], ...]] = {
     Pair.CYLINDER_ELLIPSOID: (_cylinder_ellipsoid,),
     Pair.POLYTOPE_ELLIPSOID: (_polytope_ellipsoid,),
     Pair.SPHERE_FIELD: (_sphere_field,),
-    Pair.CAPSULE_FIELD: (
-        _capsule_field,
-        choose_capsule_field,
-    ),
+    Pair.CAPSULE_FIELD: (_capsule_field, choose_capsule_field),
     Pair.POLYTOPE_POLYTOPE: (
         _polytope_polytope,
         arrange_polytope_polytope,
