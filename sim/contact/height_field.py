@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from math import floor
 
-from sim.model.columns import Grid
+from sim.model.columns import Grid, TerrainSize
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import Vec3
@@ -53,8 +53,8 @@ def field_values(
     model: Model, coefficients: Vector, k: int, x: float, y: float
 ) -> tuple[float, float, float, float, float, float]:
     """The same with other coefficients on its grid."""
-    p = model.terrain_place[k]
-    first, nx, ny = model.terrain_size[k, 0], model.terrain_size[k, 1], model.terrain_size[k, 2]
+    p, size = model.terrain_place[k], model.terrain_size[k]
+    first, nx, ny = size[TerrainSize.FIRST], size[TerrainSize.ALONG_X], size[TerrainSize.ALONG_Y]
     C, S = p[Grid.DIRECTION], p[Grid.DIRECTION + 1]
     i, a = cell(p[Grid.DENSITY] * (C * (x - p[Grid.ORIGIN]) + S * (y - p[Grid.ORIGIN + 1])), nx)
     j, b = cell(p[Grid.DENSITY + 1] * (C * (y - p[Grid.ORIGIN + 1]) - S * (x - p[Grid.ORIGIN])), ny)

@@ -150,7 +150,8 @@ def condense_pyramid(model: Model, data: Data, c: int) -> None:
     q[PyramidScale.SUM + 1] = q[PyramidScale.RATIO + 2] - q[PyramidScale.RATIO + 3]
     q[PyramidScale.INVERSE] = 1.0 / (z[Pyramid.CAP] + z[Pyramid.SPEED] * total)
     g = z[Pyramid.SPEED] * q[PyramidScale.INVERSE]
-    k1, k2, k3, k4 = q[0], q[1], q[2], q[3]
+    r = PyramidScale.RATIO
+    k1, k2, k3, k4 = q[r], q[r + 1], q[r + 2], q[r + 3]
     psi, cap = z[Pyramid.SPEED], z[Pyramid.CAP]
     x, y = k1 + k2, k3 + k4
     W[4] = -q[PyramidScale.INVERSE] * (x * (cap + psi * y) + 4.0 * psi * k1 * k2)

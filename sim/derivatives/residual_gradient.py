@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sim.dynamics.elimination import dot_six, numbers, times_row
+from sim.model.columns import DirectionRow
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
@@ -30,7 +31,7 @@ def residual_derivatives(model: Model, data: Data, h: float) -> None:
     for i in range(model.body_parent.shape[0]):
         for d in range(model.body_vadr[i] + model.joint_ntrans[i], model.body_vadr[i + 1]):
             for e in range(model.body_vadr[i], model.body_vadr[i + 1]):
-                data.dR_dq[d, e] += dot_six(data.S2[e], data.F[d, 12:])
+                data.dR_dq[d, e] += dot_six(data.S2[e], data.F[d, DirectionRow.TURNED :])
 
 
 @kernel
@@ -76,15 +77,15 @@ def _row(A: Matrix, i: int, t: Vector) -> Lanes:
 
 @kernel
 def _turned_tests(model: Model, data: Data) -> None:
-    """F[d, 12:] = t = (a x f, v x f + a x m): (S_k x S_d).r = S_k.t for S_d = (v, a), r = (f, m) below d."""
+    """F[d, TURNED:] = t = (a x f, v x f + a x m): (S_k x S_d).r = S_k.t for S_d = (v, a), r = (f, m) below d."""
     for d in range(data.F.shape[0]):
         s = data.S2[d]
         f = data.subtree[model.dof_body[d]]
-        F = data.F[d]
-        F[12], F[13], F[14] = cross(s[3], s[4], s[5], f[0], f[1], f[2])
+        F = data.F[d, DirectionRow.TURNED :]
+        F[0], F[1], F[2] = cross(s[3], s[4], s[5], f[0], f[1], f[2])
         x, y, z = cross(s[0], s[1], s[2], f[0], f[1], f[2])
         u, v, w = cross(s[3], s[4], s[5], f[3], f[4], f[5])
-        F[15], F[16], F[17] = x + u, y + v, z + w
+        F[3], F[4], F[5] = x + u, y + v, z + w
 
 
 @kernel

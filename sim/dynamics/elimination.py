@@ -8,6 +8,7 @@ eliminated as one block of up to six unknowns, with pivoting, as in Featherstone
 
 from __future__ import annotations
 
+from sim.model.columns import JointFactor
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import inlined, kernel
@@ -113,18 +114,18 @@ def factor_of(model: Model, data: Data, A: Matrix) -> int:
         put(P, 6 * i, 0, a)
         _joint_products(model, data, i, a)
         if n == 1:
-            if not abs(D[0]) > 1e-300:
+            if not abs(D[JointFactor.INVERSE]) > 1e-300:
                 return 0
-            if D[0] < 0.0:
+            if D[JointFactor.INVERSE] < 0.0:
                 sign = -sign
-            D[0] = 1.0 / D[0]
-            store(data.L, d0, 0, D[0] * load(data.L, d0, 0))
+            D[JointFactor.INVERSE] = 1.0 / D[JointFactor.INVERSE]
+            store(data.L, d0, 0, D[JointFactor.INVERSE] * load(data.L, d0, 0))
         elif n > 1:
             swaps = lu_factor(D, n)
             if swaps < 0:
                 return 0
             sign *= lu_sign(D, n, swaps)
-            D[36] = float(swaps)
+            D[JointFactor.SWAPS] = float(swaps)
             if p >= 0:
                 lu_solve_lanes(D, n, swaps, data.L, d0, 0)
         if p >= 0:
@@ -154,9 +155,9 @@ def solve(model: Model, data: Data, b: Vector, out: Vector) -> None:
         for d in range(d0, d0 + m):
             data.z[d] = b[d] - dot_six(data.S2[d], pi)
         if m == 1:
-            data.z[d0] *= data.D[i, 0]
+            data.z[d0] *= data.D[i, JointFactor.INVERSE]
         elif m > 1:
-            lu_solve(data.D[i], m, int(data.D[i, 36]), data.z, d0)
+            lu_solve(data.D[i], m, int(data.D[i, JointFactor.SWAPS]), data.z, d0)
         q = model.body_parent[i]
         if q < 0:
             continue

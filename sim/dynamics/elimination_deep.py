@@ -6,6 +6,7 @@ the nearest cache.
 
 from __future__ import annotations
 
+from sim.model.columns import JointFactor
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -29,14 +30,14 @@ def _up(model: Model, data: Data, c: int) -> None:
         w = zeros() if leaf else six(P, 6 * i, 0)
         if end == d0 + 1:
             x = load(X, d0, c) if leaf else load(X, d0, c) - dot_lanes(data.S2, d0, 0, w)
-            x = data.D[i, 0] * x
+            x = data.D[i, JointFactor.INVERSE] * x
             store(X, d0, c, x)
             w = plus_outer(w, data.U[d0], x)
         elif end > d0:
             if not leaf:
                 for d in range(d0, end):
                     store(X, d, c, load(X, d, c) - dot_lanes(data.S2, d, 0, w))
-            lu_solve_lanes(data.D[i], end - d0, int(data.D[i, 36]), X, d0, c)
+            lu_solve_lanes(data.D[i], end - d0, int(data.D[i, JointFactor.SWAPS]), X, d0, c)
             if q >= 0:
                 for d in range(d0, end):
                     w = plus_outer(w, data.U[d], load(X, d, c))

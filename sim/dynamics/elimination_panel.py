@@ -13,6 +13,7 @@ so that the last block of columns needs no care.
 from __future__ import annotations
 
 from sim.dynamics.elimination_deep import solve_deep_panel
+from sim.model.columns import JointFactor
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
@@ -59,13 +60,13 @@ def _up(model: Model, data: Data, c: int) -> None:
                 x = x - t * load(X, k, c)
                 y = y - t * load(X, k, c + LANES)
                 z = z - t * load(X, k, c + 2 * LANES)
-            f = data.D[i, 0] if n == 1 else 1.0
+            f = data.D[i, JointFactor.INVERSE] if n == 1 else 1.0
             store(X, d, c, f * x)
             store(X, d, c + LANES, f * y)
             store(X, d, c + 2 * LANES, f * z)
         if n > 1:
             for e in range(c, c + SIDE, LANES):
-                lu_solve_lanes(data.D[i], n, int(data.D[i, 36]), X, d0, e)
+                lu_solve_lanes(data.D[i], n, int(data.D[i, JointFactor.SWAPS]), X, d0, e)
 
 
 @kernel

@@ -21,7 +21,7 @@ from sim.contact.inactive import cluster_gap, highest
 from sim.dynamics.external_forces import set_external
 from sim.integrators.runge_kutta import advance, begin
 from sim.mechanism.confined import IDLE
-from sim.model.columns import Apart
+from sim.model.columns import Apart, Bounce, Cluster
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
@@ -44,7 +44,7 @@ def _speed(model: Model, data: Data, c: int) -> float:
     V, o = data.twist[i], data.origin
     x, y, z = cross(V[3], V[4], V[5], data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2])
     x, y, z = x + V[0], y + V[1], z + V[2]
-    return sqrt(x * x + y * y + z * z) + model.cluster[c, 4] * sqrt(V[3] * V[3] + V[4] * V[4] + V[5] * V[5])
+    return sqrt(x * x + y * y + z * z) + model.cluster[c, Cluster.ARM] * sqrt(V[3] * V[3] + V[4] * V[4] + V[5] * V[5])
 
 
 @kernel
@@ -141,7 +141,7 @@ def report_apart(model: Model, data: Data, h: float, out: Matrix) -> None:
             data.inactive_first[data.inactive_count[0]] = c
             data.inactive_count[0] += 1
         data.contact_out[c] = 1
-        data.bounce[c, 0] = 0.0
+        data.bounce[c, Bounce.FLOOR] = 0.0
         for k in range(data.cone.shape[1]):
             data.cone[c, k] = 0.0
     report_contacts(model, data, h, out)

@@ -40,6 +40,21 @@ class Drive(IntEnum):
     MEAN = 2  # M
 
 
+class DryMove(IntEnum):
+    """dry_move: the motion of an element in this step, and the bound of its impulse."""
+
+    MOTION = 0
+    BOUND = 1
+
+
+class DryConstant(IntEnum):
+    """dry_w: constant parts of the step of an element."""
+
+    IMPULSE = 0
+    FORWARD = 1
+    BACKWARD = 2
+
+
 class Gain(IntEnum):
     """dry_gain: those of a servo with limits of its force."""
 
@@ -185,6 +200,41 @@ class Way(IntEnum):
     BEFORE = 0  # since the motion began, along the configurations where steps began
     AHEAD = 1  # in this step, if it is like the one before
     POSE = 2  # (7,) pose where BEFORE ends
+
+
+class TerrainSize(IntEnum):
+    """terrain_size: the coefficients of a terrain."""
+
+    FIRST = 0
+    ALONG_X = 1  # number
+    ALONG_Y = 2
+
+
+class PairSize(IntEnum):
+    """pair_sizes: first of the sizes of each shape."""
+
+    A = 0
+    B = 4
+
+
+class JointFactor(IntEnum):
+    """D: LU factors of the block of a joint, (n, n)."""
+
+    INVERSE = 0  # of a block of one row, instead of factors
+    SWAPS = 36  # exchanges of rows
+
+
+class DirectionRow(IntEnum):
+    """F: scratch of a test direction, and behind it"""
+
+    TURNED = 12  # (6,) the residual wrench times the rotation by the direction
+
+
+class Pace(IntEnum):
+    """pace: when to go back to Python."""
+
+    DEADLINE = 0  # [s]
+    EFFORT = 1  # since the last look at the clock
 
 
 class Grid(IntEnum):

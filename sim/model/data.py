@@ -221,9 +221,7 @@ class Data(NamedTuple):
     stage_momenta: Vector  # (high_nv,)
     stage_dr: Matrix  # (nstage, high_nv) rates of the shift
     stage_dp: Matrix  # (nstage, high_nv) rates of the momenta
-    slope_p_q: (
-        Matrix  # (high_nv, high_nv) derivatives of momenta p and their rates f by coordinates, velocities, inputs
-    )
+    slope_p_q: Matrix  # (high_nv, high_nv) derivatives of momenta p and their rates f, by coordinates, velocities, u
     slope_p_v: Matrix  # (high_nv, high_nv)
     slope_f_q: Matrix  # (high_nv, high_nv)
     slope_f_v: Matrix  # (high_nv, high_nv)

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from time import perf_counter
 
+from sim.model.columns import Pace
 from sim.model.data import Data
 from solvers.compiler import PAUSE, kernel, seconds
 from solvers.types import Vector
@@ -54,14 +55,14 @@ def _rows(count: int) -> Iterator[slice]:
 @kernel
 def start_pace(data: Data, settings: Vector) -> None:
     """Note the deadline."""
-    data.pace[0] = settings[DEADLINE]
+    data.pace[Pace.DEADLINE] = settings[DEADLINE]
 
 
 @kernel
 def is_due(data: Data, effort: float) -> bool:
     """Whether it is time to go back to Python, after a step of that effort: its iterations, and columns solved for."""
-    data.pace[1] += effort
-    if data.pace[1] < _LOOK:
+    data.pace[Pace.EFFORT] += effort
+    if data.pace[Pace.EFFORT] < _LOOK:
         return False
-    data.pace[1] = 0.0
-    return seconds() > data.pace[0]
+    data.pace[Pace.EFFORT] = 0.0
+    return seconds() > data.pace[Pace.DEADLINE]

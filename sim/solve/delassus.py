@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from sim.contact.ground_contact import add_contact_wrench
 from sim.dynamics.elimination import dot_six
-from sim.model.columns import Kin
+from sim.model.columns import JointFactor, Kin
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -81,9 +81,9 @@ def _answer(model: Model, data: Data, i: int, b: int, size: int) -> None:
         for d in range(d0, d0 + n):
             data.z[d] -= dot_six(data.S2[d], p)
         if n == 1:
-            data.z[d0] *= data.D[i, 0]
+            data.z[d0] *= data.D[i, JointFactor.INVERSE]
         elif n > 1:
-            lu_solve(data.D[i], n, int(data.D[i, 36]), data.z, d0)
+            lu_solve(data.D[i], n, int(data.D[i, JointFactor.SWAPS]), data.z, d0)
         for d in range(d0, d0 + n):
             z, rates = data.z[d], data.reach[d]
             for k in range(size):

@@ -11,7 +11,7 @@ from sim.contact.collision.box import to_a, to_b
 from sim.contact.collision.kept import elsewhere
 from sim.contact.collision.rim import LEVEL
 from sim.contact.collision.witness import dot
-from sim.model.columns import Cone, Witness
+from sim.model.columns import Cone, PairSize, Witness
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.shape_kinds import RIM_POINTS, SWAPPED, Pair
@@ -48,8 +48,8 @@ def rounding_of_rims(model: Model, j: int) -> float:
     """
     kind, sizes = model.pair_kind[j] % SWAPPED, model.pair_sizes[j]
     if kind == Pair.CYLINDER_CYLINDER:
-        return LEVEL * max(sizes[0], sizes[4])
-    return LEVEL * sizes[4] if kind == Pair.POLYTOPE_CYLINDER else 0.0
+        return LEVEL * max(sizes[PairSize.A], sizes[PairSize.B])
+    return LEVEL * sizes[PairSize.B] if kind == Pair.POLYTOPE_CYLINDER else 0.0
 
 
 @kernel

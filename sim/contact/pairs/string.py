@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from sim.model.columns import PairSize
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.shape_kinds import SWAPPED, Pair
@@ -54,7 +55,7 @@ def is_taut(model: Model, data: Data, j: int) -> bool:
     if model.pair_kind[j] % SWAPPED != Pair.STRING:
         return False
     d, _ = string_before(model, data, j)
-    length = model.pair_sizes[j, 0]
+    length = model.pair_sizes[j, PairSize.A]
     if not length - d < _TAUT * length:
         return False
     x, y, z = 0.0, 0.0, 0.0

@@ -19,7 +19,7 @@ from sim.derivatives.parameters.body_columns import add_wrench
 from sim.derivatives.parameters.directions import At, Effect
 from sim.derivatives.restitution_gradient import gap_wrench
 from sim.dynamics.joints.coordinates import joint_frame
-from sim.model.columns import Bounce
+from sim.model.columns import Bounce, DirectionRow
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
@@ -162,7 +162,7 @@ def add_geometry(model: Model, data: Data, at: At, effect: int, i: int, k: int, 
     first_rotation = model.body_vadr[i] + model.joint_ntrans[i]
     for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
         B = T[4] if d < first_rotation else T[5]
-        X[d, col] -= w * (_dot(data.S2[d], F) + _dot(B, data.F[d, 12:18]))
+        X[d, col] -= w * (_dot(data.S2[d], F) + _dot(B, data.F[d, DirectionRow.TURNED : DirectionRow.TURNED + 6]))
     p = model.body_parent[i]
     while p >= 0:
         for d in range(model.body_vadr[p], model.body_vadr[p + 1]):

@@ -21,7 +21,7 @@ from sim.derivatives.parameters.parameter_jacobian import coordinate_rows
 from sim.derivatives.parameters.surface import add_ground_place, is_on_terrain
 from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
-from sim.model.columns import Bounce, Grid
+from sim.model.columns import Bounce, Grid, TerrainSize
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
@@ -37,8 +37,8 @@ def spread(model: Model, k: int, at: Vec3, s: Vec3, X: Matrix, first: int, out: 
 
     Columns F, F_x, F_y of the ground below `at`; where s is not zero, s.(F, F_x, F_y) in that of F only.
     """
-    p = model.terrain_place[k]
-    start, nx, ny = model.terrain_size[k, 0], model.terrain_size[k, 1], model.terrain_size[k, 2]
+    p, size = model.terrain_place[k], model.terrain_size[k]
+    start, nx, ny = size[TerrainSize.FIRST], size[TerrainSize.ALONG_X], size[TerrainSize.ALONG_Y]
     C, S = p[Grid.DIRECTION], p[Grid.DIRECTION + 1]
     i, a = cell(p[Grid.DENSITY] * (C * (at[0] - p[Grid.ORIGIN]) + S * (at[1] - p[Grid.ORIGIN + 1])), nx)
     j, b = cell(p[Grid.DENSITY + 1] * (C * (at[1] - p[Grid.ORIGIN + 1]) - S * (at[0] - p[Grid.ORIGIN])), ny)

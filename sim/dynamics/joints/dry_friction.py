@@ -16,7 +16,7 @@ has M = e = r = 0.
 from __future__ import annotations
 
 from sim.dynamics.joints.limited_servo import begin_drive, drive_by_time_step
-from sim.model.columns import Drive, Dry
+from sim.model.columns import Drive, Dry, DryConstant, DryMove
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import NewtonTarget
@@ -86,7 +86,7 @@ def onto_servo_path(z: Vector, x: float, e: float, bound: float, kappa: float) -
 @kernel
 def _onto_path(data: Data, k: int, kappa: float) -> None:
     """Element k on the central path of kappa, at the present motion."""
-    x, bound, own = data.dry_move[k, 0], data.dry_move[k, 1], data.dry_drive[k]
+    x, bound, own = data.dry_move[k, DryMove.MOTION], data.dry_move[k, DryMove.BOUND], data.dry_drive[k]
     if own[Drive.COMPLIANCE] > 0.0:
         x += own[Drive.COMPLIANCE] * own[Drive.MEAN]
         onto_servo_path(data.dry[k], x, own[Drive.COMPLIANCE], bound, kappa)
@@ -98,8 +98,8 @@ def _onto_path(data: Data, k: int, kappa: float) -> None:
 def dry_kinematics(model: Model, data: Data, h: float) -> None:
     """The motion h nu and the bound h f of every element."""
     for k in range(model.dry_dof.shape[0]):
-        data.dry_move[k, 0] = h * data.nu[model.dry_dof[k]] - data.dry_drive[k, Drive.REST]
-        data.dry_move[k, 1] = h * model.dry_force[k]
+        data.dry_move[k, DryMove.MOTION] = h * data.nu[model.dry_dof[k]] - data.dry_drive[k, Drive.REST]
+        data.dry_move[k, DryMove.BOUND] = h * model.dry_force[k]
 
 
 @optional(Slot.FIT_DRY)
@@ -133,7 +133,7 @@ def resume_dry(model: Model, data: Data, kappa: float, predicted: bool) -> None:
     predicted: the impulses that they have now, otherwise those kept in dry_trial.
     """
     for k in range(model.dry_dof.shape[0]):
-        x, bound = data.dry_move[k, 0], data.dry_move[k, 1]
+        x, bound = data.dry_move[k, DryMove.MOTION], data.dry_move[k, DryMove.BOUND]
         z = data.dry[k]
         left = z[Dry.LEFT_FORWARD] if predicted else data.dry_trial[k, Dry.LEFT_FORWARD]
         if bound * abs(x) > kappa or not left > 0.0 or data.dry_drive[k, Drive.COMPLIANCE] > 0.0:
@@ -169,7 +169,7 @@ def _gap(data: Data, k: int) -> float:
     """f - b - h nu + r - e T of element k."""
     z = data.dry[k]
     own = data.dry_drive[k, Drive.COMPLIANCE] * dry_impulse(data, k)
-    return z[Dry.FORWARD] - z[Dry.BACKWARD] - data.dry_move[k, 0] - own
+    return z[Dry.FORWARD] - z[Dry.BACKWARD] - data.dry_move[k, DryMove.MOTION] - own
 
 
 @optional(Slot.DRY_LOAD, default=0.0)
@@ -208,9 +208,10 @@ def dry_constants(model: Model, data: Data, target: NewtonTarget) -> None:
         for side in range(2):
             a, p = z[2 * side], z[2 * side + 1]
             r = target.kappa - a * p - target.corrected * step[2 * side] * step[2 * side + 1]
-            parts[1 + side] = r / p
-        parts[0] = (parts[1] - parts[2] + target.share * _gap(data, k)) / dry_compliance(data, k)
-        data.dnu[model.dry_dof[k]] += parts[0]
+            parts[DryConstant.FORWARD + side] = r / p
+        w = parts[DryConstant.FORWARD] - parts[DryConstant.BACKWARD] + target.share * _gap(data, k)
+        parts[DryConstant.IMPULSE] = w / dry_compliance(data, k)
+        data.dnu[model.dry_dof[k]] += parts[DryConstant.IMPULSE]
 
 
 @optional(Slot.RECOVER_DRY)
@@ -218,10 +219,10 @@ def recover_dry(model: Model, data: Data, h: float) -> None:
     """dry_step from dnu."""
     for k in range(model.dry_dof.shape[0]):
         z, step, w = data.dry[k], data.carry.dry_step[k], data.dry_w[k]
-        change = w[0] - h / dry_compliance(data, k) * data.dnu[model.dry_dof[k]]
+        change = w[DryConstant.IMPULSE] - h / dry_compliance(data, k) * data.dnu[model.dry_dof[k]]
         step[Dry.LEFT_FORWARD], step[Dry.LEFT_BACKWARD] = change, -change
-        step[Dry.FORWARD] = w[1] - z[Dry.FORWARD] / z[Dry.LEFT_FORWARD] * change
-        step[Dry.BACKWARD] = w[2] + z[Dry.BACKWARD] / z[Dry.LEFT_BACKWARD] * change
+        step[Dry.FORWARD] = w[DryConstant.FORWARD] - z[Dry.FORWARD] / z[Dry.LEFT_FORWARD] * change
+        step[Dry.BACKWARD] = w[DryConstant.BACKWARD] + z[Dry.BACKWARD] / z[Dry.LEFT_BACKWARD] * change
 
 
 @optional(Slot.KEEP_DRY)

@@ -1,0 +1,86 @@
+"""No number stands for a column of Model and Data that has a name (sim/model/columns.py)."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+from enum import IntEnum
+from pathlib import Path
+
+from sim.model import columns
+from sim.model.layout import CARRY_FIELDS, DATA_FIELDS, MODEL_FIELDS
+
+SIM = Path(columns.__file__).parents[1]
+WIDTHS = {name: shape[-1] for name, shape in {**MODEL_FIELDS, **CARRY_FIELDS, **DATA_FIELDS}.items()}
+MATRICES = {name for name, shape in {**MODEL_FIELDS, **CARRY_FIELDS, **DATA_FIELDS}.items() if len(shape) == 2}
+COMPONENTS = (1, 3, 4, 6, 9, 36)  # one number, vectors, quaternions, twists and wrenches, matrices of 3 or 6 rows
+FRAMES = ("pair_frame", "loop_frame", "pair_place", "pair_relative")  # a rotation, with a point before or behind it
+SIDES = ("coupling_body", "couple_live", "gear_dof", "gear_rate")  # of a and of b
+
+
+def _named() -> set[str]:
+    """Fields whose columns have names, which the docstrings of the enumerations begin with."""
+    enums = [thing for thing in vars(columns).values() if inspect.isclass(thing) and issubclass(thing, IntEnum)]
+    texts = [inspect.getdoc(thing) or "" for thing in enums if thing is not IntEnum]
+    return {name for text in texts for name in re.findall(r"\w+", text.partition(":")[0]) if name in WIDTHS}
+
+
+def _field(node: ast.expr) -> str | None:
+    """The field that an expression is, as data.cone or model.cluster."""
+    if isinstance(node, ast.Attribute) and node.attr in WIDTHS:
+        return node.attr if re.fullmatch(r"(data|model|work)(\.carry)?|carry", ast.unparse(node.value)) else None
+    return None
+
+
+def _rows(function: ast.FunctionDef) -> dict[str, str]:
+    """Local names of rows of fields, `row = data.cone[c]`, and of vectors."""
+    out = {}
+    for node in ast.walk(function):
+        if isinstance(node, ast.Assign):
+            pairs = [(target, node.value) for target in node.targets]
+            if isinstance(node.targets[0], ast.Tuple) and isinstance(node.value, ast.Tuple):
+                pairs = list(zip(node.targets[0].elts, node.value.elts, strict=False))
+            for target, value in pairs:
+                row = value
+                if isinstance(value, ast.Subscript) and not isinstance(value.slice, ast.Tuple | ast.Slice):
+                    row = value.value
+                name = _field(row)
+                if isinstance(target, ast.Name) and name and (row is not value) == (name in MATRICES):
+                    out[target.id] = name
+    return out
+
+
+def numbers_of(source: str) -> list[tuple[str, str]]:
+    """(field, subscript) of every column that a function of a source calls by a number."""
+    found = []
+    for function in (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef)):
+        rows = _rows(function)
+        for node in ast.walk(function):
+            if not isinstance(node, ast.Subscript):
+                continue
+            name, last = _field(node.value), node.slice
+            if name in MATRICES:
+                last = last.elts[-1] if isinstance(last, ast.Tuple) else ast.Name("a row")
+            elif name is None and isinstance(node.value, ast.Name):
+                name = rows.get(node.value.id)
+            if name and isinstance(last, ast.Constant):
+                found.append((name, ast.unparse(node)))
+    return found
+
+
+def test_no_column_with_a_name_is_a_number() -> None:
+    named = _named()
+    assert {"contact_kin", "cone", "bound", "D", "pair_sizes"} <= named
+    source = (
+        "def f(data):\n    k = data.contact_kin[c]\n    return k[3] + k[Kin.GAP] + data.bound[c, 1] + data.cone[0, j]"
+    )
+    assert sorted(numbers_of(source)) == [("bound", "data.bound[c, 1]"), ("contact_kin", "k[3]")]
+    wrong, seen = [], 0
+    for file in SIM.rglob("*.py"):
+        for name, text in numbers_of(file.read_text()):
+            seen += 1
+            plain = WIDTHS[name] in COMPONENTS or name in SIDES or not isinstance(WIDTHS[name], int)
+            if name not in FRAMES and (name in named or not plain):
+                wrong.append(f"{file.name}: {text}")
+    assert seen > 1000 and wrong == []
