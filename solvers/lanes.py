@@ -83,11 +83,15 @@ def _spread(builder: Any, number: Any) -> Any:
 
 
 def _address(context: Any, builder: Any, kind: Any, matrix: Any, row: Any, column: Any) -> Any:
-    """Where the lanes of a matrix, C order, begin; without a look at the bounds."""
+    """Where the lanes of a matrix, C order, begin: inside it, which is looked at where bounds are checked."""
     array = context.make_array(kind)(context, builder, matrix)
-    width = cgutils.unpack_tuple(builder, array.shape, 2)[1]
-    start = builder.gep(array.data, [builder.add(builder.mul(row, width), column)], inbounds=True)
-    return builder.bitcast(start, _Vector.as_pointer())
+    height, width = cgutils.unpack_tuple(builder, array.shape, 2)
+    first = builder.add(builder.mul(row, width), column)
+    if context.enable_boundscheck:
+        outside = builder.icmp_unsigned(">=", first, builder.mul(height, width))  # negative numbers are large ones, too
+        with cgutils.if_unlikely(builder, outside):
+            context.call_conv.return_user_exc(builder, IndexError, ("lanes that begin outside their matrix",))
+    return builder.bitcast(builder.gep(array.data, [first], inbounds=True), _Vector.as_pointer())
 
 
 @intrinsic

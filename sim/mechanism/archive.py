@@ -15,21 +15,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.mechanism.shapes import Solid
+
 Arrays = dict[str, NDArray[Any]]
 
 __all__ = ["VERSION", "packed_part", "part_of"]
 
 VERSION = 1
-PARTS = {
+PARTS = {cls.__name__: cls.__module__ for cls in Solid.__subclasses__() if cls.__module__ == Solid.__module__} | {
     "Body": "sim.mechanism.parts",
-    "Box": "sim.mechanism.shapes",
-    "Capsule": "sim.mechanism.shapes",
     "Collision": "sim.mechanism.collision",
     "Contact": "sim.mechanism.parts",
-    "Cylinder": "sim.mechanism.shapes",
-    "Ellipsoid": "sim.mechanism.shapes",
     "Gear": "sim.mechanism.gear",
-    "HalfSpace": "sim.mechanism.shapes",
     "Input": "sim.mechanism.parts",
     "Joint": "sim.mechanism.parts",
     "LinkFrame": "sim.io.urdf.report",
@@ -40,8 +37,6 @@ PARTS = {
     "Polytope": "sim.mechanism.polytope",
     "SignedDistance": "sim.mechanism.signed_distance",
     "Simulator": "sim.simulator.simulator",
-    "Sphere": "sim.mechanism.shapes",
-    "String": "sim.mechanism.shapes",
     "Terrain": "sim.mechanism.terrain",
     "UrdfMechanism": "sim.io.urdf.report",
     "UrdfReport": "sim.io.urdf.report",
@@ -103,7 +98,7 @@ def part_of(data: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
         return {part_of(key, arrays): part_of(value, arrays) for key, value in data["table"]}
     kind = data.get("part")
     if kind not in PARTS:
-        raise ValueError(f"expected one of {', '.join(PARTS)}, got {kind!r}")
+        raise ValueError(f"expected one of {', '.join(sorted(PARTS))}, got {kind!r}")
     made = getattr(import_module(PARTS[kind]), kind)
     known = {f.name for f in fields(made) if f.init} if is_dataclass(made) else set(data)
     given = {name: part_of(value, arrays) for name, value in data.items() if name != "part"}

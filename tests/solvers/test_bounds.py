@@ -11,6 +11,7 @@ from support.programs import python
 PROGRAM = """
 import numpy as np
 from solvers.compiler import kernel
+from solvers.lanes import load, spread, store, total
 
 @kernel
 def _entry(a, i):
@@ -35,30 +36,43 @@ def _caller(a, i):
     return _entry(a, i)
 
 @kernel
+def _lanes(A, i, j):
+    return total(load(A, i, j))
+
+@kernel
+def _keep(A, i, j):
+    store(A, i, j, spread(1.0))
+    return 0.0
+
+@kernel
 def _last(A):
     return A[-1, -2] + A[-1][-1]
 
 A = np.arange(12.0).reshape(3, 4)
+wide = np.arange(24.0).reshape(3, 8)
 part = A.ravel()[4:8]
 for call in (
     lambda: _entry(part, -1), lambda: _entry(part, 4), lambda: _row(A, -1, 0), lambda: _row(A, 0, -1),
     lambda: _pair(A, 0, 4), lambda: _pair(A, 0, -1), lambda: _pair(A, -3, 0), lambda: _pair(A, 3, 0),
     lambda: _write(part, -1), lambda: _caller(part, -1),
+    lambda: _lanes(wide[1:], 0, -1), lambda: _lanes(wide, 3, 0), lambda: _keep(wide[1:], -1, 0),
 ):
     try:
         print("read", call())
     except IndexError as error:
         print(error)
-print(_last(A), _entry(part, 3), _row(A, 2, 3), _pair(A, 2, 3))
+print(_last(A), _entry(part, 3), _row(A, 2, 3), _pair(A, 2, 3), _lanes(wide, 1, 0))
 """
 
 
 def test_a_negative_index_that_is_not_written_as_a_number_is_refused():
     *errors, last = python(PROGRAM, NUMBA_BOUNDSCHECK="1", DOJO_OPT_PLAIN_NUMBA="0").splitlines()
+    errors, lanes = errors[:-3], errors[-3:]
+    assert lanes == 3 * ["lanes that begin outside their matrix"]
     names = "_entry _entry _row _row _pair _pair _pair _pair _write _entry".split()
     assert [error.split(":")[0] for error in errors] == [f"kernel {name}" for name in names]
     assert "index outside A, axis 1, or negative" in errors[4] and "axis 0" in errors[6]
-    assert last == "21.0 7.0 11.0 11.0"
+    assert last == "21.0 7.0 11.0 11.0 92.0"
 
 
 @pytest.mark.parametrize("boundscheck", [True, False])
