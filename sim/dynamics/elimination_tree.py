@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sim.model.columns import JointFactor
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
@@ -58,9 +59,9 @@ def solve_tree(model: Model, data: Data, tree: Tree, X: Matrix, c: int, P: Matri
         for d in range(d0, d0 + n):
             store(X, d, c, load(X, d, c) - dot_lanes(data.S2, d, 0, w))
         if n == 1:
-            store(X, d0, c, data.D[i, 0] * load(X, d0, c))
+            store(X, d0, c, data.D[i, JointFactor.INVERSE] * load(X, d0, c))
         elif n > 1:
-            lu_solve_lanes(data.D[i], n, int(data.D[i, 36]), X, d0, c)
+            lu_solve_lanes(data.D[i], n, int(data.D[i, JointFactor.SWAPS]), X, d0, c)
         if q >= 0 and model.body_root[q] >= 0:
             for d in range(d0, d0 + n):
                 w = plus_outer(w, data.U[d], load(X, d, c))

@@ -43,7 +43,7 @@ def distances_to_level(solid: LevelSet) -> Floats:
         if length.max(initial=0.0) < 1e-10 * solid.spacing:
             break
     found = np.linalg.norm(c - solid.settled(x)[0], axis=1)
-    better = found <= out[near] + 0.1 * solid.spacing  # the others went astray
+    better = found <= out[near] + 0.1 * solid.spacing  # the others converged elsewhere
     out[near] = np.where(better, found, out[near])
     return np.asarray(np.where(solid.values.ravel() < 0.0, -out, out).reshape(counts))
 

@@ -132,7 +132,7 @@ class Data(NamedTuple):
     inactive_pose: Matrix  # (nbody, 7) poses where the inactive collisions were evaluated
     inactive_wrench: Matrix  # (nbody, 6) their wrenches about O
     pair_share: Matrix  # (npair, 2) PairShare: the part of the impulse that acts
-    pair_clear: Vector  # (npair,) at its first pair: once known distance of the shapes, plus Way.BEFORE then [m]
+    pair_clear: Vector  # (npair,) at its first pair: last measured distance of the shapes, plus Way.BEFORE then [m]
     pair_margin: Vector  # (1,) sum of Way of two bodies up to which no other collision comes within its reach [m]
     body_way: Matrix  # (nbody, 9) Way
     pair_trial: Matrix  # (1, 43) last result of `collide`, of a feature pair that is not kept

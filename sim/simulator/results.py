@@ -134,7 +134,7 @@ class Contacts:
     slip: Floats
 
     def __getattr__(self, name: str) -> Floats:
-        """`gap` where it waits until somebody asks (`contacts_of`): where a step has a report, a collision without a
+        """`gap`, evaluated on demand (`contacts_of`): where a step has a report, a collision without a
         normal is beyond its reach.
         """
         if name != "gap" or "rows" not in vars(self):

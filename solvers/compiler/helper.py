@@ -61,7 +61,7 @@ def divided(jobs: Sequence[J]) -> Generator[J, None, None]:
         while left:
             try:
                 job = left.popleft()
-            except IndexError:  # the helper was faster
+            except IndexError:  # the helper took the last one
                 break
             yield job
     except BaseException:  # of the caller, too, who compiles the rest
@@ -122,7 +122,7 @@ class _Helper:
                 text=True,
                 creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
             )
-        except OSError:  # no room for a process
+        except OSError:  # the system refuses another process
             return
         with process:
             try:

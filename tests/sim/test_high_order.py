@@ -109,6 +109,12 @@ def test_batches_steps_and_copies_agree_with_rollouts() -> None:
     copies = [pickle.loads(pickle.dumps(sim)), sim.replace(order=6).replace(order=4)]
     for run in (sim, *copies):
         np.testing.assert_array_equal(run.rollout(x, us[1]).x, batch.x[1])
+    rows = sim.step_batch(np.tile(x, (2, 1)), us[:, 0], derivatives=True)
+    np.testing.assert_array_equal(rows.x, batch.x[:, 1])
+    np.testing.assert_array_equal(sim.single_row().step(x[None], us[0, :1]).x, batch.x[:1, 1])
+    A, B = sim.linearize(x, us[1, 0])
+    np.testing.assert_array_equal(rows.A[1], A)
+    np.testing.assert_array_equal(rows.B[1], B)
     one = sim.step(x, us[0, 0])
     assert one.success and one.iterations == 4
     np.testing.assert_allclose(one.x, batch.x[0, 1], atol=1e-12)

@@ -111,7 +111,7 @@ def _choose(
     elif kind == Pair.CAPSULE_FIELD:
         code = choose_capsule_field(model, feature, sizes, R, r)
     put_contact(model, kind, feature, code, sizes, R, r, out)
-    return 0 if out[0] >= ABSENT else code  # NaN is a contact that was not found, and fails the step
+    return 0 if out[0] >= ABSENT else code  # NaN: the contact was not found, and the step fails
 
 
 @kernel

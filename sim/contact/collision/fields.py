@@ -6,8 +6,8 @@ With delta = v + w x c:
     capsule, c = r + s u  where n.u = 0:  (u.K u) ds = -(u.K delta + n.(w x u)),   dn = K (delta + u ds)
     and of both           d phi = n.delta,   p = c - (ra + phi/2) n,   K = (I + d S)^-1 S
 
-A capsule touches with the balls at its ends, and where a place between them is nearer to the level set than those
-beside it. On a flat face, and above a hollow, both ends touch, and no such place is there.
+A capsule touches with the balls at its ends, and at a place between them that is nearer to the level set than its
+neighbours. On a flat face, and above a hollow, both ends touch, and there is no such place.
 """
 
 from __future__ import annotations
@@ -78,8 +78,8 @@ def slope(hull: Matrix, o: int, c: Vec3, u: Vec3) -> tuple[float, float, tuple[f
 
 @kernel
 def between(hull: Matrix, o: int, c: Vec3, u: Vec3, half: float) -> tuple[float, bool]:
-    """Where along |s| <= half a segment is nearer to the level set than beside it, and whether that is between its
-    ends: Newton's method within bounds that close in. An end where it is not.
+    """The place along a segment, |s| <= half, that is nearest to the level set, and whether it lies between the ends:
+    Newton's method within bounds that close in. An end where there is none between them.
     """
     low, high = -half, half
     if slope(hull, o, along(c, low, u), u)[0] >= 0.0:
@@ -106,7 +106,7 @@ def between(hull: Matrix, o: int, c: Vec3, u: Vec3, half: float) -> tuple[float,
 
 @inner_kernel
 def capsule_field(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
-    """An end, or the place between the ends; where that comes to an end, it is the end."""
+    """An end, or the place between the ends, which may coincide with an end."""
     o, c, u, half, radii = int(sizes[4]), (r[0], r[1], r[2]), column(R, 2), sizes[1], (sizes[0], sizes[5])
     s, inner = half if feature == 1 else -half, False
     if feature == INSIDE:
