@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.dynamics import coordinates, coordinates_jacobian, energy, state, velocity
-from sim.integrators import rollout
+from sim.integrators import batch, rollout
 from sim.integrators.feedback import FeedbackLaw, Following, Path
 from sim.integrators.rollout import MotionBuffers
 from sim.model.columns import Inactive
@@ -412,7 +412,7 @@ class Engine:
             ends = np.arange(len(works) + 1) * n // len(works) * substeps
             done = ends[:-1].copy()
             for _ in pieces(settings, n * substeps):
-                rollout.linearize_knots(model, works, settings, substeps, line, done)
+                batch.linearize_knots(model, works, settings, substeps, line, done)
                 if np.array_equal(done, ends[1:]):
                     break
         if np.count_nonzero(reports[:, 0]):
@@ -447,13 +447,13 @@ class Engine:
         """(states, status and number of solved steps of every rollout), in parallel."""
         n, steps = us.shape[:2]
         xs, reports, knots = np.zeros((n, steps + 1, self.nx)), np.zeros((n, 1, REPORT)), np.zeros(n, dtype=np.int64)
-        motions = rollout.BatchBuffers(xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.unknown[:2])
+        motions = batch.BatchBuffers(xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.unknown[:2])
         model, works, settings = self.step_table(), self._scratch.chunks(n), self.settings.array()
         status = reports[:, 0, 0]
         try:
             xs[:, 0] = x0s  # the first touch of much memory takes its time
             for _ in pieces(settings, n * steps):
-                rollout.roll_batch(model, works, settings, motions)
+                batch.roll_batch(model, works, settings, motions)
                 if np.all((knots == steps) | (status != Status.SOLVED)):
                     break
         except KeyboardInterrupt:

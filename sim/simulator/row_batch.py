@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.integrators.batch import RowTables, linearize_rows, roll_rows
-from sim.integrators.rollout import BatchBuffers, Linearized, MotionBuffers
+from sim.integrators.batch import BatchBuffers, RowTables, linearize_rows, roll_rows
+from sim.integrators.rollout import Linearized, MotionBuffers
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
 from sim.model.pace import DEADLINE, pieces
