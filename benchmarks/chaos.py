@@ -1,11 +1,11 @@
-"""Ctrl-C at random moments, killed processes, damaged caches, forks: count what crashes, hangs or answers late.
+"""Ctrl-C at random moments, killed processes, damaged caches, forks: count crashes, hangs and late answers.
 
     python benchmarks/chaos.py                      200 interrupts, 7 kinds of damage, 20 killed processes, forks
     python benchmarks/chaos.py --only signals --interrupts 1000
 
 Interrupts go to one process after another, each of which plans, controls, rolls out, or runs a batch for ever, compiled
-before. It has to answer within 0.2 s with a KeyboardInterrupt that carries what was done, and to compute the same as
-before afterwards.
+before. It has to answer within 0.2 s with a KeyboardInterrupt that carries the finished part, and afterwards to compute
+the same as before.
 Caches: all files of compiled code are damaged, in seven ways; the next process has to compute the same.
 Killed: processes that compile into one cache are killed at random moments, and the next one has to compute the same.
 """
@@ -30,7 +30,7 @@ from victims import FORKS, LONG, SMALL, Heard, Victim, answer, environment
 from dojo_opt.report.result import Report, Table
 
 ANSWER = 0.2  # [s]
-COMPILED = {"DOJO_OPT_SHIPPED": "0"}  # what came with an installation is no cache
+COMPILED = {"DOJO_OPT_SHIPPED": "0"}  # code of an installation is no cache
 PARTS = ("signals", "caches", "killed", "forks")
 
 
@@ -74,7 +74,7 @@ DAMAGE: dict[str, Callable[[Path, np.random.Generator], object]] = {
 
 
 def caches(rng: np.random.Generator, kinds: list[str], filled: Filled) -> list[tuple[str, int, str]]:
-    """(damage, damaged files, what came of it) with every file of compiled code damaged."""
+    """(damage, damaged files, outcome) with every file of compiled code damaged."""
     found = []
     for kind in progress()([(kind, kind) for kind in kinds], "chaos, caches"):
         copy = filled.folder.with_name("copy")
@@ -90,7 +90,7 @@ def caches(rng: np.random.Generator, kinds: list[str], filled: Filled) -> list[t
 
 
 def killed(count: int, rng: np.random.Generator, filled: Filled) -> list[str]:
-    """What processes compute whose forerunners with the same cache were killed."""
+    """The results of processes whose forerunners with the same cache were killed."""
     found = []
     for _ in progress()([(f"kill {k}", k) for k in range(count)], "chaos, killed"):
         cache = filled.folder.with_name("shared")
@@ -113,7 +113,7 @@ def killed(count: int, rng: np.random.Generator, filled: Filled) -> list[str]:
 
 
 class Filled:
-    """A cache that a process has filled, and what it computed."""
+    """A cache that a process has filled, and its results."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -148,7 +148,7 @@ def run(args: argparse.Namespace) -> Report:
 def _add_caches(
     report: Report, parts: Sequence[str], args: argparse.Namespace, rng: np.random.Generator, filled: Filled
 ) -> None:
-    """What came of damaged caches and of processes that were killed while they filled one."""
+    """The outcome of damaged caches and of processes that were killed while they filled one."""
     if "caches" in parts:
         found = caches(rng, ["truncated"] if args.quick else list(DAMAGE), filled)
         report.rows += [

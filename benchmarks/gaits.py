@@ -1,4 +1,4 @@
-"""Gaits of a quadruped by iLQR: iterations, cost, and what is left of a plan at a fifth of its time step.
+"""Gaits of a quadruped by iLQR: iterations, cost, and the motion of a plan at a fifth of its time step.
 
     python benchmarks/gaits.py           the table below, 72 random gaits, 32 leaps, 40 random leaps (three minutes)
     python benchmarks/gaits.py --quick   the table with fewer rows, 6 random gaits, 1 leap, 1 random leap
@@ -109,7 +109,7 @@ def planned(name: str, settings: dict[str, Any]) -> list[Cell]:
 
 
 def replays(report: Report, lines: list[list[Cell]]) -> None:
-    """What is left of the plans of the table at a fifth of their time step, as rows."""
+    """The plans of the table followed at a fifth of their time step, as rows."""
     after = {str(line[0]): dict(zip(HEADER[9:], line[9:], strict=True)) for line in lines}
     finished = {name: replay for name, replay in after.items() if replay["off"] is not None}
     planned = {str(line[0]) for line in lines if line[1] is True}
@@ -128,7 +128,7 @@ def replays(report: Report, lines: list[list[Cell]]) -> None:
 
 
 def label(name: str, settings: dict[str, Any]) -> str:
-    """A gait, and what is asked of it."""
+    """A gait, and its problem."""
     return " ".join([name, *(f"{key}={value}" for key, value in settings.items())])
 
 

@@ -1,7 +1,7 @@
 """Policies of Gymnasium's tasks, learnt on one core: returns over processor time, with their spread over seeds.
 
 python benchmarks/learning.py DIR HalfCheetah --algorithms shac ars --seeds 0 1 2 3 4      runs and saves
-python benchmarks/learning.py DIR HalfCheetah --only-figure                                 draws what is saved
+python benchmarks/learning.py DIR HalfCheetah --only-figure                                 draws saved results
 python benchmarks/learning.py DIR HalfCheetah --beside Hopper --table       and tabulates it, in DIR/learning.json
 
 `best_of` with seed k begins with the seeds 3k, 3k + 1, 3k + 2 of SHAC. A run is DIR/TASK_ALGORITHM_SEED.npz, and its
@@ -105,7 +105,7 @@ def curve(path: Path) -> Floats:
 
 
 def figure(folder: Path, names: list[str]) -> None:
-    """Median and range over seeds of each algorithm, of what is saved; one panel per task."""
+    """Median and range over seeds of each algorithm, of the saved results; one panel per task."""
     from matplotlib.figure import Figure
 
     page = Figure(figsize=(5.0 * len(names) + 1.0, 4.0), layout="constrained")

@@ -5,7 +5,7 @@ python benchmarks/learning_peers.py DIR HalfCheetah --algorithms ppo sac --seeds
 Needs `pip install stable-baselines3`. A run is DIR/TASK_ALGORITHM_SEED.npz with `seconds` of processor time, `steps`
 and the mean `returns` of four episodes without noise; `benchmarks/learning.py DIR TASK --table` shows it beside the
 others. For one core, set NUMBA_NUM_THREADS=1 and OMP_NUM_THREADS=1. Published returns of these algorithms take
-a million steps and more: runs of minutes on one core show what minutes give, and not what the algorithms can do.
+a million steps and more: runs of minutes on one core show the results of minutes, not the limits of the algorithms.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ ours. `free_gait` is the quadruped of `tasks.free_gait_mpc` at .3 m/s, with the 
 with payloads up to 1 kg and friction from .4 to .8, and push it by 8 N s.
 Every task runs from its start and from N perturbed ones, on two plants: ours, at 1 ms with kappa 1e-8, and
 MuJoCo's with its default contacts, where it is installed. Measured here: everything but the rates. The publication
-replans at these on four threads, and gives no rates of success: what counts as one is said by `help(TASK)`. Ticks are
+replans at these on four threads, and gives no rates of success: `help(TASK)` states each criterion. Ticks are
 timed by the processor, on one core.
 """
 
@@ -90,7 +90,7 @@ def line(task: Any, kind: str, runs: int, seconds: float | None) -> tuple[list[C
 
 
 def run(args: argparse.Namespace) -> Report:
-    """What was asked for."""
+    """The requested tasks."""
     report = Report("MPC on published suites", "")
     kinds = [OURS] + ([MUJOCO] if find_spec("mujoco") is not None else [])
     runs, seconds = (1, QUICK) if args.quick else (args.runs, None)

@@ -37,7 +37,7 @@ LEAST = 0.9  # share of the tasks that have to be done
 
 
 class Robot(NamedTuple):
-    """A file of the package, and what it does not say."""
+    """A file of the package, and the numbers that it omits."""
 
     path: str
     feet: dict[str, float] | None = None  # radius of the ball about the origin of a link [m]
@@ -151,7 +151,7 @@ def steered(robot: Robot) -> list[Cell]:
 
 
 def cases(args: argparse.Namespace) -> list[tuple[str, Callable[[], list[Cell]]]]:
-    """What is tried, by name."""
+    """The trials, by name."""
     out: list[tuple[str, Callable[[], list[Cell]]]] = []
     for name, robot in ROBOTS.items():
         if args.match.lower() not in name.lower():

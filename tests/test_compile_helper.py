@@ -113,7 +113,7 @@ print(json.dumps([sim.step(sim.neutral() + 0.1).x.tolist(), len(compiled())]))
     for jobs in "21":
         (tmp_path / jobs).mkdir(mode=0o700)
         own = {"NUMBA_CACHE_DIR": str(tmp_path / jobs), "DOJO_OPT_SHIPPED": "0", "DOJO_OPT_JOBS": jobs}
-        own["NUMBA_OPT"] = "0"  # who compiles what does not depend on how well
+        own["NUMBA_OPT"] = "0"  # the division of the work does not depend on it
         runs.append(json.loads(python(program, **own)))
     assert runs[0][0] == runs[1][0]
     assert runs[0][1] < 0.8 * runs[1][1]

@@ -140,7 +140,7 @@ def test_a_row_that_starts_anew_passes_no_gradient_back(task):
         return np.array([t == 2, False])
 
     weights = np.ones((5, 2))
-    weights[:3, 0] = 0.0  # what row 0 earns after its new start does not depend on its first state
+    weights[:3, 0] = 0.0  # rewards of row 0 after its new start do not depend on its first state
     found = dojo.learn.roll_policy_batch(policy, starts, 5, slopes=True, restart=restart).gradient(weights)
     assert not found.states[0].any() and found.states[1].any()
 

@@ -1,4 +1,4 @@
-"""Tasks of published suites, and what they need of MPC: servos, targets that go along, plans that come late."""
+"""Tasks of published suites, and the features of MPC that they use: servos, targets that go along, plans that come late."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Robots that keep a commanded velocity: what they see, how commands change, and that learning them repeats."""
+"""Robots that keep a commanded velocity: their observations, changes of commands, and that learning them repeats."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The discrete Lagrangian of one interval, in maximal coordinates, and what follows from it at the nodes.
+"""The discrete Lagrangian of one interval, in maximal coordinates, and its derivatives at the nodes.
 
     L_d(z1, z2) = sum_b [ m/(2h) |x2 - x1|^2 + T_d(q1, q2) + h/2 m g.(x1 + x2) ] - sum_joints V_d(z1, z2)
     T_d = (2/h) s.Js psi(c),   (c, s) = q1^* q2, c > 0,   psi = 2/3 + 1/(3 c^2)

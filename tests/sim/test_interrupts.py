@@ -1,4 +1,4 @@
-"""Ctrl-C during every call that loops over steps or rows: heard soon, and what was done until then is at hand."""
+"""Ctrl-C during every call that loops over steps or rows: heard soon, and the finished part is at hand."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ STATES = {
 
 
 def stopped(call: Callable[[int], Any], enough: int, after: float = 0.3, *, in_loop: bool = False) -> Any:
-    """What Ctrl-C leaves of a call that is long enough; what it needs is compiled before."""
+    """The exception of a call that Ctrl-C ends; its kernels are compiled before."""
     call(2_000)
     return heard_in(call, enough, after, in_loop=in_loop)
 

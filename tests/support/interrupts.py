@@ -22,7 +22,7 @@ _THREADS = os.cpu_count() or 1  # whose processor times are added
 
 
 class Heard(NamedTuple):
-    """What became of Ctrl-C."""
+    """The effect of Ctrl-C."""
 
     stop: KeyboardInterrupt | None  # None: the call had ended before
     seconds: float  # of processor time, of all threads, from the signal to the exception
@@ -75,7 +75,7 @@ def interrupt(call: Callable[[], Any], after: float, *, in_loop: bool = False) -
 
 
 def heard(call: Callable[[], Any], after: float = 0.3) -> Any:
-    """What the exception carries that Ctrl-C ends the call with, which has to come soon; see `interrupt`."""
+    """The content of the exception with which Ctrl-C ends the call, which has to come soon; see `interrupt`."""
     return heard_in(lambda _: call(), 1, after, in_loop=False)
 
 
