@@ -92,4 +92,5 @@ def test_entries_beside_the_diagonal_that_are_not_finite_are_found(entry):
         T = np.zeros((2, 2 * LANES))
         T[0, 0] = T[1, LANES] = 1.0
         T[row, column] = entry
-        assert block_lu_factor(T, np.zeros((2, 2)), nodes, 1e-300) == -1
+        with np.errstate(invalid="ignore"):  # 0 times infinity, where the kernel runs uncompiled
+            assert block_lu_factor(T, np.zeros((2, 2)), nodes, 1e-300) == -1
