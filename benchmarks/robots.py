@@ -60,6 +60,7 @@ ROBOTS = {
     "ANYmal C": Robot("anymal_c_simple_description/urdf/anymal.urdf"),
     "HyQ": Robot("hyq_description/robots/hyq_no_sensors.urdf"),
     "Bolt": Robot("bolt_description/robots/bolt.urdf", {"FL_FOOT": 0.0275, "FR_FOOT": 0.0275}),
+    "G1": Robot("g1_description/urdf/g1_29dof_rev_1_0.urdf"),
     "Panda": Robot(
         "panda_description/urdf/panda.urdf", None, "panda_hand", (0, -0.8, 0, -2.3, 0, 1.6, 0.8, 0.02, 0.02)
     ),

@@ -101,8 +101,21 @@ def _pressed(sim: Simulator, feet: Feet, state: Array, free: NDArray[np.bool_]) 
     return state, sim.kappa / (sim.time_step * _under(feet, state)[2] * np.maximum(feet.gaps(state), 1e-12))
 
 
+def _held(sim: Simulator, state: Array, left: Array, by: str) -> Array:
+    """(nu,) inputs that balance the generalised forces `left` (nv,).  ValueError: those that have no input remain."""
+    B = input_map(sim)
+    free = ~B.any(axis=1)
+    if np.abs(left[free]).max(initial=0.0) > 1e-3 * np.abs(potential_gradient(sim, state)).max(initial=0.0):
+        k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
+        raise ValueError(
+            f"equilibrium({sim.mechanism.name}): no {by} balance the weight: {left[k]:.3g} N or N m remains at "
+            f"{sim.mechanism.dof_names[k]!r}"
+        )
+    return np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
+
+
 def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int = 20) -> tuple[Array, Array]:
-    """A state of rest near x, and the input that holds it.
+    """A state of rest near x, and the input that holds it: of robots on feet, arms, hands, and what a joint holds.
 
     The contacts press straight down, so nothing creeps on level ground, and share the load as evenly as balance allows.
     The joints balance gravity and springs. Inputs that act on bodies are zero. On the central path a contact with the
@@ -123,17 +136,19 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
 
     Raises:
         ValueError: no such forces exist: the centre of mass is not above the feet, a joint without input would have
-            to carry load, the ground is steeper than friction holds, or the smoothing is so large that inactive
-            contacts carry the weight.
+            to carry load, the ground is steeper than friction holds, a contact is in the ground, or the smoothing is
+            so large that inactive contacts carry the weight.
     """
     if not isinstance(sim, Simulator):
         raise TypeError(f"equilibrium(sim): expected a Simulator, got {sim!r}")
     mech = sim.mechanism
-    feet, B = Feet(sim, mech.contact_names), input_map(sim)
+    names = mech.contact_names[: len(mech.contacts)]
     state = np.array(sim.neutral() if x is None else checks.array("equilibrium(x)", x, (sim.nx,)))
     state[sim.nq :] = 0.0
-    free = np.asarray(~B.any(axis=1))
-    weight = float(np.abs(potential_gradient(sim, state)).max())
+    free = np.asarray(~input_map(sim).any(axis=1))
+    if not names:
+        return state, _held(sim, state, potential_gradient(sim, state) - stop_torques(sim, state), "inputs")
+    feet, weight = Feet(sim, names), float(np.abs(potential_gradient(sim, state)).max())
     for _ in range(iterations):
         down, up, share = _under(feet, state)
         gap = feet.gaps(state)
@@ -150,14 +165,12 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         move[: sim.nv] = np.linalg.lstsq(down[loaded], error, rcond=_RANK)[0]
         state = sim.integrate(state, move)
     state, force = _pressed(sim, feet, state, free)
+    gap = feet.gaps(state)
+    if gap.min() <= 0.0:
+        name = feet.names[int(gap.argmin())]
+        raise ValueError(f"equilibrium({mech.name}): {name!r} is {-gap.min():.3g} m deep in the ground near x")
     _, up, share = _under(feet, state)
     left = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ force
-    u = np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
-    if np.abs(left[free]).max() > 1e-3 * weight:
-        k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
-        raise ValueError(
-            f"equilibrium({mech.name}): no vertical forces at {', '.join(map(repr, feet.names))} balance the "
-            f"weight: {left[k]:.3g} N or N m remains at {sim.mechanism.dof_names[k]!r}"
-        )
+    u = _held(sim, state, left, f"vertical forces at {', '.join(map(repr, feet.names))}")
     _check_friction(mech.name, feet, share, np.where(force > 1e-3 * weight, force, 0.0))
     return state, u

@@ -6,15 +6,16 @@ The drawing is MeshCat's: its scene commands and its viewer, put into the page.
 from __future__ import annotations
 
 import warnings
-from html import escape
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dojo_opt.viewer import drawing
+from dojo_opt.viewer import drawing, overlays
+from dojo_opt.viewer.frames import FRAMES, sparse
 from dojo_opt.viewer.motion import Motion, motion
-from dojo_opt.viewer.page import page
+from dojo_opt.viewer.page import group_of, label, page, spacing
 from sim.mechanism import shapes
 from sim.mechanism.pack import contact_frame
 from sim.mechanism.parts import WORLD, Body, Contact
@@ -24,7 +25,6 @@ from sim.simulator.simulator import Simulator
 
 __all__ = ["save_html"]
 
-FRAMES = 60  # per second of the animation
 _GRID, _SQUARE, _PIECE = 20.0, 0.5, 1.0  # edge of the drawn floor, of its squares, length of a piece of a line [m]
 _AROUND, _FINE, _LINES = 1.0, 0.02, 160  # of drawn terrain: margin, spacing [m], and lines along one axis at most
 
@@ -32,34 +32,54 @@ _FLOOR, _LINE = 0xECEBE7, 0xB9B7B1  # colours
 _RUBBER, _EARTH = (0.2, 0.2, 0.2), (0.6, 0.56, 0.5, 0.6)
 
 
-def save_html(result: Any, path: str | Path, *, simulator: Simulator | None = None) -> Path:
+def save_html(
+    result: Any,
+    path: str | Path,
+    *,
+    simulator: Simulator | None = None,
+    forces: bool = False,
+    traces: bool = False,
+    goal: bool = True,
+) -> Path:
     """Write an animation that opens in a browser.
 
+    The page has a clock, speeds, steps from knot to knot, and boxes that show and hide contact forces, the paths of the
+    base and of the ends of the limbs, and the goal of a plan, as a ghost. Several results move side by side.
+
     Args:
-        result: Trajectory, Plan or ClosedLoop; or a Mechanism, which stands in its neutral state.
+        result: Trajectory, Plan or ClosedLoop; a Mechanism, which stands in its neutral state; or a list of these.
         path: path of the HTML file.
         simulator: simulator of the result, for one that was read from a file (default None: that of the result).
+        forces: whether the contact forces are shown at the beginning. A bar as long as the robot is its weight.
+        traces: whether the paths are shown at the beginning.
+        goal: whether the ghost is shown at the beginning.
 
     Returns:
         The path.
 
     Raises:
         TypeError: the result is none of these.
-        ValueError: the result does not know its simulator.
+        ValueError: the result does not know its simulator, or the list is empty.
         SimulationError: a step of a plan cannot be solved again, for its forces.
         OSError: the file cannot be written.
     """
     target = Path(path)
-    target.write_text(html_of(motion(result, simulator)), encoding="utf-8")
+    results = list(result) if isinstance(result, list | tuple) else [result]
+    if not results:
+        raise ValueError("save_html(result): expected one result or more, got an empty list")
+    shown = {"forces": forces, "paths": traces, "ghost": goal}
+    motions = [motion(one, simulator) for one in results]
+    target.write_text(html_of(*motions, shown=shown), encoding="utf-8")
     return target
 
 
-def html_of(m: Motion, *, moving: bool = True) -> str:
-    """The page of a motion.
+def html_of(*motions: Motion, moving: bool = True, shown: Mapping[str, bool] | None = None) -> str:
+    """The page of motions side by side.
 
     Args:
-        m: the motion.
-        moving: whether it is played; otherwise the page has its first poses.
+        *motions: the motions, the first one where it is, the others beside it.
+        moving: whether they are played; otherwise the page has their first poses.
+        shown: whether "forces", "paths" and the "ghost" of the goal are shown at the beginning (default None: none).
 
     Returns:
         The text of an HTML file.
@@ -68,7 +88,27 @@ def html_of(m: Motion, *, moving: bool = True) -> str:
         warnings.simplefilter("ignore", DeprecationWarning)  # MeshCat loads its server, and that an old part of zmq
         import meshcat  # noqa: F401
 
-    return page(m, [*_ground(m), *_scene(m), *([_animation(m)] if moving else [])])
+    commands = _ground(motions[0])
+    clips: dict[Any, Any] = {}
+    away = spacing(motions)
+    end = max(float(m.time[-1]) for m in motions)
+    for k, m in enumerate(motions):
+        at = group_of(k)
+        commands += [*_scene(m, at), *_beside(at, (0.0, -k * away, 0.0))]
+        if moving and len(m.time) > 1:
+            commands += overlays.paths(m, at)
+            bars, lengths = overlays.forces(m, at, end)
+            commands += bars
+            clips |= {**_clips(m, at, end), **lengths}
+    return page(motions, [*commands, *([_animation(clips)] if moving else [])], shown or {})
+
+
+def _beside(group: tuple[str, ...], offset: tuple[float, ...]) -> list[Any]:
+    """Commands that put a motion beside the first one."""
+    from meshcat.commands import SetTransform
+    from meshcat.path import Path as Node
+
+    return [] if len(group) == 1 else [SetTransform(drawing.matrix(offset), Node(group))]
 
 
 def _ground(m: Motion) -> list[Any]:
@@ -130,33 +170,33 @@ def _surface(m: Motion, terrain: Terrain, height: float) -> tuple[Any, Any]:
     return vertices, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
-def _scene(m: Motion) -> list[Any]:
+def _scene(m: Motion, group: tuple[str, ...] = ("meshcat",)) -> list[Any]:
     """Commands that draw every body at its first pose, the balls of its contacts, and obstacles."""
     from meshcat import geometry
     from meshcat.commands import SetObject, SetTransform
 
     commands = []
     for k, body in enumerate(m.mechanism.bodies):
-        node = node_of("bodies", k, body.name)
+        node = node_of("bodies", k, body.name, group)
         for part, piece in enumerate(m.pieces[body.name]):
             solid, paint, place = drawing.geometry(piece)
             commands.append(SetObject(solid, paint, node.append(f"part{part}")))
             commands.append(SetTransform(place, node.append(f"part{part}")))
         for c, contact in enumerate(m.mechanism.contacts):
             if contact.body == body.name and _shows(contact, body):
-                ball = node.append(_label(f"contact {c}", contact.name))
+                ball = node.append(label(f"contact {c}", contact.name))
                 commands.append(SetObject(geometry.Sphere(max(contact.radius, 0.01)), drawing.material(_RUBBER), ball))
                 commands.append(SetTransform(drawing.matrix(contact.point), ball))
         commands.append(SetTransform(drawing.matrix(m.position[0, k], m.quaternion[0, k]), node))
     for part, piece in enumerate(m.pieces[WORLD]):
         solid, paint, place = drawing.geometry(piece)
-        node = node_of("obstacles", part, WORLD)
+        node = node_of("obstacles", part, WORLD, group)
         commands += [SetObject(solid, paint, node), SetTransform(place, node)]
     for k, collision in enumerate(m.mechanism.collisions):
         if collision.b != WORLD or collision.shape_b is None or isinstance(collision.shape_b, shapes.String):
             continue
         for part, piece in enumerate(drawing.of_solid(collision.shape_b, _EARTH)):
-            node = node_of("obstacles", k, collision.name).append(f"part{part}")
+            node = node_of("obstacles", k, collision.name, group).append(f"part{part}")
             solid, paint, place = drawing.geometry(piece)
             commands += [SetObject(solid, paint, node), SetTransform(place, node)]
     return commands
@@ -170,33 +210,34 @@ def _shows(contact: Contact, body: Body) -> bool:
     return not any(np.allclose(np.asarray(s.center), np.asarray(contact.point)) for s in balls)
 
 
-def node_of(kind: str, number: int, name: str) -> Any:
+def node_of(kind: str, number: int, name: str, group: tuple[str, ...] = ("meshcat",)) -> Any:
     """Where a body or an obstacle is in MeshCat's scene."""
     from meshcat.path import Path as Node
 
-    return Node(("meshcat", kind, _label(str(number), name)))
+    return Node((*group, kind, label(str(number), name)))
 
 
-def _label(before: str, name: str) -> str:
-    """The MeshCat name of a part named by the user: in its paths a slash separates, and in its table of parts
-    JavaScript has words of its own, such as "constructor", which the number before keeps apart.
-    """
-    return escape(f"{before} {name.replace('/', '|')}")
-
-
-def _animation(m: Motion) -> Any:
-    """One clip per body, a key at every knot; the browser interpolates."""
-    from meshcat.animation import Animation, AnimationClip
-    from meshcat.commands import SetAnimation
+def _clips(m: Motion, group: tuple[str, ...], end: float) -> dict[Any, Any]:
+    """One clip per body, a key at every knot; the browser interpolates. What ends before the others stays there."""
+    from meshcat.animation import AnimationClip
 
     clips = {}
-    # a plant steps more often than a screen: keys that no frame would show only make the file larger
-    every = max(1, int(1.0 / (FRAMES * (m.time[1] - m.time[0])) + 1e-9)) if len(m.time) > 1 else 1
-    frames = [float(t * FRAMES) for t in m.time[::every]]
+    every = sparse(m.time)
+    times, rows = [*m.time[::every]], [*range(0, len(m.time), every)]
+    if end > times[-1]:
+        times, rows = [*times, end], [*rows, len(m.time) - 1]
     for k, body in enumerate(m.mechanism.bodies):
         clip = AnimationClip(fps=FRAMES)
-        for frame, position, quaternion in zip(frames, m.position[::every, k], m.quaternion[::every, k], strict=True):
-            clip.set_property(frame, "position", "vector3", position.tolist())
-            clip.set_property(frame, "quaternion", "quaternion", np.roll(quaternion, -1).tolist())
-        clips[node_of("bodies", k, body.name)] = clip
+        for time, row in zip(times, rows, strict=True):
+            clip.set_property(float(time * FRAMES), "position", "vector3", m.position[row, k].tolist())
+            turn = np.roll(m.quaternion[row, k], -1).tolist()
+            clip.set_property(float(time * FRAMES), "quaternion", "quaternion", turn)
+        clips[node_of("bodies", k, body.name, group)] = clip
+    return clips
+
+
+def _animation(clips: dict[Any, Any]) -> Any:
+    from meshcat.animation import Animation
+    from meshcat.commands import SetAnimation
+
     return SetAnimation(Animation(clips, default_framerate=FRAMES), play=True, repetitions=1000)

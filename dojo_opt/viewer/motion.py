@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from dojo_opt.viewer.drawing import Piece, pieces
+from dojo_opt.constraint import Goal
+from dojo_opt.planning.names import chosen_components
+from dojo_opt.viewer.drawing import Piece, extent, pieces
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.poses import poses
@@ -34,6 +36,9 @@ class Motion:
         contact_time: (N,) end of each simulation step [s].
         normal_force: (N, ncontact) mean normal force over the step [N].
         friction_force: (N, ncontact) size of the mean friction force over the step [N].
+        force: (N, ncontact, 3) mean force of each contact on its body, world axes [N].
+        point: (N, ncontact, 3) its point of action [m].
+        goal: (nbody, 7) places and quaternions of the bodies at the goal of a plan; None where there is none.
     """
 
     mechanism: Mechanism
@@ -45,11 +50,29 @@ class Motion:
     contact_time: Array
     normal_force: Array
     friction_force: Array
+    force: Array
+    point: Array
+    goal: Array | None = None
 
     @cached_property
     def pieces(self) -> dict[str, list[Piece]]:
         """The drawing of every body."""
         return pieces(self.mechanism)
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest coordinates (3,) of the drawing of the first pose [m]."""
+        turn = [rotation_matrix(q) for q in self.quaternion[0]]
+        names = self.mechanism.body_names
+        points = [extent(self.pieces[name]) @ turn[k].T + self.position[0, k] for k, name in enumerate(names)]
+        every = np.concatenate(points)
+        return every.min(axis=0), every.max(axis=0)
+
+    @property
+    def radius(self) -> float:
+        """Half of the longest side of the first pose [m]."""
+        low, high = self.bounds
+        return max(0.1, 0.5 * float((high - low).max()))
 
     __repr__ = brief_repr
 
@@ -92,11 +115,9 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
     x, u = np.asarray(result.x, dtype=np.float64), np.asarray(result.u, dtype=np.float64)
     known = getattr(result, "contacts", None)  # a plan has none
     substeps = 1 if isinstance(result, Trajectory) else getattr(result, "substeps", 1)  # per knot
-    if known is None:
-        normal, friction = _contact_forces(sim, x, u, substeps)
-    else:
-        normal, friction = known.normal_force, known.friction_force
+    normal, friction, force, point = _contact_forces(sim, x, u, substeps) if known is None else _of(known)
     z = sim.maximal(x)
+    end = _goal(result, sim)
     return Motion(
         mechanism=sim.mechanism,
         time=sim.time_step * substeps * np.arange(len(x), dtype=np.float64),
@@ -107,7 +128,26 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
         contact_time=sim.time_step * np.arange(1, len(normal) + 1, dtype=np.float64),
         normal_force=normal,
         friction_force=friction,
+        force=force,
+        point=point,
+        goal=None if end is None else sim.maximal(end)[:, [0, 1, 2, 6, 7, 8, 9]],
     )
+
+
+def _goal(result: Any, sim: Simulator) -> Array | None:
+    """(nx,) target of the last knot of a plan, if it has a `Goal` there; coordinates that it leaves free as planned."""
+    problem: Any = getattr(result, "problem", None)
+    for spec in () if problem is None else problem.specs[1]:
+        if isinstance(spec, Goal) and np.isin([-1, problem.horizon], np.atleast_1d(spec.knots)).any():
+            target = np.array(np.atleast_2d(np.asarray(spec.target, dtype=np.float64))[-1])
+            if target.shape != (sim.nx,):
+                continue
+            mask = np.zeros(sim.ndx)
+            mask[chosen_components("Goal(components=...)", spec.components, sim)] = 1.0
+            last = np.asarray(result.x[-1], dtype=np.float64)
+            if mask[: sim.nv].any():
+                return np.asarray(sim.integrate(last, mask * sim.difference(target, last)))
+    return None
 
 
 def _standing(mech: Mechanism) -> Motion:
@@ -126,10 +166,17 @@ def _standing(mech: Mechanism) -> Motion:
         contact_time=np.zeros(0),
         normal_force=none,
         friction_force=none,
+        force=np.zeros((*none.shape, 3)),
+        point=np.zeros((*none.shape, 3)),
     )
 
 
-def _contact_forces(sim: Simulator, x: Array, u: Array, substeps: int) -> tuple[Array, Array]:
-    """Mean normal and friction force of every simulation step; a knot spans `substeps` of them."""
-    knots = [sim.rollout(x[t], np.tile(u[t], (substeps, 1)), throw=True).contacts for t in range(len(u))]
-    return np.concatenate([c.normal_force for c in knots]), np.concatenate([c.friction_force for c in knots])
+def _contact_forces(sim: Simulator, x: Array, u: Array, substeps: int) -> tuple[Array, ...]:
+    """Forces of every simulation step, as `_of`; a knot spans `substeps` of them."""
+    knots = [_of(sim.rollout(x[t], np.tile(u[t], (substeps, 1)), throw=True).contacts) for t in range(len(u))]
+    return tuple(np.concatenate(parts) for parts in zip(*knots, strict=True))
+
+
+def _of(contacts: Any) -> tuple[Array, ...]:
+    """Normal and friction force (N, k), the force and its point of action (N, k, 3)."""
+    return contacts.normal_force, contacts.friction_force, contacts.force, contacts.point

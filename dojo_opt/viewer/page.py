@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import base64
+import json
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
-from dojo_opt.viewer import drawing
 from dojo_opt.viewer.motion import Array, Motion
-from sim.mechanism.shapes import rotation_matrix
 
 __all__ = ["page"]
 
 _SIDE = np.array([0.6, -1.0, 0.35])  # from where the camera looks
+_FRONT = np.array([1.0, -0.5, 0.5])  # the same for motions side by side
+_CLOSER = 0.6  # share of the width of a row of motions that counts for the distance: a picture is wider than high
 _AWAY = 2.6  # its distance over the radius of the robot: with MeshCat's 75 degrees a third of the picture
 _POINTS = 200  # of the path that the camera follows
+_ROOM = 0.3  # [m] between motions side by side
+_BOXES = {"forces": "forces", "paths": "paths", "ghost": "goal"}  # parts of MeshCat's scene, as the page calls them
 _SKY, _HORIZON = (1.0, 1.0, 1.0), (0.84, 0.88, 0.93)
 
 _PAGE = """<!DOCTYPE html>
@@ -29,13 +33,16 @@ body {{margin: 0; font: 14px system-ui, sans-serif; color: #223}}
 .dg {{display: none !important}}
 #bar {{position: absolute; left: 0; right: 0; bottom: 0; display: flex; gap: 12px; align-items: center;
       padding: 8px 16px; background: rgba(255, 255, 255, 0.8)}}
-#time {{flex: 1}} #bar > * {{white-space: nowrap}}
-#bar button {{width: 64px}} #clock {{width: 110px; font-variant-numeric: tabular-nums}}
+#time {{flex: 1; min-width: 60px}} #bar > * {{white-space: nowrap}}
+#bar button {{min-width: 28px}} #play {{width: 64px}} #clock {{width: 110px; font-variant-numeric: tabular-nums}}
 </style></head>
-<body><div id="meshcat-pane"></div>
-<div id="bar"><b>{title}</b><button id="play">pause</button><input id="time" type="range" min="0" max="{duration}"
-step="0.001" value="0"><span id="clock"></span><label><input id="follow" type="checkbox" checked> follow</label>
-<span>drag to turn, scroll to zoom</span></div>
+<body><div id="meshcat-pane" title="drag to turn, scroll to zoom"></div>
+<div id="bar"><b>{title}</b><button id="play">pause</button><button id="back" title="one knot back">&lsaquo;</button>
+<button id="ahead" title="one knot ahead">&rsaquo;</button><input id="time" type="range" min="0" max="{duration}"
+step="0.001" value="0"><span id="clock"></span><select id="speed" title="speed"><option value="0.1">1/10</option>
+<option value="0.25">1/4</option><option value="0.5">1/2</option><option value="1" selected>1 x</option>
+<option value="2">2 x</option></select>{boxes}
+<label><input id="follow" type="checkbox" checked> follow</label></div>
 <script>{viewer}</script>
 <script>
 const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
@@ -56,12 +63,36 @@ button.onclick = () => {{
     animator.playing ? animator.pause() : animator.play();
     button.textContent = animator.playing ? "pause" : "play";
 }};
-slider.oninput = () => {{
+const go = time => {{
     animator.pause();
     button.textContent = "play";
-    animator.seek(Number(slider.value));
+    animator.seek(time);
+    slider.value = now();
     tell();
 }};
+slider.oninput = () => go(Number(slider.value));
+document.getElementById("back").onclick = () => go((Math.round(now() / {knot}) - 1) * {knot});
+document.getElementById("ahead").onclick = () => go((Math.round(now() / {knot}) + 1) * {knot});
+document.getElementById("speed").onchange = event => {{animator.mixer.timeScale = Number(event.target.value);}};
+for (const [path, pose] of {ghosts}) {{  // the goal: a copy of every body, which one sees through
+    const body = viewer.scene_tree.find(path).object, copy = body.clone(true);
+    copy.traverse(part => {{
+        if (!part.material) return;
+        part.material = part.material.clone();
+        Object.assign(part.material, {{transparent: true, opacity: 0.25, depthWrite: false}});
+    }});
+    copy.position.set(...pose.slice(0, 3));
+    copy.quaternion.set(...pose.slice(3));
+    viewer.scene_tree.find([...path.slice(0, -2), "ghost"]).object.add(copy);
+}}
+for (const box of document.querySelectorAll("input[data-part]")) {{
+    const show = () => {{
+        for (const group of {groups}) viewer.set_property([...group, box.dataset.part], "visible", box.checked);
+        viewer.set_dirty();
+    }};
+    box.onchange = show;
+    show();
+}}
 setInterval(() => {{ if (animator.playing) {{slider.value = now(); tell();}} }}, 50);
 const path = [{path}], follow = document.getElementById("follow");  // of the robot, at even times
 let seen = path[0];
@@ -87,17 +118,18 @@ track();
 """
 
 
+def spacing(motions: Sequence[Motion]) -> float:
+    """Distance between motions side by side: room for the widest and its way to the side [m]."""
+    return max(float((m.bounds[1] - m.bounds[0])[1] + np.ptp(m.position[..., 1])) for m in motions) + _ROOM
+
+
 def _path(m: Motion) -> tuple[Array, float]:
     """The middle of the moving parts at even times (n, 3), and their radius [m].
 
     The camera does not move in a direction in which the parts stay within a radius.
     """
-    turn = [rotation_matrix(q) for q in m.quaternion[0]]
-    points = np.concatenate(
-        [drawing.extent(m.pieces[name]) @ turn[k].T + m.position[0, k] for k, name in enumerate(m.mechanism.body_names)]
-    )
-    low, high = points.min(axis=0), points.max(axis=0)
-    radius = max(0.1, 0.5 * float((high - low).max()))
+    low, high = m.bounds
+    radius = m.radius
     middle = m.position.mean(axis=1) - m.position[0].mean(axis=0) + 0.5 * (low + high)
     times = np.linspace(0.0, m.time[-1], min(_POINTS, len(m.time)))
     path = np.stack([np.interp(times, m.time, middle[:, k]) for k in range(3)], axis=1)
@@ -107,17 +139,69 @@ def _path(m: Motion) -> tuple[Array, float]:
     return path, radius
 
 
-def page(m: Motion, commands: list[Any]) -> str:
-    """The page that shows the commands, with the camera beside the motion."""
+def _ghosts(m: Motion, group: tuple[str, ...]) -> list[Any]:
+    """Of every body, its path in MeshCat's scene and its pose at the goal: place, and quaternion (x, y, z, w)."""
+    if m.goal is None:
+        return []
+    nodes = [[*group, "bodies", label(str(k), name)] for k, name in enumerate(m.mechanism.body_names)]
+    poses = np.round(np.concatenate([m.goal[:, :3], np.roll(m.goal[:, 3:], -1, axis=1)], axis=1), 5)
+    return [[node, pose] for node, pose in zip(nodes, poses.tolist(), strict=True)]
+
+
+def label(before: str, name: str) -> str:
+    """The MeshCat name of a part named by the user: in its paths a slash separates, and in its table of parts
+    JavaScript has words of its own, such as "constructor", which the number before keeps apart.
+    """
+    return escape(f"{before} {name.replace('/', '|')}")
+
+
+def group_of(number: int) -> tuple[str, ...]:
+    """Where in MeshCat's scene a motion is."""
+    return ("meshcat",) if number == 0 else ("meshcat", f"motion{number}")
+
+
+def page(motions: Sequence[Motion], commands: list[Any], shown: Mapping[str, bool]) -> str:
+    """The page that shows the commands, with the camera beside the motions.
+
+    Args:
+        motions: the motions, side by side.
+        commands: MeshCat's commands that draw and move them.
+        shown: whether "forces", "paths" and the "ghost" of the goal are shown at the beginning.
+
+    Returns:
+        The text of an HTML file.
+    """
     from umsgpack import packb
 
     encoded = ",".join(f'"{base64.b64encode(packb(c.lower())).decode()}"' for c in commands)
     viewer = files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8")
+    m, wide = motions[0], 0.5 * (len(motions) - 1) * spacing(motions)
     path, radius = _path(m)
-    eye = path[0] + _AWAY * radius * _SIDE / np.linalg.norm(_SIDE)
+    path[:, 1] -= wide
+    side = _SIDE if len(motions) == 1 else _FRONT
+    eye = path[0] + _AWAY * (radius + _CLOSER * wide) * side / np.linalg.norm(side)
     # the axes of MeshCat's camera: y is up
     places = {name: f"{x:.3f}, {z:.3f}, {-y:.3f}" for name, (x, y, z) in (("eye", eye), ("target", path[0]))}
     places["path"] = ",".join(f"[{x:.3f},{z:.3f},{-y:.3f}]" for x, y, z in path)
     places |= {name: ", ".join(map(str, rgb)) for name, rgb in (("sky", _SKY), ("horizon", _HORIZON))}
-    duration = f"{m.time[-1]:.3g}"
-    return _PAGE.format(title=escape(m.mechanism.name), viewer=viewer, commands=encoded, duration=duration, **places)
+    duration = f"{max(float(each.time[-1]) for each in motions):.3g}"
+    groups = [group_of(k) for k in range(len(motions))]
+    ghosts = [ghost for each, group in zip(motions, groups, strict=True) for ghost in _ghosts(each, group)]
+    there = {"forces": any(len(each.contact_time) and each.force.size for each in motions), "ghost": bool(ghosts)}
+    there["paths"] = len(m.time) > 1
+    boxes = "".join(
+        f'\n<label><input data-part="{part}" type="checkbox"{" checked" * bool(shown.get(part))}> {word}</label>'
+        for part, word in _BOXES.items()
+        if there[part]
+    )
+    return _PAGE.format(
+        title=escape(m.mechanism.name),
+        viewer=viewer,
+        commands=encoded,
+        duration=duration,
+        knot=f"{m.time[1] - m.time[0] if len(m.time) > 1 else 1.0:.6g}",
+        boxes=boxes,
+        ghosts=json.dumps(ghosts),
+        groups=json.dumps(groups),
+        **places,
+    )

@@ -1,8 +1,11 @@
 """Feet: where they are, how they move, inverse kinematics; and the equilibrium of a robot on its feet."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import dojo_opt as dojo
 from dojo_opt import Terrain, models
 from dojo_opt.gaits.equilibrium import equilibrium, potential_gradient
 from dojo_opt.gaits.feet import Feet
@@ -132,6 +135,21 @@ def on_its_feet(robot, x):
     x = x.copy()
     x[2] += targets[:, 2].mean() - feet.positions(x)[:, 2].mean()
     return feet.place(x, targets[None])[0]
+
+
+def test_an_arm_stays_in_equilibrium_with_and_without_contacts():
+    """Nothing touches: the inputs alone hold it; a contact a metre above the ground adds its kappa / gap."""
+    bare = dojo.models.panda(gripper=False)
+    for contacts in ((), (dojo.Contact(bare.body_names[-1], radius=0.02),)):
+        sim = dojo.Simulator(replace(bare, contacts=contacts), time_step=0.01, kappa=1e-4)
+        x, u = dojo.equilibrium(sim)
+        np.testing.assert_allclose(sim.step(x, u, throw=True).x, x, atol=1e-9)
+        assert np.abs(u).max() > 10.0
+    low = dojo.Contact(bare.body_names[-1], (0.0, 0.0, 0.0), 2.0, name="hand")
+    with pytest.raises(ValueError, match="'hand' is .* m deep in the ground near x"):
+        dojo.equilibrium(dojo.Simulator(replace(bare, contacts=[low]), time_step=0.01))
+    with pytest.raises(ValueError, match="no inputs balance the weight"):
+        dojo.equilibrium(dojo.Simulator(replace(bare, inputs=()), time_step=0.01))
 
 
 @pytest.mark.parametrize("ground", [Terrain.slope(0.1, (1.0, 0.5)), WAVES])

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.viewer import animation, drawing
+from dojo_opt.viewer import animation, drawing, overlays
 from dojo_opt.viewer.motion import motion
 from dojo_opt.viewer.page import page as page_of
+from dojo_opt.viewer.page import spacing
 from sim.io.meshes.shading import clustered, shaded
 from sim.io.meshes.triangles import TriangleMesh
 from sim.mechanism.shapes import rotation_matrix
@@ -79,7 +80,7 @@ def shown(page, path, empty=None, seconds=20.0):
 @pytest.mark.slow
 def test_the_robot_is_drawn_and_moves(page, quadruped, tmp_path):
     path = dojo.viewer.save_html(quadruped, tmp_path / "fall.html")
-    (tmp_path / "empty.html").write_text(page_of(motion(quadruped), []))
+    (tmp_path / "empty.html").write_text(page_of([motion(quadruped)], [], {}))
     shown(page, tmp_path / "empty.html")
     time.sleep(2.0)
     empty = shot(page)
@@ -251,3 +252,56 @@ def test_names_of_a_file_are_text_in_the_page_of_show(page, tmp_path):
     assert main(["show", str(tmp_path / "r.urdf"), "--seconds", "0.05", "--html", str(tmp_path / "r.html")]) == 0
     assert opened(page, tmp_path / "r.html") == []
     assert page.title() == NAMES[6]
+
+
+def test_forces_are_bars_as_long_as_the_robot_for_its_weight(quadruped):
+    """At rest the bars of four feet add up to the size of the robot."""
+    sim = quadruped.simulator
+    still, u = dojo.equilibrium(sim)
+    m = motion(sim.rollout(still, np.tile(u, (3, 1))))
+    commands, clips = overlays.forces(m, ("meshcat",), 1.0)
+    bars = [clip.tracks["scale"].values[1][2] for clip in clips.values()]
+    assert len(commands) == 2 * len(bars) == 8 and sum(bars) == pytest.approx(2.0 * m.radius, rel=1e-3)
+    assert all(clip.tracks["scale"].frames[-1] == 60.0 for clip in clips.values())  # they stay until the page ends
+
+
+def test_the_goal_of_a_plan_is_a_ghost_where_the_plan_leaves_nothing_free():
+    sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.05)
+    goal = np.array([np.pi, 0.0])
+    effort = [dojo.cost.Effort(1e-3)]
+    ends = [dojo.constraint.Goal(goal), dojo.constraint.Goal(goal, components="v")]
+    plans = [dojo.ilqr(dojo.Problem(sim, sim.neutral(), horizon=20, cost=effort, constraints=[end])) for end in ends]
+    np.testing.assert_allclose(motion(plans[0]).goal[0, :3], sim.maximal(goal)[0, :3], atol=1e-9)
+    assert motion(plans[1]).goal is None
+    assert motion(sim.rollout(plans[0].x[0], plans[0].u)).goal is None
+
+
+def test_motions_side_by_side_are_apart_and_end_together(quadruped, tmp_path):
+    two = [motion(quadruped), motion(quadruped.simulator.rollout(quadruped.x[0], quadruped.u[:10]))]
+    text = animation.html_of(*two, shown={"forces": True})
+    assert 'data-part="forces" type="checkbox" checked' in text and 'data-part="paths" type="checkbox">' in text
+    assert "motion1" in text and 'data-part="ghost"' not in text
+    assert spacing(two) > np.ptp(two[0].bounds, axis=0)[1]
+    with pytest.raises(ValueError, match="expected one result or more"):
+        dojo.viewer.save_html([], tmp_path / "none.html")
+
+
+@pytest.mark.slow
+def test_a_page_steps_from_knot_to_knot_and_shows_its_overlays(page, quadruped, tmp_path):
+    page.goto(dojo.viewer.save_html([quadruped, quadruped], tmp_path / "two.html", forces=True).as_uri())
+    time.sleep(2.0)
+    page.evaluate("go(0.2)")
+    page.click("#ahead")
+    assert page.evaluate("now()") == pytest.approx(0.21, abs=1e-6)
+    page.click("#back")
+    assert page.evaluate("now()") == pytest.approx(0.2, abs=1e-6)
+    page.select_option("#speed", "0.25")
+    assert page.evaluate("animator.mixer.timeScale") == 0.25
+    page.evaluate("go(0.45)")
+    page.evaluate("follow.checked = false")
+    time.sleep(0.5)
+    before = shot(page)
+    page.uncheck("input[data-part=forces]")
+    time.sleep(0.5)
+    r, g, b = np.moveaxis(before, 2, 0)
+    assert changed(shot(page), before) > 50 and ((r > 2 * g) & (r > 2 * b) & (r > 0.3)).sum() > 50

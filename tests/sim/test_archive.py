@@ -49,6 +49,8 @@ def test_a_trajectory_comes_back_and_goes_on(tmp_path):
     np.testing.assert_array_equal(found.contacts.normal_force, made.contacts.normal_force)
     assert found.simulator.kappa == sim.kappa and found.status == made.status
     np.testing.assert_array_equal(found.simulator.step(found.x[-1]).x, sim.step(made.x[-1]).x)
+    made.save(tmp_path / "a.motion")
+    np.testing.assert_array_equal(dojo.Trajectory.load(tmp_path / "a.motion").x, made.x)
 
 
 def test_a_trajectory_is_exported_by_names(tmp_path):
