@@ -112,6 +112,9 @@ class Division(NamedTuple):
         return cls(substeps, shares, np.zeros(steps))
 
 
+_UNDIVIDED = Division.none(0)
+
+
 class Rolled(NamedTuple):
     """A rollout; rows after the solved steps are undefined."""
 
@@ -301,7 +304,7 @@ class Engine:
         """Steps from the one `first` until the end or the first unsolved one: the number of solved ones, those before
         included, which Interrupted carries, too.
 
-        division: of whole steps, where a divided step leaves its numbers; following: the law of the motion, if any.
+        division: of whole steps, where a divided step leaves its numbers, unless the motion follows a law.
         """
         steps, knot = len(motion.us) * (following.substeps if following else 1), first
         data = self._scratch.table()
@@ -367,7 +370,7 @@ class Engine:
         motion = MotionBuffers(path.xs, path.us, policy.wrenches, path.report[None], *self.unkept)
         following = Following(policy, float(alpha), *limits, substeps, path.cones, path.bounds)
         try:
-            done = self.take_steps(self.step_table(), motion, kappa, Division.none(knots), following)
+            done = self.take_steps(self.step_table(), motion, kappa, _UNDIVIDED, following)
         except Interrupted as stop:
             interrupted(path.report[None], 0 if stop.result < steps else 1)
             raise Interrupted((stop.result // substeps, path)) from None
