@@ -51,6 +51,7 @@ measure robustness "$python" "$here/benchmarks/robustness.py" $quick --out "$out
 measure attacks "$python" "$here/benchmarks/attacks.py" $quick --out "$out"
 measure division "$python" "$here/benchmarks/division.py" $quick --out "$out"
 measure accuracy "$python" "$here/benchmarks/accuracy.py" $quick --out "$out"
+measure contact_costs "$python" "$here/benchmarks/contact_costs.py" $quick --out "$out"
 measure falls "$python" "$here/benchmarks/falls.py" $quick --out "$out"
 measure gaits "$python" "$here/benchmarks/gaits.py" $quick --out "$out"
 measure loops "$python" "$here/benchmarks/loops.py" $quick --out "$out"

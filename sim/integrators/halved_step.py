@@ -19,8 +19,9 @@ FAILED = 1e300
 
 _SOLVED = int(Status.SOLVED)
 _TOUCHING = 0.125  # gap of a contact that closes, in accuracies
-_PRESSED = 8.0
-_NOISE = 1e-10  # [m, rad] error that is not seen: the gap of a contact on the central path is as exact
+_PRESSED, _HELD = 8.0, 4.0
+# [m, rad] error that is not seen: the gap of a contact on the central path is as exact; that of a loop
+_NOISE, _CLOSED = 1e-10, 1e-12
 _OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes deeper ones, whatever its length
 _AHEAD = 1e-3  # [s] least length of the steps behind an impact whose velocities are compared
 
@@ -68,6 +69,7 @@ def _difference(
     """Largest e = |q - q'|/2 + |v - v'| t of the coordinates after a step and after its two halves [m, rad].
 
     In contact without an impact, _PRESSED times that: errors of the velocity go on there, and grow where a body tips.
+    _HELD times by loops and gears alone.
 
     v, v': after an impact, as means of another step, in which the ground has acted. Without an impact these do not
     count: they are as different as the gap of a contact is, over the length of the step.
@@ -80,11 +82,14 @@ def _difference(
         if _step_ahead(model_at, data_at, options, line, line.trial, line.node) == _SOLVED:
             one, other = line.ahead, line.node
     configuration_difference(model, line.whole[:nq], line.mean[:nq], embedded.distance)
+    noise = _NOISE if model.contact_body.shape[0] + model.limit_dof.shape[0] > 0 else _CLOSED
     error, time = 0.0, max(goal[2] - line.clock[Clock.TIME], 0.5) if hits else 0.0
     for d in range(embedded.distance.shape[0]):
         moved, turned = 0.5 * abs(embedded.distance[d]), abs(one[nq + d] - other[nq + d])
-        error = max(error, max(moved - _NOISE, 0.0) + time * turned)
-    return _PRESSED * error if presses and not hits else error
+        error = max(error, max(moved - noise, 0.0) + time * turned)
+    if presses:
+        return error if hits else _PRESSED * error
+    return _HELD * error if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0 else error
 
 
 @kernel

@@ -4,6 +4,9 @@
     v25            = that of a step (step.py) from (q2, v15)
     (M(q3) + C) v3 = p(q3, v25; h) + h/2 f(q3)            C: of dampers (dynamics/joints/damper.py)
 
+of which closed loops and gears take the part across them, in the metric of M + C (dynamics/loops/loop_velocity.py):
+half of their impulse at a node belongs to each of its steps.
+
 f: generalized forces of inputs and external wrenches. The step lets all their impulse h f act at its first node; half
 of it belongs to its last, as of the impulse of dampers. So steps of different lengths follow one another at second
 order, and without these forces momentum is handed on as it is.
@@ -17,12 +20,14 @@ from __future__ import annotations
 from sim.dynamics.elimination import add_children, dot_six
 from sim.dynamics.energy import solve_mass_matrix
 from sim.dynamics.external_forces import input_wrench, set_external
+from sim.dynamics.loops.loop_velocity import close_velocity
+from sim.integrators.closed_interval import close_interval
 from sim.integrators.rollout import begin
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import InputKind, Model
 from sim.model.options import Guess, StepOptions
-from sim.solve.start_velocity import momentum_error, momentum_of_velocity, state_of_momentum
+from sim.solve.start_velocity import meet_momentum, momentum_error, momentum_of_velocity
 from sim.step import step
 from solvers.compiler import Table, kernel
 from solvers.dense import copy_vector
@@ -79,7 +84,8 @@ def mean_of_node(model_at: Table, data_at: Table, h: float, u: Vector, x: Vector
     momentum_error(model, data, h, x, x[nq:], data.residual)  # for the poses
     momentum_of_velocity(model, data, h, x[nq:], data.nu)
     add_forces(model, data, -0.5 * h, u, data.nu)
-    return state_of_momentum(model_at, data_at, h, data.nu, mean)
+    status = meet_momentum(model, data, h, mean)
+    return close_interval(model, data, h, mean) if status == _SOLVED else status
 
 
 @kernel
@@ -92,6 +98,7 @@ def node_of_mean(model: Model, data: Data, h: float, u: Vector, mean: Vector, x:
     add_forces(model, data, 0.5 * h, u, data.residual)
     if not solve_mass_matrix(model, data, h, data.residual, data.dnu):
         return _SINGULAR
+    close_velocity(model, data, h, mean[:nq], mean[nq:], data.dnu)
     for k in range(nq):
         x[k] = mean[k]
     for d in range(data.dnu.shape[0]):

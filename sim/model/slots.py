@@ -199,3 +199,5 @@ class Slot(IntEnum):
     PUT_SPHERE_FIELD = 163
     PUT_CAPSULE_FIELD = 164
     CHOOSE_CAPSULE_FIELD = 165
+    # dampers between closed loops and gears, with an accuracy
+    CLOSE_INTERVAL = 166

@@ -39,11 +39,13 @@ from solvers.status import Status
 from solvers.types import Cube, Integers, Vector
 
 SHORTEST = 1e-7  # [s]
+_BRIEF = 1e-3  # time steps, an interval in which dampers have next to no inertia
 _IMPACT = 1e-6  # [kg s] shortest length of an impact, times a mass: kappa is the least one there, and not to be felt
 # (h w)^2 of the shortest step h, where w^2 = m g^2 h/kappa is the stiffness over m of a contact that carries m g
 _SETTLED = 10.0
 _LEAST_PRESSING = 1e-6  # [m/s, rad/s] accuracy: shorter impacts would round velocities
 _LEAST_KAPPA = 1e-13  # [N s m]
+_CONVERGED = 1e-6  # tolerance of steps with loops or gears, in accuracies
 _ROWS = 256  # sub-steps between two pauses
 
 Held = tuple[Vector, Cube]  # input (nu,) and external wrenches (1 or 0, nbody, 6) of a step
@@ -66,6 +68,8 @@ class AdaptiveEngine(KnotEngine):
     """The kernels of one packed mechanism, with steps of the accuracy of its settings."""
 
     def __init__(self, model: Model, settings: Settings) -> None:
+        if len(model.loop_ntrans) + len(model.gear_dof):  # many sub-steps add up what each leaves of its residual
+            settings = settings._replace(tolerance=min(settings.tolerance, _CONVERGED * settings.accuracy))
         super().__init__(model, settings)
         self._second = Engine(model, settings._replace(order=2))
         coupled = len(model.pair_kind) + len(model.loop_ntrans) + len(model.gear_dof)
@@ -259,6 +263,8 @@ class AdaptiveEngine(KnotEngine):
 
     def slopes(self, path: Substeps, held: Held, kappa: float | None = None) -> tuple[Floats, Floats, float]:
         """(A, B, accuracy of them) of a step: the products of those of its sub-steps, whose lengths are held."""
+        if self.sizes.nloop + self.sizes.ngear:
+            self._refuse("derivatives through closed loops and gears are")
         A, B, accuracy = np.eye(self.ndx), np.zeros((self.ndx, self.nu)), 0.0
         for x, h, order in zip(path.starts, path.lengths, path.orders, strict=True):
             _, dx, du, report = self.part_slopes(x, held, h, int(order), kappa)
@@ -304,6 +310,11 @@ class AdaptiveEngine(KnotEngine):
             raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, division)) from None
         return Rolled(knot, xs, reports, contacts, A, B, division)
 
+    def along_loops(self, x: Vector) -> Vector:
+        """The velocity (nv,) nearest to that of x, in the metric of the masses, that keeps loops and gears closed."""
+        nq, h = self.sizes.nq, _BRIEF * self.settings.time_step
+        return np.asarray(self._second.node_velocities(self._second.started(x[:nq], x[nq:], h)[None], h)[0])
+
     def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Vector) -> Floats:
         """(n, nx) nodes of a motion (states, inputs, external wrenches) at times since its beginning, in any order [s].
 
@@ -348,20 +359,20 @@ def _lightest(model: Model) -> float:
 
 
 def check_adaptive(mechanism: Mechanism, accuracy: float) -> None:
-    """Refuse loops and gears, whose nodes have no velocity of their own, and an accuracy that contacts do not have."""
+    """Refuse dry friction and limits of servos, whose kinks are not found, and accuracies that contacts do not have."""
     stops = any(np.isfinite(pair).any() for joint in mechanism.joints for pair in joint.limits or ())
     stops = stops or any(joint.cone is not None for joint in mechanism.joints)
-    if accuracy < _LEAST_PRESSING and (mechanism.contacts or mechanism.collisions or stops):
+    held = stops or mechanism.contacts or mechanism.collisions or mechanism.loops or mechanism.gears
+    if accuracy < _LEAST_PRESSING and held:
         raise ValueError(
-            f"Simulator(accuracy=...): expected at least {_LEAST_PRESSING:g} with contacts, collisions or limits of "
-            f"joints, whose errors are not seen below that, got {accuracy:g}"
+            f"Simulator(accuracy=...): expected at least {_LEAST_PRESSING:g} with contacts, collisions, limits of "
+            f"joints, closed loops or gears, whose errors are not seen below that, got {accuracy:g}"
         )
-    names = [("loop joint", j.name) for j in mechanism.loops] + [("gear", g.name) for g in mechanism.gears]
-    names += [("dry friction of", j.name) for j in mechanism.joints if np.any(j.friction)]
+    names = [("dry friction of", j.name) for j in mechanism.joints if np.any(j.friction)]
     names += [("limited servo", part.name) for _, part in limited_servos(mechanism.inputs or ())]
     if names:
         what, name = names[0]
         raise ValueError(
             f"Simulator(accuracy=...): {mechanism.name!r} has the {what} {name!r}; steps of a given accuracy are for "
-            "trees without dry friction and limits of servos: use a time step"
+            "mechanisms without dry friction and limits of servos: use a time step"
         )

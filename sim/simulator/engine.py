@@ -493,13 +493,20 @@ class Engine:
         status = start_velocity.start_at(self._model, self._scratch.table(), h or self.settings.time_step, v, x)
         return int(status), x
 
-    def started(self, q: Vector, v: Vector) -> Vector:
+    def started(self, q: Vector, v: Vector, h: float | None = None) -> Vector:
         """`start`; SimulationError if no such state exists."""
-        status, x = self.start(q, v)
+        status, x = self.start(q, v, h)
         if status != Status.SOLVED:
             reason = Status(status)
             raise SimulationError(f"Simulator.start: {MESSAGES[reason]}", reason)
         return x
+
+    def along_loops(self, x: Vector) -> Vector | None:
+        """Of states with the velocity of their node, the nearest velocity along closed loops and gears; None of others.
+
+        The velocity of a state of order 2 is closed by its interval.
+        """
+        return None
 
     def node_velocities(self, xs: Floats, h: float | None = None) -> Floats:
         """Joint velocities at the node of every row, (n, nv)."""

@@ -106,6 +106,7 @@ from sim.dynamics.loops.gears import (
 )
 from sim.dynamics.loops.loop_velocity import close_velocity
 from sim.dynamics.loops.loop_work import loop_slack, loops_gained
+from sim.integrators.closed_interval import close_interval
 from sim.model.model import Law, Model
 from sim.model.shape_kinds import SWAPPED, Pair
 from sim.solve.delassus import contact_answers, contact_rates
@@ -253,6 +254,8 @@ def link_nodes(model: Model) -> None:
     """Link the kernels of velocities and energies at nodes: those of loops follow from their constraints."""
     if len(model.loop_ntrans) + len(model.gear_dof):
         link(model.optional, *_COUPLING, close_velocity)
+        if np.any(model.dof_damper):
+            link(model.optional, close_interval)
     if len(model.gear_dof):
         link(model.optional, unit_gear_impulse, gear_response)
 

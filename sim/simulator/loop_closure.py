@@ -92,13 +92,17 @@ class Closure:
         return np.concatenate([held, turned if joint.nrot < 3 else turned[:, :0]], axis=1)
 
     def close(self, x: Floats, *, search: bool = True) -> Floats:
-        """The state near x whose loops are closed at both ends of its interval.
+        """The state near x whose loops are closed at both ends of its interval, or along which its velocity is.
 
         search: whether to look further away where Newton's method finds none, as from a linkage in one line.
         ValueError: there is none near, with the loop that stays open and by how much.
         """
         nv = self._mechanism.nv
         x = self._placed(x, search)
+        along = self._engine.along_loops(x)
+        if along is not None:
+            x[self._nq :] = along
+            return x
 
         def before(dv: Floats) -> Floats:
             back = np.concatenate([-self._h * (x[self._nq :] + dv), np.zeros((len(dv), nv))], axis=1)

@@ -231,7 +231,7 @@ class StateSpace:
         v0 = checks.array("Simulator.start(v)", v, (self.nv,))
         q0 = self._arguments.states("Simulator.start(q)", np.concatenate([q0, v0]))[: self.nq]
         x0 = np.concatenate([q0, v0])
-        if self._closes and self.order == 2:
+        if self._closes:
             return Closure(self.mechanism, self._engine).start(self._placed("start", x0)[: self.nq], v0)
         return self._arguments.finite("start", self._engine.started(q0, v0), x0[None])
 

@@ -151,6 +151,12 @@ def _momentum_scale(model: Model, data: Data, h: float, x: Vector) -> float:
 
 
 @kernel
+def meet_momentum(model: Model, data: Data, h: float, x: Vector) -> int:
+    """Solve p(q, v15; h) = p for v15, p (nv,) in data.nu.   x: [q; guess of v15], its velocities are overwritten."""
+    return _meet_momentum(model, data, h, _momentum_scale(model, data, h, x), x)
+
+
+@kernel
 def start_state(model: Model, data: Data, h: float, velocity: Vector, x: Vector) -> int:
     """Solve p(q, v15) = (M(q) + C) velocity for v15.
 
@@ -158,7 +164,7 @@ def start_state(model: Model, data: Data, h: float, velocity: Vector, x: Vector)
     """
     momentum_error(model, data, h, x, velocity, data.residual)  # for the poses
     momentum_of_velocity(model, data, h, velocity, data.nu)
-    return _meet_momentum(model, data, h, _momentum_scale(model, data, h, x), x)
+    return meet_momentum(model, data, h, x)
 
 
 @kernel
@@ -179,11 +185,11 @@ def momentum_at(model_at: Table, data_at: Table, h: float, x: Vector, out: Vecto
 
 @kernel
 def state_of_momentum(model_at: Table, data_at: Table, h: float, p: Vector, x: Vector) -> int:
-    """Solve p(q, v15; h) = p for v15.   x: [q; first guess of v15], its velocities are overwritten; p: (nv,)."""
+    """`meet_momentum` of p (nv,), from tables."""
     model = model_view(model_at)
     data = data_view(data_at)
     copy_vector(p, data.nu)
-    return _meet_momentum(model, data, h, _momentum_scale(model, data, h, x), x)
+    return meet_momentum(model, data, h, x)
 
 
 @kernel

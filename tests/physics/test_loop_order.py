@@ -105,3 +105,21 @@ def test_positions_and_node_velocities_are_of_second_order(
     coarse, fine = np.array(errors)
     assert (coarse < [0.01, 0.06]).all()  # [rad], [rad/s]
     np.testing.assert_allclose(coarse / fine, 4.0, rtol=0.1)
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5, 1e-6])
+@pytest.mark.parametrize("linkage", [fourbar, fivebar])
+def test_loops_have_the_accuracy_that_is_asked_for(
+    linkage: Callable[[], tuple[dojo.Mechanism, PlanarLoop, np.ndarray]], accuracy: float
+) -> None:
+    mech, plane, coordinates = linkage()
+    sim = dojo.Simulator(mech, accuracy=accuracy)
+    q = sim.neutral()[: sim.nq]
+    a = np.linalg.solve(coordinates, q)
+    N = plane.freedom(a)
+    w = PUSH * N @ (N.T @ np.ones(len(a)))
+    exact = solve_ivp(plane.rate, (0.0, DURATION), [*a, *w], "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    t = sim.rollout(sim.start(q, coordinates @ w), duration=DURATION, throw=True)
+    assert np.abs(t.x[-1, : sim.nq] - coordinates @ exact[: len(a)]).max() < 3.0 * DURATION * accuracy
+    assert np.abs(t.x[-1, sim.nq :] - coordinates @ exact[len(a) :]).max() < 60.0 * DURATION * accuracy
+    assert max(np.abs(gap).max() for gap in sim.loop_gaps(t.x[-1]).values()) < 1e-9

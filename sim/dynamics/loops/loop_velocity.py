@@ -8,8 +8,9 @@ With v = M^-1 p, p without the half of the loops' impulses that acts at the node
 from __future__ import annotations
 
 from sim.dynamics.loops.bifurcation import lead_loops
-from sim.dynamics.loops.closure import direct_loops
+from sim.dynamics.loops.closure import direct_loops, loop_rows
 from sim.dynamics.loops.coupling_system import body_twists, factor_coupling, solve_coupling
+from sim.dynamics.loops.gears import gear_row
 from sim.model.columns import CoupleRank
 from sim.model.data import Data
 from sim.model.model import Model
@@ -59,3 +60,28 @@ def close_velocity(model: Model, data: Data, h: float, q: Vector, v: Vector, out
         body_twists(model, data, out)
         solve_coupling(model, data, 0.0, out)
     data.bifurcation_replaces[0] = 0
+
+
+@kernel
+def closing_velocity(model: Model, data: Data, h: float) -> bool:
+    """data.dnu = M^-1 G^T f, by which a velocity changes to close loops and gears at configuration 1: G dv = g_1/h.
+
+    With configurations 1 and 2, and the mass matrix of 2 factored; False where the loops are singular.
+    """
+    direct_loops(model, data)
+    data.bifurcation_count[0] = 0
+    _set_rows(model, data)
+    if not factor_coupling(model, data):
+        return False
+    for m in range(model.loop_ntrans.shape[0]):
+        loop_rows(model, data, m, data.pos1, data.rot1, data.couple_G)
+    for k in range(model.gear_dof.shape[0]):
+        a, b = data.theta1[model.dof_qadr[model.gear_dof[k, 0]]], data.theta1[model.dof_qadr[model.gear_dof[k, 1]]]
+        data.couple_gap[gear_row(model, k)] = a - model.gear_ratio[k] * b - model.gear_offset[k]
+    for row in range(data.couple_gap.shape[0]):
+        data.couple_gap[row] *= -1.0 / h
+    for d in range(data.dnu.shape[0]):
+        data.dnu[d] = 0.0
+    body_twists(model, data, data.dnu)
+    solve_coupling(model, data, 1.0, data.dnu)
+    return True
