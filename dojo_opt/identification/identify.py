@@ -7,7 +7,8 @@ the mean square of the errors, rms^2, is by how much, and the data count that mu
 
 Starts are eliminated window by window (Schur complement), so the work grows with the data and not with its square. rho
 is Huber's, by iteratively reweighted least squares: a state whose scaled error has a root mean square above `outlier`
-counts linearly. Levenberg and Marquardt's damping; parameters stay within their bounds by projection.
+counts linearly. Levenberg and Marquardt's damping; parameters stay within their bounds by projection. Motions through
+many contacts have local minima: fits from several starts, in workers if wanted, keep the one of the least cost.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from concurrent.futures import Executor
+from contextlib import suppress
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.identification.windows import Predictor, Window, WindowErrors, cut_windows
+from dojo_opt.planning.executors import check_executor, results_in_order
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_table
 from sim.simulator.simulator import Simulator
@@ -34,6 +38,7 @@ __all__ = ["Identified", "IdentifyOptions", "identify"]
 
 _DAMPING, _LEAST, _LARGEST = 1e-3, 1e-9, 1e8  # share of the diagonal
 _UNSEEN = 1e-8  # of the largest eigenvalue: combinations that the data do not tell
+_AWAY = 0.3  # of a value: standard deviation of further starts where no prior tells one
 _EXACT = 1e-10  # square of the errors over their noise: data without noise
 COLUMNS = ("iteration", "kappa", "cost", "rms", "damping", "step", "outliers", "unsolved", "seconds")
 _HEADER = "{:>9} {:>8} {:>12} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8}".format(*COLUMNS)
@@ -56,6 +61,7 @@ class Identified:
         unseen: combinations, by label, that change no prediction, and that no prior tells.
         outliers: share of states that count less than fully.
         unsolved: windows that could not be predicted at the end, and do not count.
+        cost: that of the data and the prior, as in the module.
         starts: (nx,) of every window.
         history: one record per iteration.
         seconds: processor time.
@@ -73,6 +79,7 @@ class Identified:
     unseen: list[dict[str, float]]
     outliers: float
     unsolved: int
+    cost: float = float("nan")
     starts: list[Floats] = field(default_factory=list)
     history: list[dict[str, Any]] = field(default_factory=list)
     seconds: float = 0.0
@@ -276,6 +283,9 @@ def identify(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     prior: Mapping[str, Any] | None = None,
     noise: ArrayLike = 1.0,
+    starts: int = 1,
+    seed: int = 0,
+    executor: Executor | None = None,
     **options: Any,
 ) -> Identified:
     """Fit parameters to measured motions: see the module.
@@ -290,6 +300,10 @@ def identify(
             ruler, scales, a data sheet. A name covers all its components; the mean is that of `sim` by default, or one
             number or one for each component. Few motions determine few parameters; the rest stay at their priors.
         noise: standard deviation of the measurement of a state, one or (ndx,); infinite where there is none.
+        starts: number of fits; the first begins with the values of `sim`, further ones with values drawn from the
+            prior, or around those of `sim` with a deviation of three tenths (default 1). The best one is returned.
+        seed: of these values (default 0).
+        executor: whose workers fit, as for `dojo.monte_carlo`; the result does not depend on it (default None).
         **options: fields of `IdentifyOptions`.
 
     Returns:
@@ -303,15 +317,44 @@ def identify(
     if not isinstance(sim, Simulator):
         raise TypeError(f"{call}(sim): expected a Simulator, got {sim!r}")
     checks.keywords(f"{call}(...)", options, [f.name for f in fields(IdentifyOptions)])
-    o, began = IdentifyOptions(**options), time.process_time()
+    o = IdentifyOptions(**options)
     space = ParameterSpace(sim, tuple(parameters), tuple(bodies), bounds)
     deviations = np.broadcast_to(checks.floats(f"{call}(noise=...)", noise), (sim.ndx,))
     if not np.all(deviations > 0.0) or not np.isfinite(deviations).any():
         raise ValueError(f"{call}(noise=...): expected numbers above 0, not all infinite, got {noise!r}")
-    predictor = Predictor(space, deviations, o.every)
-    fit = _Fit(space, cut_windows(sim, trajectories, o.window), predictor, o.outlier, Prior(space, prior or {}))
+    check_executor(call, executor)
+    known, windows = Prior(space, prior or {}), cut_windows(sim, trajectories, o.window)
+    count = checks.whole_number(f"{call}(starts=...)", starts)
+    first = _first_values(space, known, count, checks.whole_number(f"{call}(seed=...)", seed, 0))
+    calls = [(space, windows, deviations, o, known, values) for values in first]
+    found = list(results_in_order(_fitted, calls, executor))
+    best = min(found, key=lambda each: (each.unsolved, each.cost))
+    return replace(best, seconds=sum(each.seconds for each in found))
+
+
+def _first_values(space: ParameterSpace, known: Prior, count: int, seed: int) -> list[Floats]:
+    """Values (n,) that fits begin with: those of the space, then random ones within their bounds."""
+    rng, out = np.random.default_rng(seed), [space.values.copy()]
+    told = known.precision > 0.0
+    middle = np.where(told, known.mean, space.values)
+    spread = np.where(told, np.maximum(known.precision, 1e-300) ** -0.5, _AWAY * np.abs(space.values))
+    while len(out) < count:
+        values = np.clip(middle + spread * rng.standard_normal(len(middle)), space.low, space.high)
+        with suppress(ValueError):  # of bodies that cannot be
+            space.simulator(values)
+            out.append(values)
+    return out
+
+
+def _fitted(
+    space: ParameterSpace, windows: list[Window], noise: Floats, o: IdentifyOptions, known: Prior, values: Floats
+) -> Identified:
+    """The fit from one start; at module level, so that other processes can import it."""
+    began = time.process_time()
+    fit = _Fit(space, windows, Predictor(space, noise, o.every), o.outlier, known)
+    fit.theta = values.copy()
     history: list[dict[str, Any]] = []
-    levels, status = o.kappas or (sim.kappa,), Status.SOLVED
+    levels, status = o.kappas or (fit.base.kappa,), Status.SOLVED
     for kappa in levels:
         status = _descend(fit, kappa, o, began, history)
     return _identified(fit, levels[-1], status, history, began)
@@ -387,6 +430,6 @@ def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str,
     ]
     return Identified(
         status == Status.SOLVED, status, MESSAGES[status], space.labels, fit.theta, space.values, covariance,
-        space.simulator(fit.theta), float(np.sqrt(cost / max(count, 1))), unseen, far, usable.count(False), fit.starts,
-        history, time.process_time() - began,
+        space.simulator(fit.theta), float(np.sqrt(cost / max(count, 1))), unseen, far, usable.count(False),
+        fit.rest(cost, found, usable), fit.starts, history, time.process_time() - began,
     )  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -70,6 +72,24 @@ def test_a_prior_decides_where_the_data_do_not():
     assert len(dojo.identify(start, motions, names, noise=sd).unseen) == 1
     with pytest.raises(ValueError, match=r"identify\(prior=\.\.\.\).*masses"):
         dojo.identify(start, motions, names, prior={"masses": 1.0})
+
+
+def test_several_starts_leave_a_local_minimum_and_need_not_be_fitted_here():
+    """A pendulum that swings slower than it was measured to is a swing behind after a while: no small change helps."""
+    name = "armature"
+    truth = _arm(0.02).with_parameters({name: 0.02})
+    motions = [(truth.rollout(np.array([1.0, 0.0]), steps=200).x, np.zeros((200, 1)))]
+    wrong = truth.with_parameters({name: 0.3})
+    known = {"prior": {name: (0.1, 0.1)}, "noise": 0.05, "bounds": {"armature:hinge": (1e-3, 1.0)}}
+    alone = dojo.identify(wrong, motions, (name,), **known)
+    assert abs(alone.values[0] - 0.02) > 0.05
+    several = dojo.identify(wrong, motions, (name,), starts=6, seed=1, **known)
+    assert several.success and abs(several.values[0] - 0.02) < 1e-3 and several.cost < 0.01 * alone.cost
+    with ThreadPoolExecutor(2) as pool:
+        elsewhere = dojo.identify(wrong, motions, (name,), starts=6, seed=1, executor=pool, **known)
+    np.testing.assert_array_equal(elsewhere.values, several.values)
+    with pytest.raises(TypeError, match=r"identify\(executor=\.\.\.\)"):
+        dojo.identify(wrong, motions, (name,), executor=3, **known)
 
 
 def test_friction_is_found_through_contacts():
