@@ -4,8 +4,9 @@
     python benchmarks/accuracy.py --figure accuracy.png             error against processor time
 
 An error is the largest final error of a joint coordinate [m, rad], over the seconds of the motion. References: exact
-solutions of balls and blocks; order 8 with small steps without contact; else order 2 at 10 us with the least kappa. The
-error of a reference is its difference from a run with steps twice as long: accuracies below three times it are omitted.
+solutions of balls and blocks; order 8 with small steps without contact, and of closed loops order 2, extrapolated;
+else order 2 at 10 us with the least kappa. The error of a reference is its difference from a run with steps twice as
+long: accuracies below three times it are omitted.
 
 Cost: processor time of the whole motion, relative to the cheapest fixed order and step, or step of RK4, with an error
 no larger; nan where there is none. Bounces of MuJoCo are not comparable. `told`: the estimated error of the result
@@ -19,6 +20,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +29,7 @@ from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Report, Table
+from support.linkage import plain_fourbar
 from support.scenes import ball, block
 
 Vector = NDArray[np.float64]
@@ -35,7 +38,7 @@ _G = 9.81
 _ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 _STEPS = (0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4)
 _FINE = (2e-5, 1e-5)  # [s] steps of references in contact
-_LEAST = 1e-6  # accuracy with contacts
+_LEAST = 1e-6  # accuracy with contacts or loops
 
 
 class Motion(NamedTuple):
@@ -148,10 +151,17 @@ def motions(quick: bool) -> list[Callable[[], Motion]]:
         lambda: rolling(0.0, 2.0, 0.5),
         lambda: rolling(0.2, 3.0, 0.8),
         tumbling,
+        fourbar,
         lambda: landing("hopper landing", dojo.models.hopper(), np.array([0.1, 0.5, 0.9, 0.3]), 0.4),
         lambda: landing("quadruped landing", dojo.models.quadruped(), bend, 0.3),
     ]
     return found[:3] if quick else found
+
+
+def fourbar() -> Motion:
+    """Let go: a closed loop."""
+    mech = plain_fourbar()
+    return Motion("four-bar", mech, np.array(mech.neutral, dtype=np.float64), np.zeros(3), 0.5, None)
 
 
 def error(sim: dojo.Simulator, end: Vector | None, exact: Vector, seconds: float) -> float:
@@ -191,7 +201,7 @@ def runge_kutta(motion: Motion, exact: Vector, steps: tuple[float, ...]) -> Poin
     from benchmarks.engines.mujoco_warnings import quiet
 
     out, sim = [], dojo.Simulator(motion.mechanism)
-    if any(c.restitution for c in motion.mechanism.contacts):
+    if any(c.restitution for c in motion.mechanism.contacts) or motion.mechanism.loops:
         return []
     for h in steps:
         model: Any = mujoco_scene.load(sim.model, h, integrator="RK4")
@@ -208,19 +218,24 @@ def reference(motion: Motion) -> tuple[Vector, float]:
     """(coordinates in the end, their error over the seconds)."""
     if motion.exact is not None:
         return motion.exact, 0.0
-    touches = bool(motion.mechanism.contacts)
-    ends = []
-    for h in _FINE if touches else (2e-4, 1e-4):
+    touches, loops = bool(motion.mechanism.contacts), bool(motion.mechanism.loops)
+    ends: list[Vector] = []
+    for h in _FINE if touches else ((4e-4, 2e-4, 1e-4) if loops else (2e-4, 1e-4)):
         settings: dict[str, Any] = {"kappa": 1e-13} if touches else {"order": 8}
+        if loops:
+            settings = {"tolerance": 1e-12}
         sim = dojo.Simulator(motion.mechanism, time_step=h, **settings)
         x = sim.start(motion.q, motion.v)
         ends.append(np.asarray(sim.rollout(x, steps=round(motion.seconds / h), throw=True).x[-1][: sim.nq]))
+    if loops:  # of order 2
+        ends = [fine + (fine - coarse) / 3.0 for coarse, fine in pairwise(ends)]
     return ends[1], error(sim, ends[0], ends[1], motion.seconds)
 
 
 def _asked(motion: Motion, unsure: float, quick: bool) -> tuple[float, ...]:
     """The accuracies that exist and that the reference of a motion can judge."""
-    least = max(3.0 * unsure, 0.99 * _LEAST if motion.mechanism.contacts else 0.0)
+    held = motion.mechanism.contacts or motion.mechanism.loops
+    least = max(3.0 * unsure, 0.99 * _LEAST if held else 0.0)
     asked = tuple(a for a in _ASKED if a >= least) or _ASKED[:1]
     return asked[:4] if quick else asked
 
