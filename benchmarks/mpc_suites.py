@@ -98,6 +98,8 @@ def run(args: argparse.Namespace) -> Report:
     for kind in kinds:
         lines = []
         names = [name for name in args.tasks if kind == OURS or name not in DISTURBED]  # only our plant is perturbed
+        if not names:
+            continue
         for name in progress()([(n, n) for n in names], kind):
             cells, outcomes = line(tasks[name], kind, runs, seconds)
             lines.append(cells)
