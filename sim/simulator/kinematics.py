@@ -223,40 +223,43 @@ class Kinematics:
         constant v, by central differences of order 8 along the motion: exact to about 1e-11 of their size.
 
         Args:
-            q: (nq,) coordinates.
-            v: (nv,) joint velocities.
+            q: (..., nq) coordinates.
+            v: (..., nv) joint velocities.
 
         Returns:
-            (nv,) forces and torques [N, N m].
+            (..., nv) forces and torques [N, N m].
         """
-        q = checks.array("Kinematics.bias_forces(q)", q, (self.sim.nq,))
-        v = checks.array("Kinematics.bias_forces(v)", v, (self.sim.nv,))
+        q = self._q("Kinematics.bias_forces(q)", q)
+        v = _rows("Kinematics.bias_forces(v)", v, self.sim.nv)
+        q, v = (np.broadcast_to(a, (*np.broadcast_shapes(q.shape[:-1], v.shape[:-1]), a.shape[-1])) for a in (q, v))
         J, R = self._body_jacobians(q)
-        twist = J @ v
-        step = _STEP / max(1.0, float(np.abs(v).max(initial=0.0)))
+        twist = _times(J, v)
+        step = _STEP / np.maximum(1.0, np.abs(v).max(axis=-1, initial=0.0))
         rate = np.zeros_like(twist)
         for k, weight in enumerate(_ORDER_8, start=1):
-            ahead, behind = (self._body_jacobians(self.moved(q, sign * k * step * v))[0] @ v for sign in (1.0, -1.0))
-            rate += weight / step * (ahead - behind)
+            moves = (sign * k * step[..., None] * v for sign in (1.0, -1.0))
+            ahead, behind = (_times(self._body_jacobians(self.moved(q, dq))[0], v) for dq in moves)
+            rate += weight / step[..., None, None] * (ahead - behind)
         I = self._world_inertia(R)
-        w = twist[:, 3:]
-        force = self._mass[:, None] * rate[:, :3]
-        torque = (I @ rate[:, 3:, None])[..., 0] + np.cross(w, (I @ w[..., None])[..., 0])
-        return np.einsum("bkd,bk->d", J, np.concatenate([force, torque], axis=1))
+        w = twist[..., 3:]
+        force = self._mass[:, None] * rate[..., :3]
+        torque = (I @ rate[..., 3:, None])[..., 0] + np.cross(w, (I @ w[..., None])[..., 0])
+        return np.einsum("...bkd,...bk->...d", J, np.concatenate([force, torque], axis=-1))
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, acceleration: ArrayLike) -> Floats:
         """Forces of the joints for an acceleration of the tree, tau = M dv + b + g.
 
         Args:
-            q: (nq,) coordinates.
-            v: (nv,) joint velocities.
-            acceleration: (nv,) rate of the joint velocities [m/s^2, rad/s^2].
+            q: (..., nq) coordinates.
+            v: (..., nv) joint velocities.
+            acceleration: (..., nv) rate of the joint velocities [m/s^2, rad/s^2].
 
         Returns:
-            (nv,) forces and torques [N, N m].
+            (..., nv) forces and torques [N, N m].
         """
-        dv = checks.array("Kinematics.inverse_dynamics(acceleration)", acceleration, (self.sim.nv,))
-        return np.asarray(self.mass_matrix(q) @ dv + self.bias_forces(q, v) + self.gravity_torques(q))
+        dv = _rows("Kinematics.inverse_dynamics(acceleration)", acceleration, self.sim.nv)
+        inertial = (self.mass_matrix(q) @ dv[..., None])[..., 0]
+        return np.asarray(inertial + self.bias_forces(q, v) + self.gravity_torques(q))
 
     def _frame(self, call: str, name: str) -> tuple[int, Floats, Floats]:
         if name == WORLD and WORLD not in self._frames:
@@ -270,14 +273,15 @@ class Kinematics:
         """Coordinates moved by a perturbation, as in `Simulator.integrate`.
 
         Args:
-            q: (nq,) coordinates.
-            dq: (nv,) perturbation.
+            q: (..., nq) coordinates.
+            dq: (..., nv) perturbation.
 
         Returns:
-            (nq,) coordinates.
+            (..., nq) coordinates.
         """
-        x = np.concatenate([q, np.zeros(self.sim.nv)])
-        return np.asarray(self.sim.integrate(x, np.concatenate([dq, np.zeros(self.sim.nv)])))[: self.sim.nq]
+        still = np.zeros((*q.shape[:-1], self.sim.nv))
+        x = np.concatenate([q, still], axis=-1)
+        return np.asarray(self.sim.integrate(x, np.concatenate([dq, np.zeros_like(dq)], axis=-1)))[..., : self.sim.nq]
 
     def _world_inertia(self, R: Floats) -> Floats:
         return R @ self._inertia @ np.swapaxes(R, -1, -2)
@@ -301,6 +305,11 @@ def _rows(call: str, value: ArrayLike, length: int) -> Floats:
     if out.ndim == 0 or out.shape[-1] != length:
         raise ValueError(f"{call}: expected shape (..., {length}), got {out.shape}")
     return out
+
+
+def _times(J: Floats, v: Floats) -> Floats:
+    """(..., nbody, 6) twists of Jacobians (..., nbody, 6, nv) at joint velocities (..., nv)."""
+    return np.asarray((J @ v[..., None, :, None])[..., 0])
 
 
 def _rotations(quats: Floats) -> Floats:

@@ -128,3 +128,16 @@ def test_inverse_kinematics_of_a_floating_robot(tmp_path: Path) -> None:
     np.testing.assert_array_equal(held.q[:7], start[:7])
     with pytest.raises(ValueError, match=r"ik\(fixed=\.\.\.\): 'base' is not one of"):
         dojo.ik(sim, {"hand": (0, 0, 0)}, fixed=["base"])
+
+
+def test_arrays_have_any_leading_axes(tmp_path: Path, rng: np.random.Generator) -> None:
+    """Bias forces and inverse dynamics of many states are those of each."""
+    sim = dojo.Simulator(robot(tmp_path), time_step=0.01)
+    kin = dojo.Kinematics(sim)
+    dq, v, dv = rng.normal(size=(3, 2, 3, sim.nv))
+    q = kin.moved(np.broadcast_to(sim.neutral()[: sim.nq], (2, 3, sim.nq)), dq)
+    many = kin.inverse_dynamics(q, v, dv)
+    for k in np.ndindex(2, 3):
+        np.testing.assert_allclose(many[k], kin.inverse_dynamics(q[k], v[k], dv[k]), atol=1e-9)
+        np.testing.assert_allclose(kin.bias_forces(q, v)[k], kin.bias_forces(q[k], v[k]), atol=1e-9)
+    assert kin.bias_forces(q[0, 0], v).shape == (2, 3, sim.nv)
