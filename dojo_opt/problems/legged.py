@@ -29,7 +29,7 @@ _KNOTS = 20  # of a period
 _STEP = 0.02  # [s] of jumps and of standing up
 _LOWS = (0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)  # of the height of the stance, where rising begins
 _STRIDE = 0.7  # [s] of a walk on two feet
-_SINK = 0.4  # of the way down that flat feet allow, by which the base is lower when they walk, and their lift
+_SINK, _RAISE = 0.4, 0.25  # of the way down that flat feet allow: how much lower the base is in a walk, and their lift
 _LOOSE = 0.2  # of the usual damper, which takes much of the torque of ankles that push off
 _CROUCH = 0.8  # of the way down that the legs allow, at most, before a jump
 _LEAST = 1e-3  # [s] time steps are multiples of this
@@ -118,7 +118,7 @@ def _periodic(legs: Legs, name: str, period: float, speed: float, settings: dict
     sim = legs.simulator(step / substeps, PLANNED)
     if Feet(sim).flat:  # legs that are nearly stretched reach neither to the side nor ahead
         bend = _deepest(sim, legs.height)
-        usual |= {"height": float(sim.neutral()[2]) - _SINK * bend, "step_height": _SINK * bend}
+        usual |= {"height": float(sim.neutral()[2]) - _SINK * bend, "step_height": _RAISE * bend}
     made = getattr(gaits, name)(sim, period=_KNOTS * step, **{**usual, **rest})
     return _scaled(legs, made, follows)
 
