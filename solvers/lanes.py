@@ -18,10 +18,11 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, overload, register_model
+from numba.extending import intrinsic, lower_builtin, models, register_model
 from numpy.typing import NDArray
 
 from solvers.compiler import kernel
+from solvers.compiler.instructions import compiled_as
 from solvers.types import Matrix, Vector
 
 __all__ = [
@@ -139,55 +140,35 @@ def _spread_number(typing: Any, number: Any) -> Any:
     return _LANES(types.float64), lower
 
 
+@compiled_as(_load)
 def load(A: Matrix, i: int, j: int) -> Lanes:
     """A[i, j : j + LANES]; the matrix has to have that many columns left, or rows behind."""
     found = A.reshape(-1)[i * A.shape[1] + j :][:LANES]
     return np.pad(found, (0, LANES - len(found)))
 
 
+@compiled_as(_store)
 def store(A: Matrix, i: int, j: int, x: Lanes) -> None:
     """A[i, j : j + LANES] = x, as `load`."""
     A.reshape(-1)[i * A.shape[1] + j :][:LANES] = x
 
 
+@compiled_as(_keep)
 def keep(bits: int, x: Lanes) -> Lanes:
     """Lane k of x where bit k of `bits` is set, 0 elsewhere."""
     return np.where([bits >> k & 1 for k in range(LANES)], x, 0.0)
 
 
+@compiled_as(_spread_number)
 def spread(number: float) -> Lanes:
     """The number in every lane."""
     return np.full(LANES, number)
 
 
+@compiled_as(_total)
 def total(x: Lanes) -> float:
     """The sum of the lanes, in pairs."""
     return float(x.reshape(-1, 2).sum(axis=1).reshape(-1, 2).sum(axis=1).sum())
-
-
-@overload(load, strict=False)
-def _compiled_load(A: Any, i: Any, j: Any) -> Any:
-    return lambda A, i, j: _load(A, i, j)
-
-
-@overload(store, strict=False)
-def _compiled_store(A: Any, i: Any, j: Any, x: Any) -> Any:
-    return lambda A, i, j, x: _store(A, i, j, x)
-
-
-@overload(keep, strict=False)
-def _compiled_keep(bits: Any, x: Any) -> Any:
-    return lambda bits, x: _keep(bits, x)
-
-
-@overload(spread, strict=False)
-def _compiled_spread(number: Any) -> Any:
-    return lambda number: _spread_number(number)
-
-
-@overload(total, strict=False)
-def _compiled_total(x: Any) -> Any:
-    return lambda x: _total(x)
 
 
 def _operator(function: Any, instruction: str) -> None:

@@ -117,3 +117,12 @@ print(json.dumps([sim.step(sim.neutral() + 0.1).x.tolist(), len(compiled())]))
         runs.append(json.loads(python(program, **own)))
     assert runs[0][0] == runs[1][0]
     assert runs[0][1] < 0.8 * runs[1][1]
+
+
+def test_a_kernel_ahead_has_the_types_of_its_calls() -> None:
+    import dojo_opt as dojo
+    from solvers.compiler.optional import _Ahead
+    from solvers.riccati import backward_knots
+
+    dojo.ilqr(dojo.problems.swingup(), max_iterations=1)
+    assert {_Ahead(backward_knots).types()} == set(backward_knots.entry.overloads)  # type: ignore[attr-defined]

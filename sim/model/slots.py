@@ -201,3 +201,5 @@ class Slot(IntEnum):
     CHOOSE_CAPSULE_FIELD = 165
     # dampers between closed loops and gears, with an accuracy
     CLOSE_INTERVAL = 166
+    # energies of a step that few steps ask for
+    ENERGIES_GAINED = 167

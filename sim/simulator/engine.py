@@ -28,7 +28,7 @@ from sim.model.layout import data_view, sizes_of, table
 from sim.model.model import Model
 from sim.model.pace import pieces, rows
 from sim.model.scratch import Scratch
-from sim.simulator.link import link_gradient, link_nodes, link_poses, link_step
+from sim.simulator.link import link_gradient, link_nodes, link_planner, link_poses, link_step
 from sim.simulator.results import Interrupted, SimulationError
 from sim.simulator.settings import Settings
 from sim.solve import start_velocity
@@ -223,7 +223,7 @@ class Engine:
 
     def prepare(self) -> None:
         """Link the kernels of rollouts and their derivatives at once: two processes can then compile them."""
-        self.gradient_table()
+        self.gradient_table(link_planner)
 
     def tables(self, *needs: Callable[[Model], None]) -> tuple[Table, Table]:
         """Tables of the Model, linked for derivatives and further needs of a call, and of this thread's first Data."""

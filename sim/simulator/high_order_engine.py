@@ -14,7 +14,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.servos import limited_servos
 from sim.model.model import InputKind, Model
 from sim.simulator.engine import Engine, Floats
-from sim.simulator.link import link_curvature
+from sim.simulator.link import link_curvature, link_planner
 from sim.simulator.settings import Settings
 from solvers.compiler import Table, link
 from solvers.status import Status
@@ -56,7 +56,7 @@ class HighOrderEngine(Engine):
 
     def prepare(self) -> None:
         """As Engine.prepare."""
-        self.linked(link_stages, link_tangents)
+        self.linked(link_stages, link_tangents, link_planner)
 
     def gradient_table(self, *needs: Callable[[Model], None]) -> Table:
         """As Engine.gradient_table; refuses joints with two rotations."""

@@ -110,6 +110,7 @@ from sim.integrators.closed_interval import close_interval
 from sim.model.model import Law, Model
 from sim.model.shape_kinds import SWAPPED, Pair
 from sim.solve.delassus import contact_answers, contact_rates
+from sim.solve.energy_balance import energies_gained
 from sim.solve.inequalities import add_stiffness
 from sim.solve.interior_point import interior_point
 from sim.solve.loop_branch import solve_loops
@@ -117,6 +118,7 @@ from sim.solve.newton import newton
 from sim.solve.prediction import choose_contacts, take_contacts
 from sim.step import step
 from solvers.compiler import link
+from solvers.riccati import backward_knots
 
 _CONTACTS = (
     sunk_contact,
@@ -280,6 +282,7 @@ def link_step(model: Model) -> None:
 
 def link_terms(model: Model) -> None:
     """Link the kernels that a step calls: the interior point only if there are contacts or limits."""
+    link(model.optional, energies_gained)
     hard = len(model.contact_body) + len(model.limit_dof) + len(model.dry_dof) > 0
     if hard:
         link(model.optional, interior_point)
@@ -360,3 +363,8 @@ def link_parameters(model: Model) -> None:
 def link_heights(model: Model) -> None:
     """Link the further kernels of gradients by heights of terrain."""
     link(model.optional, add_height_gradient)
+
+
+def link_planner(model: Model) -> None:
+    """Compile the backward pass of a planner beside the kernels of its horizon."""
+    link(model.optional, backward_knots)

@@ -52,8 +52,9 @@ from sim.model.columns import Bound, BoundRow, Cone, Kin
 from sim.model.data import Data
 from sim.model.model import InputKind, Model
 from sim.model.options import StepOptions
+from sim.model.slots import Slot
 from sim.solve.residual import residual_scale
-from solvers.compiler import kernel
+from solvers.compiler import kernel, optional
 from solvers.dense import clear
 from solvers.rotation import cross, rotate
 from solvers.types import Vector
@@ -226,12 +227,24 @@ def step_gained(model: Model, data: Data, options: StepOptions, inputs: tuple[Ve
     near = _NEAR if model.contact_body.shape[0] == 0 else _NEAR_GROUND
     if turned > near and model.terrain_size.shape[0] == 0:
         return False
-    h, least = options.h, noise(model, data, options, v)
+    least = noise(model, data, options, v)
     if turned > (_FAR if options.loss > 1e300 else _FAR_DIVIDED):
-        before = 0.5 * momentum_velocity(model, data, h, data.move_in, data.turn_in, v)
-        work = constraint_work(model, data, h, v)
+        before = 0.5 * momentum_velocity(model, data, options.h, data.move_in, data.turn_in, v)
+        work = constraint_work(model, data, options.h, v)
         if not (abs(work) if both else work) > _TELLING * options.gain * before + least:
             return False
+    return energies_gained(model, data, options, v, u, both, least)
+
+
+@optional(Slot.ENERGIES_GAINED, default=True, seldom=True)
+def energies_gained(
+    model: Model, data: Data, options: StepOptions, v: Vector, u: Vector, both: bool, least: float
+) -> bool:
+    """The answer of `step_gained` by the energies.
+
+    both: of losses, too;  least: a gain that is noise [J].
+    """
+    h = options.h
     given, driven = work_at_node(model, data, h, v, u)
     falling = 0.5 * abs(gravity_energy(model, data.move_in) + gravity_energy(model, data.move))
     before = arriving_energy(model, data, h, v, False)

@@ -1,4 +1,4 @@
-"""Operators of two numbers of one type in kernels: their types, and LLVM's instructions.
+"""Operators of two numbers of one type in kernels, and the least and largest: their types, and LLVM's instructions.
 
 Numba asks NumPy's and half a dozen other libraries' rules for the type of every `+`, and looks through as many
 implementations. Kernels do not ask, and ask about any other function once per process. Nothing is registered with
@@ -8,14 +8,14 @@ Numba: other functions of the process are compiled as ever.
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from numba import types
 from numba.core.typing import Context
 from numba.core.typing.templates import Signature, signature
 
-__all__ = ["ARITHMETIC", "KernelTyping"]
+__all__ = ["ARITHMETIC", "KernelTyping", "choice"]
 
 _COMPARED = (operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne)
 
@@ -36,6 +36,22 @@ def _arithmetic() -> dict[Any, Callable[..., Any]]:
 
 
 ARITHMETIC = _arithmetic()
+_CHOICES = {min: operator.lt, max: operator.gt}
+
+
+def choice(function: Any, kinds: Sequence[types.Type]) -> Callable[..., Any] | None:
+    """The code generator of min or max of numbers of one type, in the order in which Python compares them."""
+    compare = ARITHMETIC.get((_CHOICES.get(function), kinds[0])) if kinds else None
+    if compare is None or any(kind is not kinds[0] for kind in kinds):
+        return None
+
+    def write(builder: Any, chosen: Any, *others: Any) -> Any:
+        for value in others:
+            chosen = builder.select(compare(builder, value, chosen), value, chosen)
+        return chosen
+
+    return write
+
 
 # Numba asks all of these rules anew in every function that it compiles, for most of the same few hundred calls
 _CALLS: dict[tuple[types.Type, tuple[types.Type, ...]], Signature] = {}
@@ -53,6 +69,9 @@ class KernelTyping(Context):
         self._shared = context
         object.__setattr__(self, "__dict__", context.__dict__)
 
+    def refresh(self) -> None:
+        """Do nothing: `cache.prepare` and `cache.renew` did. Numba asks for it before each function."""
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Context) and self.__dict__ is other.__dict__
 
@@ -69,6 +88,8 @@ class KernelTyping(Context):
             if left is right and (op, left) in ARITHMETIC:
                 func._impl_keys.setdefault((left, left), op)  # where lowering looks for calls of operator.add(x, y)
                 return signature(types.boolean if op in _COMPARED else left, left, left)
+        if len(args) > 1 and choice(func.typing_key, kinds := [*map(types.unliteral, args)]):
+            return signature(kinds[0], *kinds)
         call = func, tuple(args)
         found = _CALLS.get(call)
         if found is None:

@@ -35,13 +35,14 @@ from typing import Any
 import numba
 from numba.core.caching import FunctionCache
 from numba.core.compiler import CompileResult
+from numba.core.imputils import builtin_registry
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from solvers.compiler.notice import because
 from solvers.compiler.ownership import OTHERS, WORLD, foreign
-from solvers.compiler.pipeline import FAST
+from solvers.compiler.pipeline import FAST, inner_result
 from solvers.compiler.shipped import Shipped, open_shipped, write_shipped
 
 __all__ = ["INNER", "STORE", "KernelCache", "cache_folder", "open_store", "prepare", "ship", "shipped", "stamp"]
@@ -265,6 +266,12 @@ def prepare() -> None:
     because(f"{why}; {f'kept in {STORE.folder}' if STORE.folder else 'not kept on disk'}")
 
 
+def renew(context: Any) -> None:
+    """Let Numba register what modules have added since: a refresh also imports all of its own modules again."""
+    context.install_registry(builtin_registry)
+    context.typing_context._load_builtins()
+
+
 @cache
 def _text_digest(file: str) -> bytes:
     return hashlib.sha256(Path(file).read_bytes()).digest()
@@ -307,12 +314,13 @@ class KernelCache(FunctionCache):
         if self._form != INNER and (found := self._load_shipped(sig, target_context)) is not None:
             return found
         prepare()
-        target_context.refresh()
+        renew(target_context)
         key, name = self._key(sig, target_context.codegen())
         try:
             kept, payload = pickle.loads(STORE.read(name))
             if kept == key:
-                return CompileResult._rebuild(target_context, *payload)
+                rebuild = inner_result if self._form == INNER else CompileResult._rebuild
+                return rebuild(target_context, *payload)
         except FileNotFoundError:
             return None
         except Exception:  # of a damaged file, whatever unpickling runs into

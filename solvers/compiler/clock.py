@@ -17,7 +17,9 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
+
+from solvers.compiler.instructions import compiled_as
 
 __all__ = ["PAUSE", "seconds"]
 
@@ -28,13 +30,6 @@ if sys.platform == "win32":
     _TICKS.restype = ctypes.c_uint64
 
 _WORD, _INT = ir.IntType(64), ir.IntType(32)
-
-
-def seconds() -> float:
-    """Seconds that have gone by since some moment, the same one for kernels and Python; the clock never goes back."""
-    if sys.platform == "win32":
-        return float(_TICKS() * 1e-3)
-    return time.clock_gettime(time.CLOCK_MONOTONIC)
 
 
 def _ticks(builder: Any) -> Any:
@@ -63,6 +58,9 @@ def _seconds(typing: Any) -> Any:
     return types.float64(), lower
 
 
-@overload(seconds, strict=False)
-def _compiled() -> Any:
-    return lambda: _seconds()
+@compiled_as(_seconds)
+def seconds() -> float:
+    """Seconds that have gone by since some moment, the same one for kernels and Python; the clock never goes back."""
+    if sys.platform == "win32":
+        return float(_TICKS() * 1e-3)
+    return time.clock_gettime(time.CLOCK_MONOTONIC)

@@ -1,9 +1,5 @@
-"""The fast pipeline from kernels to machine code: each entry once, with all its callees, and nothing else.
-
-Numba optimises every function together with all that it calls, translates it to machine code, and does both again
-for each of its callers. Here a kernel that kernels call is kept as it was written, and only entries are optimised and
-translated: functions called from Python or by their address. Inside an entry everything but itself is private, so that
-the optimiser may drop unused arguments and uncalled copies.
+"""The fast pipeline from kernels to machine code: each entry once, with all its callees (libraries.py), by those passes
+of Numba that have work to do on a kernel.
 """
 
 from __future__ import annotations
@@ -13,85 +9,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import llvmlite.binding as llvm
-from numba.core import transforms, typed_passes, untyped_passes
+from numba.core import interpreter, transforms, typed_passes, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
-from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.compiler_machinery import PassManager, _pass_registry, register_pass
+from numba.core.errors import NumbaError
 from numba.core.ir_utils import build_definitions
 from numba.core.rewrites import rewrite_registry
 from numba.core.ssa import reconstruct_ssa
 
 from solvers.compiler.arithmetic import KernelTyping
+from solvers.compiler.inference import KernelInference
+from solvers.compiler.libraries import EntryLibrary, InnerLibrary, SeldomLibrary
 from solvers.compiler.lowering import KernelLowering
 from solvers.compiler.notice import compiling
 
-__all__ = ["EntryCompiler", "InnerCompiler"]
-
-_ENVIRONMENT = "_ZN08NumbaEnv"  # Numba looks for such a variable of every function
-
-
-def _shell(library: Any, module: Any, functions: tuple[str, ...] = ()) -> Any:
-    """A module with the names of another: variables that Numba looks for, and these functions, without their code."""
-    text = str(library._codegen._create_empty_module(library.name))
-    for variable in module.global_variables:
-        if variable.name.startswith(_ENVIRONMENT):
-            text += f'\n@"{variable.name}" = common global i8* null'
-    for name in functions:
-        text += f'\ndefine void @"{name}"() {{\n  ret void\n}}'
-    return llvm.parse_assembly(text)
-
-
-class InnerLibrary(JITCodeLibrary):
-    """Code of a kernel for its callers: made smaller, not optimised, never translated."""
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        """Numba runs all of its optimisations here; each entry does so again, after these three."""
-        ll_module.data_layout = self._codegen._data_layout
-        passes, builder = llvm.create_new_function_pass_manager(), self._codegen._pass_builder()
-        passes.add_sroa_pass()
-        passes.add_instruction_combine_pass()
-        passes.add_simplify_cfg_pass()
-        for function in ll_module.functions:
-            if not function.is_declaration:
-                passes.run(function, builder)
-
-    def _optimize_final_module(self) -> None:
-        """Left to the entries."""
-
-    def _finalize_final_module(self) -> None:
-        """Keep the code for linking; the loaded and cached translation is a shell without functions."""
-        code: Any = self._final_module  # type: ignore[has-type]
-        code.verify()
-        for function in code.functions:
-            if not function.is_declaration and function.linkage == llvm.Linkage.external:
-                function.linkage = "linkonce_odr"
-        self._final_module = _shell(self, code)
-        self._final_module.name = self.name
-        super()._finalize_final_module()
-        self._shared_module = code
-
-
-class EntryLibrary(JITCodeLibrary):
-    """Code of an entry, with all that it calls.
-
-    Its copies of kernels are private, not internal. LLVM drops arguments of either, but its JIT linker knows internal
-    functions by name too, and takes one for the copy of the same kernel in any function that Numba itself compiles.
-    """
-
-    def _optimize_final_module(self) -> None:
-        for function in self._final_module.functions:
-            if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
-                function.linkage = "private"
-        super()._optimize_final_module()
-
-    def _get_module_for_linking(self) -> Any:
-        """Data cached beside the machine code: nothing links an entry, and Numba needs its names only."""
-        self._ensure_finalized()
-        code: Any = self._final_module
-        external = [f for f in code.functions if not f.is_declaration and f.linkage == llvm.Linkage.external]
-        return _shell(self, code, tuple(f.name for f in external))
-
+__all__ = ["EntryCompiler", "InnerCompiler", "SeldomCompiler"]
 
 _IDLE = (  # features that kernels do not use: closures, array expressions, literals as types, exceptions; print types
     untyped_passes.WithLifting,
@@ -113,6 +46,27 @@ def _tidy(func_ir: Any) -> None:
     generators, lifted loops and Python's objects need: a twentieth of a cold start.
     """
     func_ir.blocks = transforms.canonicalize_cfg(func_ir.blocks)
+
+
+class _Interpreter(interpreter.Interpreter):
+    """Numba's, for functions without `with`, dictionaries and exceptions to catch."""
+
+    def post_process(self, peepholes: Any, func_ir: Any) -> Any:
+        """Rewrite nothing but lists that Python makes of the arguments of a call."""
+        wanted = (interpreter.peep_hole_list_to_tuple, interpreter.peep_hole_call_function_ex_to_call_function_kw)
+        return super().post_process([peephole for peephole in peepholes if peephole in wanted], func_ir)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Translation(untyped_passes.TranslateByteCode):
+    """Numba's pass, with the above."""
+
+    _name = "kernel_translation"
+
+    def run_pass(self, state: Any) -> bool:
+        """Translate Python's byte code to Numba's representation."""
+        state.func_ir = _Interpreter(state.func_id).interpret(state.bc)
+        return True
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -178,10 +132,12 @@ class _StripPhis(typed_passes.PreLowerStripPhis):
 
 
 _REPLACED = {
+    untyped_passes.TranslateByteCode: _Translation,
     untyped_passes.IRProcessing: _Processing,
     untyped_passes.GenericRewrites: _Rewrites,
     untyped_passes.ReconstructSSA: _SingleAssignment,
     typed_passes.PreLowerStripPhis: _StripPhis,
+    typed_passes.NopythonTypeInference: KernelInference,
     typed_passes.NativeLowering: KernelLowering,
 }
 _SELDOM = (50_000, 20, 100)  # thresholds of the garbage collector
@@ -204,22 +160,58 @@ def _seldom_collected() -> Iterator[None]:
             gc.set_threshold(*before)
 
 
+class _Passes(PassManager):
+    """Passes that run without the events, the clocks and the texts for both that Numba makes for each."""
+
+    def run(self, state: Any) -> None:
+        """Run them."""
+        for kind, said in self.passes:
+            step = _pass_registry.get(kind).pass_inst
+            step.analysis = self._analysis
+            try:
+                step.run_initialization(state)
+                step.run_pass(state)
+                step.run_finalizer(state)
+            except NumbaError as error:
+                raise self._patch_error(f"Failed in kernel mode (step: {said})", error) from error
+
+
+class _Prepared:
+    """A target context that is not refreshed, which Numba does before each function: `cache.prepare` did."""
+
+    def __init__(self, context: Any) -> None:
+        self._context = context
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._context, name)
+
+    def refresh(self) -> None:
+        """Do nothing."""
+
+
+_PASSES: list[PassManager] = []  # the same for all kernels
+
+
 class _Compiler(Compiler):
     """Numba's compiler, into a library of our own, without the passes that are idle."""
 
     library: type[JITCodeLibrary] = JITCodeLibrary
 
+    def __init__(self, typingctx: Any, targetctx: Any, *others: Any) -> None:
+        super().__init__(KernelTyping(typingctx), _Prepared(targetctx), *others)
+
     def define_pipelines(self) -> list[PassManager]:
         """Which passes, in which order."""
-        (default,) = super().define_pipelines()
-        chosen = PassManager(default.pipeline_name)
-        chosen.passes = [(_REPLACED.get(kind, kind), said) for kind, said in default.passes if kind not in _IDLE]
-        chosen.finalize()
-        return [chosen]
+        if not _PASSES:
+            (default,) = super().define_pipelines()
+            chosen = _Passes("kernel")
+            chosen.passes = [(_REPLACED.get(kind, kind), said) for kind, said in default.passes if kind not in _IDLE]
+            chosen.finalize()
+            _PASSES.append(chosen)
+        return list(_PASSES)
 
     def compile_extra(self, func: Any) -> Any:
         """Compile one function."""
-        self.state.typingctx = KernelTyping(self.state.typingctx)
         library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         library.enable_object_caching()
         self.state.library = library
@@ -237,3 +229,9 @@ class EntryCompiler(_Compiler):
     """For functions called from Python or by their address."""
 
     library = EntryLibrary
+
+
+class SeldomCompiler(_Compiler):
+    """For entries that few steps call."""
+
+    library = SeldomLibrary

@@ -1,4 +1,4 @@
-"""A helper: a second process that compiles optional kernels beside this one, into the same cache, on another core.
+"""A helper: a second process that compiles kernels beside this one, into the same cache, on another core.
 
 Each of the two takes the largest kernel that is left, and loads the results of the helper from the cache. A helper
 that fails, or ends, leaves its kernels to this process. Nothing is started where one core is available, where the code
@@ -23,17 +23,18 @@ from typing import Any, Protocol, TypeVar
 import numba
 
 from solvers.compiler.cache import STORE
+from solvers.compiler.notice import expect
 
 __all__ = ["divided", "end_with", "serve"]
 
 _JOBS = "DOJO_OPT_JOBS"
-_PROGRAM = "from solvers.compiler.helper import serve; serve()"
+_PROGRAM = "from solvers.compiler.optional import help_out; help_out()"
 _ANSWER = "done"
 _LOOK = 0.5  # [s] between two looks for the process that started a helper
 
 
 class Job(Protocol):
-    """An optional kernel."""
+    """A kernel to compile."""
 
     name: str  # module:function
     func: Callable[..., Any]
@@ -51,6 +52,10 @@ J = TypeVar("J", bound=Job)
 def divided(jobs: Sequence[J]) -> Generator[J, None, None]:
     """The jobs, in an order in which a helper has done those that come late."""
     missing = [job for job in jobs if not job.at_hand()]
+    callees: set[str] = set()
+    for job in missing:
+        _size(job.func, callees)
+    expect(len(missing) + len(callees))
     yield from (job for job in jobs if job not in missing)
     if len(missing) < 2 or not _possible():
         yield from missing
@@ -142,13 +147,13 @@ class _Helper:
         return True
 
 
-def serve() -> None:
-    """Compile the kernels that the standard input names, until it ends."""
+def serve(job: Callable[[Any], Job]) -> None:
+    """Compile the kernels that the standard input names, until it ends.   job: that of a kernel."""
     threading.Thread(target=end_with, args=(os.getppid(),), daemon=True).start()
     print(_ANSWER, flush=True)
     for line in sys.stdin:
         module, name = line.strip().split(":")
-        vars(import_module(module))[name].address()
+        job(vars(import_module(module))[name]).address()
         print(_ANSWER, flush=True)
 
 

@@ -19,7 +19,7 @@ from numba.core.sigutils import normalize_signature
 from numba.core.types.misc import unliteral
 
 from solvers.compiler.cache import INNER, STORE, KernelCache, cache_folder, prepare, shipped
-from solvers.compiler.pipeline import EntryCompiler, InnerCompiler, UsersCompiler
+from solvers.compiler.pipeline import EntryCompiler, InnerCompiler, SeldomCompiler, UsersCompiler
 
 __all__ = [
     "FLAGS",
@@ -174,9 +174,12 @@ def inlined(func: F) -> F:
 inner_kernel = kernel  # where only kernels call it
 
 
-def entry(func: Callable[..., Any], signature: tuple[Any, ...]) -> Any:
-    """`func` compiled, or loaded, for arguments of these types, to be called by its address: Numba's result."""
-    form = registered(cached(_Form(func, EntryCompiler, no_cpython_wrapper=True)))
+def entry(func: Callable[..., Any], signature: tuple[Any, ...], seldom: bool = False) -> Any:
+    """`func` compiled, or loaded, for arguments of these types, to be called by its address: Numba's result.
+
+    seldom: that it is called, so that to compile it fast is worth more than fast code.
+    """
+    form = registered(cached(_Form(func, SeldomCompiler if seldom else EntryCompiler, no_cpython_wrapper=True)))
     form.compile(signature)
     return form.overloads[signature]
 

@@ -22,7 +22,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
-from solvers.compiler.arithmetic import ARITHMETIC
+from solvers.compiler.arithmetic import ARITHMETIC, choice
 from solvers.compiler.array_words import DATA, SHAPE, STRIDES, WORD, ArrayWords
 from solvers.compiler.records import RecordType, field_words
 
@@ -138,6 +138,9 @@ class _Lower(Lower):
 
     def _lower_call_normal(self, fnty: Any, expr: Any, signature: Any) -> Any:
         """A call: of a kernel with its words as they are, and with the caller's place for an exception."""
+        if isinstance(fnty, types.Function) and (write := choice(fnty.typing_key, signature.args)):
+            values = [self._cast_var(var, kind) for var, kind in zip(expr.args, signature.args, strict=True)]
+            return write(self.builder, *values)
         code = fnty.dispatcher.overloads.get(tuple(signature.args)) if isinstance(fnty, types.Dispatcher) else None
         plain = not (expr.vararg or expr.kws) and len(expr.args) == len(signature.args)
         if code is None or not plain or isinstance(signature.return_type, types.Optional):

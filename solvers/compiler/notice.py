@@ -1,7 +1,7 @@
 """Signs of life during compilation, which happens once and takes a while; and the count of compiled functions.
 
 dojo_opt: compiling, once: no code is shipped; kept in /home/me/.cache/dojo_opt/0123456789abcdef
-dojo_opt: compiling sim.solve.interior_point.interior_point (function 34, 5 s so far, part 2 of 14)
+dojo_opt: compiling sim.solve.interior_point.interior_point (function 34 of about 120, 5 s so far, part 2 of 14)
 
 The second line is written again and again while it lasts. Both are for users who wait: at a terminal or in a notebook.
 
@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-__all__ = ["because", "compiled", "compiling", "parts"]
+__all__ = ["because", "compiled", "compiling", "expect", "parts"]
 
 _PATIENCE = 1.0  # [s] of compilation before a word about it, and between two of them
 _WIDTH = 118
@@ -42,6 +42,7 @@ class _Clock:
         self.next_word = _PATIENCE
         self.reason = ""
         self.part = ""
+        self.expected = 0  # functions, with those before
         self.told = self.written = False
 
     def look(self) -> None:
@@ -55,7 +56,8 @@ class _Clock:
         if not self.told:
             self.told = True
             print(f"dojo_opt: compiling, once{self.reason}", file=sys.stderr)
-        text = f"dojo_opt: compiling {self.names[-1][0]} (function {len(self.names)}, {spent:.0f} s so far{self.part})"
+        count = f"{len(self.names)} of about {self.expected}" if self.expected else f"{len(self.names)}"
+        text = f"dojo_opt: compiling {self.names[-1][0]} (function {count}, {spent:.0f} s so far{self.part})"
         print(f"\r{text[:_WIDTH]:<{_WIDTH}}", end="", file=sys.stderr, flush=True)
         self.written = True
 
@@ -91,6 +93,11 @@ def because(reason: str) -> None:
     _CLOCK.reason = f": {reason}"
 
 
+def expect(count: int) -> None:
+    """Say, where something is said at all, how many more functions there are, about; those of a helper count."""
+    _CLOCK.expected = len(_CLOCK.names) + count
+
+
 def parts(items: Iterable[T], count: int) -> Iterator[T]:
     """The items, as parts of a task that may compile each of them."""
     try:
@@ -98,7 +105,7 @@ def parts(items: Iterable[T], count: int) -> Iterator[T]:
             _CLOCK.part = f", part {k + 1} of {count}" if count > 1 else ""
             yield item
     finally:
-        _CLOCK.part = ""
+        _CLOCK.part, _CLOCK.expected = "", 0
 
 
 def compiled() -> list[str]:

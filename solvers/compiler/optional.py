@@ -13,6 +13,9 @@ The types of its arguments and of its result are read from the annotations, beca
     def factor_coupling(model: Model, work: Work) -> bool: ...
 
     link(model.optional, factor_coupling)
+
+`link` also takes kernels that Python will call, with such annotations, so that two processes share all that there is to
+compile.
 """
 
 from __future__ import annotations
@@ -34,7 +37,7 @@ from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from solvers.compiler.helper import divided
+from solvers.compiler.helper import divided, serve
 from solvers.compiler.kernels import entry, is_kept
 from solvers.compiler.notice import parts
 from solvers.compiler.records import RECORDS, load_word
@@ -50,6 +53,8 @@ _TYPES: dict[str, types.Type] = {
     "None": types.none,
     "Vector": types.Array(types.float64, 1, "C"),
     "Matrix": types.Array(types.float64, 2, "C"),
+    "Cube": types.Array(types.float64, 3, "C"),
+    "Stack": types.Array(types.float64, 3, "C"),
     "Integers": types.Array(types.int64, 1, "C"),
 }
 
@@ -86,8 +91,8 @@ _UNCOMPILED: list[OptionalKernel] = []  # addresses requested with NUMBA_DISABLE
 class OptionalKernel:
     """A kernel with a slot in a table of addresses; compiled when it is first linked."""
 
-    def __init__(self, func: Callable[..., Any], slot: int, default: Any) -> None:
-        self.func, self.slot, self.default = func, slot, default
+    def __init__(self, func: Callable[..., Any], slot: int, default: Any, seldom: bool) -> None:
+        self.func, self.slot, self.default, self.seldom = func, slot, default, seldom
         self.name = f"{func.__module__}:{func.__name__}"
         self._code: Any = None
         _EVERY.append(self)
@@ -127,7 +132,7 @@ class OptionalKernel:
             return _UNCOMPILED.index(self) + 1
         if self._code is None:
             declared = self.signature()
-            code = entry(self.func, declared.args)
+            code = entry(self.func, declared.args, self.seldom)
             if code.signature.return_type != declared.return_type:
                 found = code.signature.return_type
                 raise TypeError(f"optional kernel {self.name}: expected to return {declared.return_type}, got {found}")
@@ -145,6 +150,37 @@ class OptionalKernel:
         return cpu_target.typing_context.resolve_value_type(self._call)
 
 
+class _Ahead:
+    """A kernel that Python will call, for the arguments of its annotations."""
+
+    def __init__(self, kernel: Any) -> None:
+        self._kernel, self.func = kernel, kernel.py_func
+        self.name = f"{self.func.__module__}:{self.func.__name__}"
+
+    def types(self) -> tuple[types.Type, ...]:
+        """Those of its arguments."""
+        *arguments, _ = (type_of(text, self.func.__globals__) for text in self.func.__annotations__.values())
+        return tuple(arguments)
+
+    def at_hand(self) -> bool:
+        """Whether it is loaded, or can be."""
+        return self.types() in self._kernel.entry.overloads or is_kept(self.func, self.types())
+
+    def address(self) -> int:
+        """Compile or load it; Python has no use for its address."""
+        self._kernel.entry.compile(self.types())
+        return 0
+
+
+def _job(kernel: Any) -> OptionalKernel | _Ahead:
+    return kernel if isinstance(kernel, OptionalKernel) else _Ahead(kernel)
+
+
+def help_out() -> None:
+    """The program of a helper."""
+    serve(_job)
+
+
 def _zeros(kind: types.Type) -> Any:
     """Zeros of a type of numbers and tuples; None of the others."""
     if isinstance(kind, types.BaseTuple):
@@ -153,20 +189,21 @@ def _zeros(kind: types.Type) -> Any:
     return {types.float64: 0.0, types.int64: 0, types.boolean: False}.get(kind)
 
 
-def optional(slot: int, default: Any = None) -> Callable[[Function], Function]:
+def optional(slot: int, default: Any = None, seldom: bool = False) -> Callable[[Function], Function]:
     """A decorator: the kernel gets a slot in the table of addresses.
 
     Args:
         slot: its index in the table, a member of an IntEnum: never the order of imports, because machine code on disk
             holds it.
         default: result of a call where the slot is empty; zeros of the type of the result unless given.
+        seldom: few steps call it: to compile it fast is worth more than fast code.
 
     Returns:
         The decorator. Tools see the decorated function with its own type.
     """
 
     def decorate(func: Function) -> Function:
-        return cast(Function, OptionalKernel(func, slot, default))
+        return cast(Function, OptionalKernel(func, slot, default, seldom))
 
     return decorate
 
@@ -182,17 +219,19 @@ def link(table: NDArray[np.int64] | list[Callable[..., Any]], *kernels: Callable
     Args:
         table: (slots,) addresses; overwritten in place. A list collects the kernels instead: those of one call divide
             the work of compilation among two processes (helper.py).
-        kernels: functions decorated by `optional`.
+        kernels: functions decorated by `optional`; and kernels that Python will call, which have no slot.
     """
     if isinstance(table, list):
         table += kernels
         return
-    every = cast("list[OptionalKernel]", list(dict.fromkeys(kernels)))
-    left = [] if numba.config.DISABLE_JIT else [kernel for kernel in every if not kernel.compiled]
-    with closing(divided(left)) as queue:
-        for found in parts(queue, len(left)):
-            found.address()
-    for found in every:
+    every = list(dict.fromkeys(kernels))
+    slotted = [kernel for kernel in every if isinstance(kernel, OptionalKernel)]
+    if not numba.config.DISABLE_JIT:
+        jobs = [_job(kernel) for kernel in every if kernel not in slotted or not cast(Any, kernel).compiled]
+        with closing(divided(jobs)) as queue:
+            for job in parts(queue, len(jobs)):
+                job.address()
+    for found in slotted:
         table[found.slot] = found.address()
 
 

@@ -13,11 +13,19 @@ import sys
 from typing import Any
 
 import numba
-from numba.core.compiler import Compiler
+from numba.core.compiler import Compiler, CompileResult
 
 from solvers.compiler.notice import compiling
 
-__all__ = ["FAST", "EntryCompiler", "InnerCompiler", "PlainCompiler", "UsersCompiler"]
+__all__ = [
+    "FAST",
+    "EntryCompiler",
+    "InnerCompiler",
+    "PlainCompiler",
+    "SeldomCompiler",
+    "UsersCompiler",
+    "inner_result",
+]
 
 _KNOWN = ("0.66", "0.67", "0.68")  # versions of Numba that the fast pipeline was tested with
 
@@ -39,19 +47,22 @@ class UsersCompiler(PlainCompiler):
     own = False
 
 
-def _compilers() -> tuple[bool, type[Compiler], type[Compiler]]:
-    """(whether they are fast, the compiler of entries, that of kernels which kernels call)."""
+def _compilers() -> tuple[bool, type[Compiler], type[Compiler], type[Compiler], Any]:
+    """(whether they are fast, the compiler of entries, of entries that are seldom called, of kernels which kernels
+    call, and what makes a result of the last from one that was kept).
+    """
     if os.environ.get("DOJO_OPT_PLAIN_NUMBA", "0") in ("", "0"):
         if any(numba.__version__.startswith(f"{known}.") for known in _KNOWN):
-            from solvers.compiler.fast_pipeline import EntryCompiler, InnerCompiler
+            from solvers.compiler.fast_pipeline import EntryCompiler, InnerCompiler, SeldomCompiler
+            from solvers.compiler.libraries import inner_result
 
-            return True, EntryCompiler, InnerCompiler
+            return True, EntryCompiler, SeldomCompiler, InnerCompiler, inner_result
         print(
             f"dojo_opt: Numba {numba.__version__} is not one of {', '.join(_KNOWN)}, which the fast compiler knows: "
             "kernels are compiled by Numba alone, and steps take about 1.3 times as long",
             file=sys.stderr,
         )
-    return False, PlainCompiler, PlainCompiler
+    return False, PlainCompiler, PlainCompiler, PlainCompiler, CompileResult._rebuild
 
 
-FAST, EntryCompiler, InnerCompiler = _compilers()
+FAST, EntryCompiler, SeldomCompiler, InnerCompiler, inner_result = _compilers()

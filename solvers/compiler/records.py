@@ -24,10 +24,11 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.typing.templates import AttributeTemplate
-from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, overload, register_model
+from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
 from numpy.typing import NDArray
 
 from solvers.compiler.array_words import WORD, ArrayWords
+from solvers.compiler.instructions import compiled_as
 
 Table = NDArray[np.int64]
 R = TypeVar("R")
@@ -141,12 +142,9 @@ def record(cls: type[R], fields: Sequence[Field | Part]) -> Callable[[Table], R]
 
         return kind(table), lower
 
+    @compiled_as(at)
     def view(table: Table) -> R:
         return cast(R, _view(cls, table))
-
-    @overload(view, strict=False)  # not strict: annotations are not part of the signature
-    def compiled(table: Any) -> Any:
-        return lambda table: at(table)
 
     return view
 

@@ -99,3 +99,13 @@ def test_a_notebook_is_told(clock: list[float], monkeypatch: pytest.MonkeyPatch)
 def test_compilations_are_counted_by_name(clock: list[float]) -> None:
     compile_for(clock, 0.0)
     assert [name.split(".")[-1] for name in notice.compiled()] == ["compile_for", "parts_of"]
+
+
+def test_the_number_of_functions_is_told_as_far_as_it_is_known(clock: list[float], terminal: io.StringIO) -> None:
+    compile_for(clock, 0.1)
+    for _ in notice.parts([1], 1):
+        notice.expect(8)
+        compile_for(clock, 3.0)
+    assert "(function 4 of about 10, 3 s so far)" in terminal.getvalue()
+    compile_for(clock, 3.0)
+    assert "(function 6, 6 s so far)" in terminal.getvalue()
