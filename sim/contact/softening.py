@@ -7,11 +7,11 @@ answer with there, and rounding adds 1e-16 M/D, M the same of a body that is fre
 
     W' = (W^-1 - D)^-1 = (I - W D)^-1 W,      D = diag(h d, d, d),      d = 3e-8 sqrt(M G)
 
-balances the two; a contact that gives more than D is not changed. 3e-14 M W' is an estimate of the loss
-(Linearization.accuracy), 1e-6 where M = G. M is 1/m of the bodies that touch, with all parts fixed to them. G follows
-from the effect of the impulse gamma: it has stopped the speed v of the contact point, or carried weight for h, so
-G = (v + |g| h)/gamma. A foot of 1 kg under a load of 1000 kg has G = M/1000, and its impulses are not taken for those
-of a foot alone.
+balances the two; a contact that gives more than D is not changed. 7e-14 M W' is an estimate of the loss
+(Linearization.accuracy): 2e-6 where M = G, where A is off by 3e-8, and a B that is small beside A by more. M is 1/m of
+the bodies that touch, with all parts fixed to them. G follows from the effect of the impulse gamma: it has stopped the
+speed v of the contact point, or carried weight for h, so G = (v + |g| h)/gamma. A foot of 1 kg under a load of 1000 kg
+has G = M/1000, and its impulses are not taken for those of a foot alone.
 """
 
 from __future__ import annotations

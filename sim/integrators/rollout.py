@@ -39,7 +39,7 @@ _SINGULAR = int(Status.SINGULAR)
 _NOT_FINITE = int(Status.NOT_FINITE)
 UNIT = 1e-6  # by how much the length of a quaternion may be off
 REFUSED = -1  # in place of a Status: no state, or no inputs
-ACCURACY = 3e-14  # of derivatives, times the stiffness of their contacts over inertia (contacts/softening.py)
+ACCURACY = 7e-14  # of derivatives, times the stiffness of their contacts over inertia (contact/softening.py)
 
 
 class Linearized(NamedTuple):

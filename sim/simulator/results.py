@@ -455,7 +455,8 @@ class Linearization(Result):
         status: (T,) Status of each knot; the derivatives of an unsolved knot are zero.
         parameters: derivatives (T, ndx, n) by the names of the requested parameters.
         accuracy: (T,) estimate of the error of A and B, relative to their largest entry: hard contacts on light parts
-            cost digits.
+            cost digits. It takes the step as solved: where contacts graze, a step that is solved to the default
+            `tolerance` may have derivatives that are off by 1e-3; with 1e-12 they are not.
         detail: sentence about an unsolved step, with its numbers.
     """
 

@@ -89,6 +89,8 @@ SCENES: dict[str, Callable[[float, float], tuple[dojo.Simulator, np.ndarray]]] =
     "on a slope": lambda h, v: landing(block(friction=0.8, normal=(0.3, -0.2, 0.9)), h, v),
     "kappa 1e-8": lambda h, v: landing(block(friction=0.8), h, v, 1e-8),
     "bouncing": lambda h, v: landing(block(friction=0.8, restitution=0.5), h, v),
+    "bouncing, linear": lambda h, v: landing(block(friction=0.8, restitution=0.5, law="linear"), h, v),
+    "bouncing, 1000 kg": lambda h, v: landing(block(mass=1e3, friction=0.8, restitution=0.9, law="linear"), h, v),
     "bouncing on a slope": lambda h, v: landing(block(friction=0.3, restitution=0.8, normal=(0.3, -0.2, 0.9)), h, v),
     "on terrain": lambda h, v: landing(dojo.Mechanism([dojo.Body("b", 1.0, np.full(3, 0.01))], [FREE], BALL), h, v),
     "bodies": lambda h, v: meeting(two(SHAPES["box"], SHAPES["sphere"]), h, v),
@@ -114,7 +116,7 @@ def test_impacts(name: str, h: float, speed: float) -> None:
 
 
 def test_random_impacts(rng: np.random.Generator) -> None:
-    """Any block, any way up, on any of the laws; bounces with the linear law are right to 1e-4 only, and not tried."""
+    """Any block, any way up, on any of the laws."""
     for _ in range(12):
         mech = block(
             side=rng.uniform(0.1, 1.0),
@@ -123,29 +125,32 @@ def test_random_impacts(rng: np.random.Generator) -> None:
             law=str(rng.choice(["nonlinear", "linear"])),
             restitution=float(rng.choice([0.0, rng.uniform(0.1, 0.9)])),
         )
-        if mech.contacts[0].restitution > 0.0:
-            mech = replace(mech, contacts=[replace(c, law="nonlinear") for c in mech.contacts])
         kappa = float(rng.choice([1e-8, 1e-10])) if rng.random() < 0.5 else None
         check(*landing(mech, 10.0 ** rng.uniform(-4, -2), 10.0 ** rng.uniform(0, 1.5), kappa, rng.normal(size=4)))
 
 
 def error_along(sim: dojo.Simulator, x: np.ndarray, seed: int) -> tuple[float, float]:
-    """Error of A along a random direction, the better of two sizes of differences, and the accuracy that goes with A."""
-    here = sim.step(x, throw=True)
+    """Error of A along a random direction, the best of three sizes of differences, and the accuracy that goes with A.
+
+    Differences are of steps that are solved further than the one that is differentiated.
+    """
+    tight = sim.replace(tolerance=1e-13)
+    here = tight.step(x, throw=True)
     linear = sim.linearize_trajectory(x[None], np.zeros((1, sim.nu)))
     d = np.random.default_rng(seed).normal(size=sim.ndx)
     slopes = [
-        five_point(lambda e: sim.difference(sim.step(sim.integrate(x, e)).x, here.x), d, size) for size in (1e-5, 1e-6)
+        five_point(lambda e: sim.difference(tight.step(sim.integrate(x, e)).x, here.x), d, size)
+        for size in (1e-5, 1e-6, 1e-7)
     ]
     off = min(float(np.abs(linear.A[0] @ d - slope).max()) for slope in slopes)
     return off / float(np.abs(linear.A[0]).max()), float(linear.accuracy[0])
 
 
-@pytest.mark.parametrize("h", [1e-3, 1e-2])
+@pytest.mark.parametrize("h, speed", [(1e-3, 5.0), (1e-2, 5.0), (1e-4, 10.0)])
 @pytest.mark.parametrize("name", ["quadruped", "atlas", "humanoid"])
-def test_robots_that_fall(name: str, h: float) -> None:
-    """Robots with parts of very different mass, at 5 m/s: to 1e-6, and no worse than the reported accuracy."""
-    sim, x = landing(getattr(dojo.models, name)(), h, 5.0, turn=(1, 0.1, 0.1, 0.05))
+def test_robots_that_fall(name: str, h: float, speed: float) -> None:
+    """Robots with parts of very different mass: to 1e-6, and no worse than the reported accuracy."""
+    sim, x = landing(getattr(dojo.models, name)(), h, speed, turn=(1, 0.1, 0.1, 0.05))
     for seed in range(3):
         off, accuracy = error_along(sim, x, seed)
         assert off < 1e-6
@@ -161,7 +166,7 @@ def test_the_accuracy_includes_the_effect_of_a_load() -> None:
     sim, x = landing(block(), 1e-3, 5.0)
     soft = sim.linearize_trajectory(x[None], np.zeros((1, sim.nu)), kappa=1e-3).accuracy
     hard = sim.linearize_trajectory(x[None], np.zeros((1, sim.nu))).accuracy
-    assert soft[0] < 1e-10 < 1e-7 < hard[0] < 1e-5
+    assert soft[0] < 3e-10 < 1e-7 < hard[0] < 1e-5
     x[2] += 5.0
     assert sim.linearize_trajectory(x[None], np.zeros((1, sim.nu))).accuracy[0] < 1e-10
 
