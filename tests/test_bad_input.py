@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from dojo_opt.planning.term import knot_list
 from support.refusals import check_refused
 from support.scenes import ball, block, chain, free_body, pendulum, run
 
@@ -135,6 +136,60 @@ CALLS = {
 @pytest.mark.parametrize("case", CALLS)
 def test_simulator(case):
     check_refused(*CALLS[case])
+
+
+def kinematics():
+    return dojo.Kinematics(dojo.Simulator(ball()))
+
+
+def grid(radius=0.4):
+    """Signed distances of a ball on 9 x 9 x 9 points, .15 m apart."""
+    x = np.linspace(-0.6, 0.6, 9)
+    return np.sqrt(x[:, None, None] ** 2 + x[None, :, None] ** 2 + x[None, None, :] ** 2) - radius
+
+
+Q = np.r_[np.zeros(3), 1.0, np.zeros(3)]
+FROM_DENSITY, FROM_FUNCTION = dojo.SignedDistance.from_density, dojo.SignedDistance.from_function
+# fmt: off
+ROOMS = {
+    "number of 400 digits": (lambda: dojo.Simulator(block(), time_step=10**400), "time_step", "real numbers"),
+    "number of 5000 digits": (lambda: dojo.Sphere(10**5000), "Sphere(radius", "a int"),
+    "ragged number": (lambda: dojo.Sphere([[1, 2], [3]]), "Sphere(radius", "real numbers"),
+    "masked state": (lambda: hopper().step(np.ma.masked_less(state(), 0.1)), "step", "masked"),
+    "order of an array": (lambda: dojo.Simulator(block(), order=np.empty(0)), "order", "2"),
+    "iterations beyond floats": (lambda: dojo.Simulator(block(), max_iterations=10**400), "max_iterations", "2^53"),
+    "frame of an array": (lambda: kinematics().pose(np.empty(0), Q), "Kinematics.pose(frame)"),
+    "text coordinates": (lambda: kinematics().jacobian("ball", "abc"), "Kinematics.jacobian(q)", "'abc'"),
+    "nan velocity": (lambda: kinematics().velocity("ball", Q, np.full(6, np.nan)), "Kinematics.velocity(v)", "nan"),
+    "inf momentum": (lambda: kinematics().centroidal_momentum(Q, np.full(6, np.inf)), "momentum(v)", "inf"),
+    "bias that overflows": (lambda: kinematics().bias_forces(Q, np.full(6, 1e300)), "bias_forces", "not finite"),
+    "option of 400 digits": (lambda: dojo.Options(tolerance=10**400), "ilqr(tolerance=...)", "2^53"),
+    "ragged knots": (lambda: knot_list("Goal(knots=...)", [[1, 2], [3]], 5, True), "Goal(knots=...)", "[[1, 2], [3]]"),
+    "ragged wrenches": (lambda: hopper().step(state(), wrenches=[[1, 2], [3]]), "wrenches", "[[1, 2], [3]]"),
+    "command of nan": (lambda: dojo.Plant(hopper()).step(np.full(0, 1.0)[None]), "Plant.step(command)", "(0,)", "(1, 0)"),
+    "gains of nothing": (lambda: dojo.tracking_gains(None, None), "tracking_gains(problem)", "None"),
+    "ik of nothing": (lambda: dojo.ik(kinematics(), None), "ik(targets)", "None"),
+    "ik to nan": (lambda: dojo.ik(kinematics(), {"ball": (0, 0, 1)}, tolerance=np.nan), "ik(tolerance", "nan"),
+    "ik without attempts": (lambda: dojo.ik(kinematics(), {"ball": (0, 0, 1)}, attempts=None), "ik(attempts", "None"),
+    "ik without iterations": (lambda: dojo.ik(kinematics(), {"ball": (0, 0, 1)}, max_iterations=0), "max_iterations"),
+    "ik that fixes text": (lambda: dojo.ik(kinematics(), {"ball": (0, 0, 1)}, fixed="ball"), "ik(fixed", "'ball'"),
+    "ik of strange limits": (lambda: dojo.ik(kinematics(), {"ball": (0, 0, 1)}, limits=[]), "ik(limits", "[]"),
+    "grid of a light year": (lambda: dojo.SignedDistance(grid(), (-1, -1, -1), 1e300), "spacing", "1e+300"),
+    "too many points": (lambda: FROM_FUNCTION(lambda p: p[:, 0], [[0] * 3, [1] * 3], 1e-9), "spacing", "grid points"),
+    "function of no points": (lambda: FROM_FUNCTION(None, [[0] * 3, [1] * 3], 0.1), "from_function(f)", "None"),
+    "density below its level": (lambda: FROM_DENSITY(-grid(), 1e9, 0.15), "from_density(level", "nowhere above 1e+09"),
+    "density at the edge": (lambda: FROM_DENSITY(-grid(), -1.0, 0.15), "from_density(density)", "edge", "larger grid"),
+    "inertia of nan": (lambda: dojo.Box(1, 1, 1).inertia(np.nan), "Box.inertia(mass)", "nan"),
+    "inertia of no mass": (lambda: dojo.SignedDistance(grid(), (-0.6,) * 3, 0.15).inertia(None), "inertia(mass)", "None"),
+    "place of text": (lambda: dojo.Box(1, 1, 1).place("abc"), "Box.place(points)", "'abc'"),
+    "place in a plane": (lambda: dojo.Box(1, 1, 1).place(np.zeros((4, 2))), "Box.place(points)", "(4, 2)"),
+}
+# fmt: on
+
+
+@pytest.mark.parametrize("case", ROOMS)
+def test_other_rooms(case):
+    check_refused(*ROOMS[case])
 
 
 @pytest.mark.parametrize("mech", [free_body(), block(), chain("spherical", 1)])

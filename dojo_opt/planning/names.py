@@ -41,6 +41,7 @@ def _named(chosen: Any) -> bool:
 def _numbers(call: str, chosen: Any, count: int) -> Integers:
     if chosen is None:
         return np.arange(count)
+    checks.shape(call, chosen)
     numbers = np.atleast_1d(np.asarray(chosen))
     if numbers.dtype.kind not in "iu":
         raise ValueError(f"{call}: expected names or whole numbers, got {chosen!r}")
@@ -72,7 +73,7 @@ def input_weight(call: str, weight: Any, sim: Any) -> Any:
 
 def _value(call: str, value: Any, size: int) -> Any:
     """One number for all components of a name, or one for each."""
-    return checks.number(call, value) if np.ndim(value) == 0 else checks.array(call, value, (size,))
+    return checks.number(call, value) if checks.ndim(call, value) == 0 else checks.array(call, value, (size,))
 
 
 def component_name(sim: Any, column: int) -> str:

@@ -143,7 +143,9 @@ class Options:
         kinds = (int, np.integer) if whole else (int, float, np.integer, np.floating)
         if isinstance(value, bool) or not isinstance(value, kinds) or not value >= 0:
             what = "a whole number" if whole else "a number"
-            raise ValueError(f"ilqr({name}=...): expected {what} >= 0, got {value!r}")
+            raise ValueError(f"ilqr({name}=...): expected {what} >= 0, got {checks.shown(value)}")
+        if isinstance(value, int) and value > checks.LARGEST:
+            raise ValueError(f"ilqr({name}=...): expected a number <= 2^53, got {checks.shown(value)}")
 
     def say(self, line: str) -> None:
         """Print a line to the stream of the table of iterations, if `verbose`.

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.planning.manifold import tangent_layout
 from dojo_opt.planning.names import chosen_components
 from dojo_opt.planning.term import Spec, numbers, state_table, table
+from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 
 Vector = NDArray[np.float64]
@@ -227,8 +228,9 @@ class Problem:
         Raises:
             ValueError: for a wrong shape, or a number that is not finite.
         """
-        if np.ndim(controls) == 2 and np.shape(controls) != (self.horizon, self.sim.nu):
-            raise ValueError(f"{call}: expected shape ({self.horizon}, {self.sim.nu}), got {np.shape(controls)}")
+        shape = checks.shape(call, controls)
+        if len(shape) == 2 and shape != (self.horizon, self.sim.nu):
+            raise ValueError(f"{call}: expected shape ({self.horizon}, {self.sim.nu}), got {shape}")
         return table(call, controls, self.horizon, self.sim.nu)
 
     def check_states(self, call: str, states: ArrayLike) -> Matrix:
@@ -244,8 +246,9 @@ class Problem:
         Raises:
             ValueError: for a wrong shape, or a number that is not finite.
         """
-        if np.shape(states) != (self.horizon + 1, self.sim.nx):
-            raise ValueError(f"{call}: expected shape ({self.horizon + 1}, {self.sim.nx}), got {np.shape(states)}")
+        shape = checks.shape(call, states)
+        if shape != (self.horizon + 1, self.sim.nx):
+            raise ValueError(f"{call}: expected shape ({self.horizon + 1}, {self.sim.nx}), got {shape}")
         checked = table(call, states, self.horizon + 1, self.sim.nx)
         if self.free_start is None:
             checked[0] = self.start

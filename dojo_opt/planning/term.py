@@ -236,9 +236,7 @@ def knot_list(call: str, knots: Any, horizon: int, last: bool) -> Integers:
     count = horizon + 1 if last else horizon
     if knots is None:
         return np.arange(count)
-    chosen = np.atleast_1d(np.asarray(knots))
-    if chosen.dtype.kind not in "iu":
-        raise ValueError(f"{call}: expected whole numbers, got {knots!r}")
+    chosen = checks.whole_numbers(call, knots)
     if chosen.ndim != 1 or chosen.size == 0 or np.any(chosen < -count) or np.any(chosen >= count):
         raise ValueError(f"{call}: expected knots in [{-count}, {count}), got {chosen.tolist()}")
     return np.where(chosen < 0, chosen + count, chosen).astype(np.int64)

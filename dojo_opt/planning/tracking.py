@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.planning.problem import Problem
+from sim.mechanism import checks
 from solvers.status import Status
 
 Array = NDArray[np.float64]
@@ -32,9 +33,14 @@ def tracking_gains(problem: Problem, plan: Any, *, kappa: float | None = None) -
         The gains, (T, nu, ndx) [N or N m per unit of the state].
 
     Raises:
+        TypeError: an argument is no problem, or no plan.
         ValueError: a step of the plan cannot be linearised.
     """
+    if not isinstance(problem, Problem):
+        raise TypeError(f"tracking_gains(problem): expected a Problem, got {checks.shown(problem)}")
     sim = problem.sim
+    if not (hasattr(plan, "x") and hasattr(plan, "u")):
+        raise TypeError(f"tracking_gains(plan): expected a plan or trajectory, got {checks.shown(plan)}")
     line = sim.linearize_trajectory(plan.x, plan.u, substeps=problem.substeps, kappa=kappa)
     if np.any(line.status != Status.SOLVED):
         t = int(np.flatnonzero(line.status != Status.SOLVED)[0])

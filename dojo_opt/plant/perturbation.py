@@ -231,7 +231,7 @@ class Perturbation:
 
 def _array(call: str, value: ArrayLike) -> NDArray[np.float64]:
     """A finite array of whatever shape."""
-    return checks.array(call, value, (None,) * np.ndim(value))
+    return checks.array(call, value, (None,) * checks.ndim(call, value))
 
 
 def _check_limits(call: str, limits: Any) -> None:

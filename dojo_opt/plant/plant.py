@@ -129,8 +129,12 @@ class Plant:
 
         Returns:
             (inputs that acted, those of the pushes included [N, N m], result of the step).
+
+        Raises:
+            ValueError: the shape of the command is wrong, or a number is not finite.
         """
-        self._waiting.append(command)
+        checks.array("Plant.step(command)", command, (self.sim.nu,))
+        self._waiting.append(np.array(command, dtype=np.float64))  # its owner may write into it meanwhile
         if len(self._waiting) > self._late:
             acting = self._waiting.popleft()
         else:

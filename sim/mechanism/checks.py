@@ -14,6 +14,17 @@ Floats = NDArray[np.float64]
 
 _MOST_LISTED = 20  # words in a message
 _LONG = 8192  # numbers; OpenBLAS divides products of 10,000 and more among threads
+_LONGEST = 200  # characters of a value in a message
+LARGEST = 2**53  # up to which floats hold all whole numbers
+
+
+def shown(value: Any) -> str:
+    """A value for a message, cut where it is long."""
+    try:
+        text = repr(value)
+    except Exception:  # integers of thousands of digits refuse, and so may classes of users
+        return f"a {type(value).__name__}"
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
 def floats(call: str, value: Any) -> Floats:
@@ -21,16 +32,40 @@ def floats(call: str, value: Any) -> Floats:
 
     One that must not be written to is copied: compiled code would take it for another type, and be compiled again.
     """
-    if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.flags.carray:
+    if type(value) is np.ndarray and value.dtype == np.float64 and value.flags.carray:
         return value
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise ValueError(f"{call}: expected real numbers, got an array with masked entries")
     try:
         with np.errstate(all="ignore"):
             raw = np.asarray(value)
-            if raw.dtype.kind not in "biufO":
+            if raw.dtype.kind not in "biufO" or (raw.dtype.kind == "O" and any(x is None for x in raw.flat)):
                 raise TypeError
             return np.array(raw, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise ValueError(f"{call}: expected real numbers, got {value!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{call}: expected real numbers, got {shown(value)}") from None
+
+
+def shape(call: str, value: Any) -> tuple[int, ...]:
+    """The shape of what is to become an array; ragged lists are refused."""
+    try:
+        return np.shape(value)
+    except ValueError:
+        raise ValueError(f"{call}: expected real numbers, got {shown(value)}") from None
+
+
+def ndim(call: str, value: Any) -> int:
+    """The number of axes of what is to become an array."""
+    return len(shape(call, value))
+
+
+def whole_numbers(call: str, value: Any) -> NDArray[np.int64]:
+    """`value` as an array of whole numbers, with at least one axis."""
+    shape(call, value)
+    out = np.atleast_1d(np.asarray(value))
+    if out.dtype.kind not in "iu":
+        raise ValueError(f"{call}: expected whole numbers, got {shown(value)}")
+    return out
 
 
 def finite(values: Floats) -> bool:
@@ -62,8 +97,8 @@ def number(call: str, value: Any, at_least: float | None = None, above: float | 
     """`value` as a finite float within the stated bound."""
     if type(value) is float and isfinite(value):
         out = value
-    elif np.ndim(value) != 0:
-        raise ValueError(f"{call}: expected one number, got {value!r}")
+    elif ndim(call, value) != 0:
+        raise ValueError(f"{call}: expected one number, got {shown(value)}")
     else:
         out = float(array(call, value, ()))
     if at_least is not None and out < at_least:
@@ -101,7 +136,7 @@ def quaternion(call: str, value: Any) -> tuple[float, ...]:
 def name(call: str, value: Any) -> str:
     """`value` as a name that is not empty."""
     if not isinstance(value, str) or not value:
-        raise ValueError(f"{call}: expected a name, got {value!r}")
+        raise ValueError(f"{call}: expected a name, got {shown(value)}")
     return value
 
 
@@ -109,7 +144,7 @@ def one_of(call: str, value: Any, known: Iterable[str]) -> str:
     """`value` as one of the known words."""
     words = known if isinstance(known, Mapping | Sequence) and not isinstance(known, str) else list(known)
     if not isinstance(value, str) or value not in words:
-        raise ValueError(f"{call}: {value!r} is not one of: {listed(words)}{nearest(value, words)}")
+        raise ValueError(f"{call}: {shown(value)} is not one of: {listed(words)}{nearest(value, words)}")
     return value
 
 
@@ -153,7 +188,17 @@ def share(call: str, value: Any) -> float:
 
 
 def whole_number(call: str, value: Any, least: int = 1) -> int:
-    """`value` as a whole number of at least `least`."""
+    """`value` as a whole number of at least `least`, and at most 2^53, which floats hold."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ValueError(f"{call}: expected a whole number >= {least}, got {value!r}")
+        raise ValueError(f"{call}: expected a whole number >= {least}, got {shown(value)}")
+    if value > LARGEST:
+        raise ValueError(f"{call}: expected a whole number <= 2^53, got {shown(value)}")
     return int(value)
+
+
+def within_range(call: str, result: Any) -> Floats:
+    """A result of finite arguments, refused where it has overflowed."""
+    out = np.asarray(result)
+    if not finite(out):
+        raise ValueError(f"{call}: the result is not finite: an argument is too large")
+    return out

@@ -415,7 +415,8 @@ def inertia_of(call: str, body: Body) -> tuple[tuple[float, ...], ...]:
     if body.inertia is None:
         matrix = inertia_of_shapes(call, body)
     else:
-        matrix = checks.array(f"{call}, inertia=...)", body.inertia, (3,) if np.ndim(body.inertia) == 1 else (3, 3))
+        flat = checks.ndim(f"{call}, inertia=...)", body.inertia) == 1
+        matrix = checks.array(f"{call}, inertia=...)", body.inertia, (3,) if flat else (3, 3))
         matrix = np.diag(matrix) if matrix.ndim == 1 else matrix
     if np.abs(matrix - matrix.T).max() > 1e-9 * np.abs(matrix).max():
         raise ValueError(f"{call}, inertia=...): expected a symmetric matrix, got {matrix.tolist()}")
@@ -453,7 +454,7 @@ def inertia_of_shapes(call: str, body: Body) -> NDArray[np.float64]:
 def per_dof(call: str, joint: Joint, field: str) -> tuple[float, ...]:
     """One value per degree of freedom."""
     call, value = f"{call}, {field}=...)", getattr(joint, field)
-    if np.ndim(value) == 0:
+    if checks.ndim(call, value) == 0:
         values = (checks.number(call, value),) * joint.nv
         if field == "rest" and joint.nrot == 3 and any(values):
             raise ValueError(f"{call}: expected {joint.nv} numbers, the last three a rotation vector, got {value!r}")
@@ -476,7 +477,11 @@ def limits_of(call: str, joint: Joint) -> tuple[tuple[float, float], ...]:
         return (free,) * joint.nv
     if not hasattr(given, "__len__"):
         raise ValueError(f"{call}: expected (lo, hi), or one such pair per degree of freedom, got {given!r}")
-    if len(given) == 2 and all(np.ndim(x) == 0 for x in given) and (joint.nv == 1 or any(x is not None for x in given)):
+    if (
+        len(given) == 2
+        and all(checks.ndim(call, x) == 0 for x in given)
+        and (joint.nv == 1 or any(x is not None for x in given))
+    ):
         given = (given,)
     if len(given) != joint.nv:
         raise ValueError(f"{call}: expected {joint.nv} pairs (lo, hi), one per degree of freedom, got {len(given)}")

@@ -199,6 +199,7 @@ class Solid:
         Raises:
             ValueError: a body cannot have this shape.
         """
+        mass = checks.number(f"{type(self).__name__}.inertia(mass)", mass, at_least=0.0)
         R = rotation_matrix(self.orientation)
         return np.asarray((R * self.principal(mass)) @ R.T)
 
@@ -210,8 +211,15 @@ class Solid:
 
         Returns:
             (..., 3) the same from the centre of mass of the body, body axes [m].
+
+        Raises:
+            ValueError: the points have another shape.
         """
-        return np.asarray(points) @ rotation_matrix(self.orientation).T + np.asarray(self.center)
+        call = f"{type(self).__name__}.place(points)"
+        places = checks.floats(call, points)
+        if places.shape[-1:] != (3,):
+            raise ValueError(f"{call}: expected shape (..., 3), got {places.shape}")
+        return places @ rotation_matrix(self.orientation).T + np.asarray(self.center)
 
     def mass_centre(self) -> Floats:
         """Centre of the solid.

@@ -23,6 +23,8 @@ Field = Callable[[Floats], ArrayLike]
 
 _LEAST = 4  # values along each axis
 _MARGIN = 3  # cells around a mesh
+_MOST = 1e8  # points of a grid: .8 GB
+_FINEST, _COARSEST = 1e-9, 1e6  # spacings [m]: beyond, squares of lengths lose their digits
 _STAND = 32  # points on which it stands
 _APART = 0.05  # of a cell, within which the balls around two of them are one
 
@@ -74,10 +76,12 @@ class SignedDistance(Solid):
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "origin", checks.vector(f"{call}(origin=...)", self.origin, 3))
         self._positive("spacing")
+        if not _FINEST <= self.spacing <= _COARSEST:
+            raise ValueError(f"{call}(spacing=...): expected {_FINEST:g} to {_COARSEST:g} m, got {self.spacing:g}")
         object.__setattr__(self, "offset", checks.number(f"{call}(offset=...)", self.offset, at_least=0.0))
         if not values.min() < 0.0:
             raise ValueError(f"{call}(values=...): there is no solid: expected negative values inside, got none")
-        edge = min(float(np.take(values, [0, -1], axis=k).min()) for k in range(3))
+        edge = _at_edge(values)
         if not edge > 0.0:
             raise ValueError(
                 f"{call}(values=...): the solid reaches the edge of the grid, where a value is {edge:g}; "
@@ -108,6 +112,8 @@ class SignedDistance(Solid):
             ValueError: for values of another number, or that SignedDistance refuses.
         """
         call = "SignedDistance.from_function"
+        if not callable(f):
+            raise ValueError(f"{call}(f): expected a function of points (n, 3), got {checks.shown(f)}")
         origin, counts, points = _grid(call, bounds, spacing)
         return cls(_sampled(f"{call}(f)", f, points).reshape(counts), origin, spacing, **place)
 
@@ -153,6 +159,13 @@ class SignedDistance(Solid):
             values = _sampled(f"{call}(density)", density, points).reshape(counts)
         else:
             values = checks.array(f"{call}(density)", density, (None, None, None))
+        if values.size and not values.max() > level:
+            raise ValueError(f"{call}(level=...): the density is nowhere above {level:g}")
+        if min(values.shape) >= _LEAST and _at_edge(-values) <= -level:
+            raise ValueError(
+                f"{call}(density): it is {-_at_edge(-values):g} at the edge of the grid, expected less than the level "
+                f"{level:g} there: take a larger grid"
+            )
         raw = cls(level - values, origin, spacing)
         return cls(distances_to_level(raw.level_set), origin, spacing, **place)
 
@@ -218,6 +231,7 @@ class SignedDistance(Solid):
         Raises:
             ValueError: the centroid is elsewhere.
         """
+        mass = checks.number("SignedDistance.inertia(mass)", mass, at_least=0.0)
         if np.abs(self.centroid).max() > 1e-6 * self.bounding_radius():
             raise ValueError(
                 f"SignedDistance: its centroid is at {np.round(self.centroid, 9).tolist()}; a body has its origin "
@@ -325,13 +339,21 @@ class SignedDistance(Solid):
         return Stance("point", centres, self.offset + radius)
 
 
+def _at_edge(values: Floats) -> float:
+    """Least value at the edge of a grid."""
+    return min(float(np.take(values, [0, -1], axis=k).min()) for k in range(3))
+
+
 def _grid(call: str, bounds: ArrayLike, spacing: float) -> tuple[Floats, tuple[int, ...], Floats]:
     """Lowest corner, numbers of points along the axes, and all points (n, 3) of a grid that covers a box."""
     box = checks.array(f"{call}(bounds=...)", bounds, (2, 3))
     spacing = checks.number(f"{call}(spacing=...)", spacing, above=0.0)
     if not np.all(box[1] > box[0]):
         raise ValueError(f"{call}(bounds=...): expected a lowest and a highest corner, got {box.tolist()}")
-    counts = np.ceil((box[1] - box[0]) / spacing - 1e-9).astype(int) + 1
+    cells = np.ceil((box[1] - box[0]) / spacing - 1e-9)
+    if not np.prod(cells + 1.0) <= _MOST:
+        raise ValueError(f"{call}(spacing=...): {np.prod(cells + 1.0):.3g} grid points, expected at most {_MOST:.0e}")
+    counts = cells.astype(int) + 1
     axes = [box[0, k] + spacing * np.arange(counts[k]) for k in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     return box[0], tuple(counts.tolist()), points

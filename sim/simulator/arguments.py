@@ -94,10 +94,10 @@ class Arguments:
         if isinstance(wrenches, Mapping):
             for name, value in wrenches.items():
                 checks.one_of(f"{call}: body", name, names)
-                lead = (steps,) if np.ndim(value) == 2 else ()
+                lead = (steps,) if checks.ndim(f"{call}: body {name!r}", value) == 2 else ()
                 out[:, names.index(name)] = checks.array(f"{call}: body {name!r}", value, (*lead, 6))
         else:
-            lead = (steps,) if np.ndim(wrenches) == 3 else ()
+            lead = (steps,) if checks.ndim(call, wrenches) == 3 else ()
             out[:] = checks.array(call, wrenches, (*lead, self.nbody, 6))
         return out
 
@@ -185,7 +185,7 @@ class Arguments:
 
 def shaped(call: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """`value` as a finite array that ends in `shape`, with any leading axes."""
-    ndim = np.ndim(value)
+    ndim = checks.ndim(call, value)
     lead = (None,) * max(0, ndim - len(shape))
     try:
         return checks.array(call, value, (*lead, *shape))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -85,6 +85,11 @@ def ik(
         ValueError: a frame or a joint is unknown, or a target has another form.
     """
     kin = sim if isinstance(sim, Kinematics) else Kinematics(sim)
+    if not isinstance(targets, Mapping):
+        raise ValueError(f"ik(targets): expected a place for each frame, got {checks.shown(targets)}")
+    tolerance = checks.number("ik(tolerance=...)", tolerance, above=0.0)
+    checks.whole_number("ik(max_iterations=...)", max_iterations)
+    checks.whole_number("ik(attempts=...)", attempts)
     wanted = {name: _target(kin, name, given) for name, given in targets.items()}
     if not wanted:
         raise ValueError("ik(targets): expected at least one target")
@@ -220,6 +225,10 @@ def _bounds(kin: Kinematics, fixed: Sequence[str], limits: bool) -> tuple[Floats
     mech = kin.mechanism
     low, high = np.full(mech.nv, -np.inf), np.full(mech.nv, np.inf)
     free = np.ones(mech.nv, dtype=bool)
+    if not isinstance(fixed, Sequence | Set) or isinstance(fixed, str):
+        raise ValueError(f"ik(fixed=...): expected names of joints, got {checks.shown(fixed)}")
+    if not isinstance(limits, bool | np.bool_):
+        raise ValueError(f"ik(limits=...): expected True or False, got {checks.shown(limits)}")
     for name in fixed:
         checks.one_of("ik(fixed=...)", name, mech.joint_names)
     for joint in mech.joints:

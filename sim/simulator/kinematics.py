@@ -111,6 +111,7 @@ class Kinematics:
         R = _rotations(z[..., 6:10])
         return z[..., :3] + R @ point, R @ turn
 
+    @np.errstate(over="ignore", invalid="ignore")  # an overflow is refused at the end
     def velocity(self, frame: str, q: ArrayLike, v: ArrayLike) -> Floats:
         """Velocity of a frame.
 
@@ -123,7 +124,8 @@ class Kinematics:
             (..., 6) velocity of the frame's origin [m/s] and angular velocity [rad/s], world axes.
         """
         J = self.jacobian(frame, q)
-        return np.asarray((J @ _rows("Kinematics.velocity(v)", v, self.sim.nv)[..., None])[..., 0])
+        v = _rows("Kinematics.velocity(v)", v, self.sim.nv)
+        return checks.within_range("Kinematics.velocity", (J @ v[..., None])[..., 0])
 
     def jacobian(self, frame: str, q: ArrayLike) -> Floats:
         """Jacobian of a frame's velocity by joint velocities.
@@ -167,6 +169,7 @@ class Kinematics:
         J, _ = self._body_jacobians(self._q("Kinematics.com_jacobian(q)", q))
         return np.einsum("b,...bkd->...kd", self._mass, J[..., :3, :]) / self._mass.sum()
 
+    @np.errstate(over="ignore", invalid="ignore")  # an overflow is refused at the end
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Momentum of all bodies about their centre of mass.
 
@@ -185,8 +188,10 @@ class Kinematics:
         p = self._mass[:, None] * twist[..., :3]
         spin = (self._world_inertia(R) @ twist[..., 3:, None])[..., 0]
         arm = z[..., :3] - self.center_of_mass(q)[..., None, :]
-        return np.concatenate([p.sum(axis=-2), (spin + np.cross(arm, p)).sum(axis=-2)], axis=-1)
+        momentum = np.concatenate([p.sum(axis=-2), (spin + np.cross(arm, p)).sum(axis=-2)], axis=-1)
+        return checks.within_range("Kinematics.centroidal_momentum", momentum)
 
+    @np.errstate(over="ignore", invalid="ignore")  # an overflow is refused at the end
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Mass matrix M, armature included.
 
@@ -200,7 +205,8 @@ class Kinematics:
         linear, angular = J[..., :3, :], J[..., 3:, :]
         M = np.einsum("b,...bki,...bkj->...ij", self._mass, linear, linear)
         M += np.einsum("...bki,...bkl,...blj->...ij", angular, self._world_inertia(R), angular)
-        return np.asarray(M + np.diag(np.concatenate([np.asarray(j.armature) for j in self.mechanism.joints])))
+        M = M + np.diag(np.concatenate([np.asarray(j.armature) for j in self.mechanism.joints]))
+        return checks.within_range("Kinematics.mass_matrix", M)
 
     def gravity_torques(self, q: ArrayLike) -> Floats:
         """Forces g(q) of the joints that hold the mechanism at rest against gravity.
@@ -216,6 +222,7 @@ class Kinematics:
         weight = np.outer(share * self._mass, np.asarray(self.mechanism.gravity))
         return -np.einsum("bk,...bkd->...d", weight, J[..., :3, :])
 
+    @np.errstate(over="ignore", invalid="ignore")  # an overflow is refused at the end
     def bias_forces(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Forces b(q, v) of the joints that keep v constant, without gravity.
 
@@ -244,8 +251,10 @@ class Kinematics:
         w = twist[..., 3:]
         force = self._mass[:, None] * rate[..., :3]
         torque = (I @ rate[..., 3:, None])[..., 0] + np.cross(w, (I @ w[..., None])[..., 0])
-        return np.einsum("...bkd,...bk->...d", J, np.concatenate([force, torque], axis=-1))
+        forces = np.einsum("...bkd,...bk->...d", J, np.concatenate([force, torque], axis=-1))
+        return checks.within_range("Kinematics.bias_forces", forces)
 
+    @np.errstate(over="ignore", invalid="ignore")  # an overflow is refused at the end
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, acceleration: ArrayLike) -> Floats:
         """Forces of the joints for an acceleration of the tree, tau = M dv + b + g.
 
@@ -259,10 +268,11 @@ class Kinematics:
         """
         dv = _rows("Kinematics.inverse_dynamics(acceleration)", acceleration, self.sim.nv)
         inertial = (self.mass_matrix(q) @ dv[..., None])[..., 0]
-        return np.asarray(inertial + self.bias_forces(q, v) + self.gravity_torques(q))
+        forces = inertial + self.bias_forces(q, v) + self.gravity_torques(q)
+        return checks.within_range("Kinematics.inverse_dynamics", forces)
 
     def _frame(self, call: str, name: str) -> tuple[int, Floats, Floats]:
-        if name == WORLD and WORLD not in self._frames:
+        if isinstance(name, str) and name == WORLD and WORLD not in self._frames:
             return -1, np.zeros(3), np.eye(3)
         return self._frames[checks.one_of(call, name, self._frames)]
 
@@ -294,6 +304,7 @@ class Kinematics:
         nv = self.sim.nv
         many = np.broadcast_to(q[..., None, :], (*q.shape[:-1], nv, q.shape[-1]))
         z = self.sim.bodies(many, np.broadcast_to(np.eye(nv), (*q.shape[:-1], nv, nv)))
+        checks.within_range("Kinematics", z)
         R = _rotations(z[..., 0, :, 6:10])
         columns = np.moveaxis(z, -3, -1)  # (..., nbody, 13, nv)
         return np.concatenate([columns[..., 3:6, :], R @ columns[..., 10:13, :]], axis=-2), R
@@ -301,10 +312,10 @@ class Kinematics:
 
 def _rows(call: str, value: ArrayLike, length: int) -> Floats:
     """An array (..., length)."""
-    out = np.asarray(value, dtype=np.float64)
+    out = checks.floats(call, value)
     if out.ndim == 0 or out.shape[-1] != length:
         raise ValueError(f"{call}: expected shape (..., {length}), got {out.shape}")
-    return out
+    return checks.array(call, out, out.shape)
 
 
 def _times(J: Floats, v: Floats) -> Floats:

@@ -332,7 +332,9 @@ class RowStepping(StateSpace):
         if kappa is not None:
             if self.order > 2:
                 raise ValueError(f"{call}(kappa=...): steps of order {self.order} have none")
-            kappas[:] = checks.array(f"{call}(kappa=...)", kappa, () if np.ndim(kappa) == 0 else (count,))
+            kappas[:] = checks.array(
+                f"{call}(kappa=...)", kappa, () if checks.ndim(f"{call}(kappa=...)", kappa) == 0 else (count,)
+            )
             if not np.all(kappas > 0.0):
                 raise ValueError(f"{call}(kappa=...): expected numbers above 0, got {kappa!r}")
         engines, index = self._row_models.of(f"{call}(parameters=...)", parameters, count)

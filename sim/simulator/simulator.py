@@ -96,7 +96,7 @@ class Simulator(RowStepping):
         whole_number("Simulator(max_iterations=...)", max_iterations)
         if not isinstance(divide, bool | np.bool_):
             raise TypeError(f"Simulator(divide=...): expected True or False, got {divide!r}")
-        if order not in _ORDERS:
+        if not isinstance(order, int | np.integer) or order not in _ORDERS:
             raise ValueError(f"Simulator(order=...): expected one of {_ORDERS}, got {order!r}")
         h = checks.number("Simulator(time_step=...)", time_step, above=0.0)
         self._kappa = None if kappa is None else checks.number("Simulator(kappa=...)", kappa, above=0.0)

@@ -79,6 +79,17 @@ def test_delay_holds_commands_back():
     np.testing.assert_array_equal(loop.u[:, 2], [0, 0, 0, 1, 2, 3])
 
 
+def test_a_controller_may_write_into_the_array_it_returned():
+    plant, command = Plant(HOPPER, high(HOPPER), delay=0.01), np.zeros(3)
+
+    def controller(t, x):
+        command[2] = round(t / 5e-3)
+        return command
+
+    loop = dojo.closed_loop(controller, plant, 0.03, fallen=lambda x: False)
+    np.testing.assert_array_equal(loop.u[:, 2], [0, 0, 0, 1, 2, 3])
+
+
 def test_actuators_saturate():
     plant = Plant(HOPPER, high(HOPPER), control_limits=(-1.0, [2.0, 2.0, 3.0]))
     loop = dojo.closed_loop(lambda t, x: np.array([-5.0, 5.0, 5.0]), plant, 0.01, fallen=lambda x: False)

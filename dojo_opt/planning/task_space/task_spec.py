@@ -54,6 +54,8 @@ class TaskSpec(Spec):
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         del layout
         call = type(self).__name__
+        if not isinstance(self.periodic, bool | np.bool_):
+            raise ValueError(f"{call}(periodic=...): expected True or False, got {checks.shown(self.periodic)}")
         if self.periodic:
             return self._tie(sim, horizon)
         knots = knot_list(f"{call}(knots=...)", self.knots, horizon, last=self._LAST)
