@@ -20,6 +20,7 @@ from sim.dynamics.kinematics import tree_poses
 from sim.model.data import Data
 from sim.model.model import InputKind, Model
 from solvers.compiler import kernel
+from solvers.dense import dot
 from solvers.rotation import Mat3, cross, rotate
 from solvers.types import Matrix, Vector
 
@@ -118,14 +119,12 @@ def turns_below_half(model: Model, data: Data, h: float, v: Vector) -> bool:
 def ends_below_half(model: Model, data: Data, h: float) -> bool:
     """`turns_below_half` at configuration 3, for the velocity data.nu: whether another step may begin there.
 
-    Where no body or joint turned by a quarter of a turn, all is well.
+    Where no body turned by a quarter of a turn, and all coordinates together moved by less, all is well.
     """
-    c, most = 1.0, 0.0
+    c = 1.0
     for i in range(data.turn.shape[0]):
         c = min(c, data.turn[i, 0])
-        for d in range(model.body_vadr[i] + model.joint_ntrans[i], model.body_vadr[i + 1]):
-            most = max(most, abs(data.nu[d]))
-    if c > _QUARTER and h * most < _QUARTER:
+    if c > _QUARTER and h * h * dot(data.nu, data.nu) < _QUARTER * _QUARTER:
         return True
     for i in range(model.body_parent.shape[0]):
         p, w = model.body_parent[i], data.twist[i]

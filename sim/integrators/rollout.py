@@ -202,6 +202,9 @@ def _report(model: Model, data: Data, options: StepOptions, motion: MotionBuffer
         if not gradient(model, data, options.h, options.kappa, x[:nq], x[nq:], motion.A[t], motion.B[t]):
             report[0] = _SINGULAR
             return False
+        if not (is_finite_matrix(motion.A[t]) and is_finite_matrix(motion.B[t])):
+            report[0] = _NOT_FINITE
+            return False
         report[5] = ACCURACY * data.contact_hard[0]
     return True
 

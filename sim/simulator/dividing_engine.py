@@ -20,7 +20,7 @@ from sim.integrators.feedback import Following
 from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, chained, knot_inputs
+from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, chained, knot_inputs, refuse
 from sim.simulator.intervals import Intervals
 from sim.simulator.link import link_step
 from sim.simulator.results import Interrupted
@@ -212,6 +212,7 @@ class DividingEngine(Engine):
             motion.contacts[knot] = divided.contacts()
         if derivatives:
             motion.A[knot], motion.B[knot] = self.slopes(x, divided)
+            return refuse(report[None], 1, motion.A[knot : knot + 1], motion.B[knot : knot + 1]) == 1
         return True
 
     def _divide_followed(self, motion: MotionBuffers, kappa: float | None, following: Following, done: int) -> bool:

@@ -204,8 +204,8 @@ class Engine:
 
     def linked(self, *needs: Callable[[Model], None]) -> Table:
         """Table of the Model, with the optional kernels linked that a call needs."""
-        new = [need for need in needs if need not in self._linked]
-        if new:
+        if not self._linked.issuperset(needs):
+            new = [need for need in needs if need not in self._linked]
             kernels: Any = []  # of all needs at once, so that two processes can compile them
             for need in new:
                 need(self.model._replace(optional=kernels))
@@ -286,8 +286,6 @@ class Engine:
                 raise KeyboardInterrupt from None
             knot = stop.result
             raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, division)) from None
-        if derivatives:
-            knot = refuse(reports, knot, A[:knot], B[:knot])
         if knot < steps:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
         return Rolled(knot, xs, reports, contacts, A, B, division)

@@ -585,7 +585,7 @@ def sentence(
 
 def missed(errors: Floats) -> str:
     """A sentence about the largest estimated error (T,) of solved steps beyond the accuracy; empty without one."""
-    if errors.max(initial=0.0) <= 1.0:
+    if errors.dot(errors) <= 1.0 or errors.max(initial=0.0) <= 1.0:  # the product takes a fifth of the time
         return ""
     worst = int(np.argmax(errors))
     return (

@@ -226,7 +226,7 @@ class Simulator(RowStepping):
         """A rollout under the inputs (T, nu)."""
         knot, xs, reports = rolled.knot, rolled.xs, rolled.reports
         last = reports[min(knot, len(reports) - 1)] if len(reports) else np.zeros(REPORT)
-        status, where = Status(int(last[0])), f"Simulator.rollout: step {knot}"
+        status, where = STATUSES[int(last[0])], f"Simulator.rollout: step {knot}"
         errors = rolled.division.errors[:knot]
         return Trajectory(
             simulator=self,

@@ -263,3 +263,14 @@ def test_a_mechanism_spoilt_afterwards_gets_a_status() -> None:
         assert np.isfinite(t.contacts.impulse).all() and np.isfinite(t.contacts.gap).all()
         assert np.isfinite(linear.A).all() and np.isfinite(linear.B).all()
         assert not t.success and linear.status.all()
+
+
+def test_derivatives_beyond_all_numbers_end_a_rollout() -> None:
+    """At the step whose derivatives they are, although the step itself is solved."""
+    sim = dojo.Simulator(dojo.models.pendulum(mass=1e-3), 0.01)
+    x, us = sim.neutral(), np.zeros((3, 1))
+    sim._engine.model.input_wrench[...] = 1e308  # per kg m^2 of the link it is infinite
+    assert sim.rollout(x, us).success
+    _, linear = sim.linearize_rollout(x, us)
+    assert list(linear.status) == 3 * [dojo.Status.NOT_FINITE]
+    assert not linear.A.any() and not linear.B.any()
