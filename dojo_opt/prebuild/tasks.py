@@ -103,6 +103,12 @@ def _pendulum(calls: Callable[[Any], None], order: int = 2) -> None:
     calls(dojo.Simulator(dojo.models.pendulum(), time_step=0.01, order=order))
 
 
+def _divisions() -> None:
+    """Divided steps without dampers, and with those whose impulses are handed on."""
+    for damper in (0.0, 0.01):
+        divisions(dojo.Simulator(dojo.models.pendulum(damper=damper), time_step=0.01))
+
+
 def _learning() -> None:
     """Rows of a batch, with and without derivatives, and the action of a policy."""
     sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01)
@@ -230,7 +236,7 @@ _CALLS: dict[str, Callable[[], None]] = {  # the first one to reach an entry com
     "motions": lambda: _pendulum(motions),
     "states": lambda: _pendulum(states),
     "learning": lambda: _learning(),
-    "divisions": lambda: _pendulum(divisions),
+    "divisions": lambda: _divisions(),
     "flight": lambda: _flight(motions, 8),
     "states of higher order": lambda: _pendulum(states, 4),
     "motions of higher order": lambda: _pendulum(motions, 4),
