@@ -20,7 +20,7 @@ def pytest_configure(config: pytest.Config) -> None:
     Without bytecode each worker parses all tests again, and each process that a test starts all modules: ten seconds
     a worker, and half a second a process.
     """
-    if sys.dont_write_bytecode and config.cache is not None:
+    if sys.dont_write_bytecode and getattr(config, "cache", None) is not None:
         sys.pycache_prefix, sys.dont_write_bytecode = str(config.cache.mkdir("bytecode")), False
 
 

@@ -348,8 +348,15 @@ OTHER_PAIRS = (
 HARD = "complementarity interior_point inequalities globalization direction step_length merit".split()
 NO_CONTACTS = ("solvers.cones", "sim.contact", "sim.dynamics.joints.limits", *(f"sim.solve.{name}" for name in HARD))
 
-# lines that take numbers or lanes of them, rows of one layout or another: a signature for each
-SEVERAL = ("solvers.lu.solve_two", "solvers.lu.solve_three", "solvers.rotation.three", "solvers.rotation.put_three")
+# lines that take numbers or lanes of them, rows of one layout or another; the loop over time, with a law and without:
+# a signature for each
+SEVERAL = (
+    "solvers.lu.solve_two",
+    "solvers.lu.solve_three",
+    "solvers.rotation.three",
+    "solvers.rotation.put_three",
+    "sim.integrators.rollout.roll",
+)
 
 SCENES: dict[str, tuple[str, tuple[str, ...]]] = {  # each with kernels that neither it nor those above it need
     "pendulum": (

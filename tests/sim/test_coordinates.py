@@ -14,6 +14,7 @@ from sim.mechanism.pack import pack
 from sim.model.layout import allocate_data, sizes_of, table
 from sim.simulator.link import link_poses
 from support.mechanisms import CASES, chain_with, random_state
+from support.records import arrays_of
 
 Floats = NDArray[np.float64]
 H = 0.05
@@ -28,7 +29,7 @@ class Maps:
         link_poses(self.model)
         self.model_at = table(self.model)
         self.work = allocate_data(sizes_of(self.model))
-        for array in self.work:
+        for array in arrays_of(self.work).values():
             array[...] = np.nan if array.dtype.kind == "f" else -(2**62)
         self.data_at = table(self.work)
         self.nx, self.ndx = mech.nq + mech.nv, 2 * mech.nv

@@ -15,6 +15,7 @@ from sim.mechanism.shapes import rotation_matrix
 from sim.model.layout import allocate_data, sizes_of, table
 from sim.simulator.link import link_poses
 from support.mechanisms import CASES, chain_with, random_state
+from support.records import arrays_of
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ def measure(mech: Mechanism, q: Floats, v: Floats, h: float) -> tuple[Floats, Fl
     model = pack(mech)
     link_poses(model)
     work = allocate_data(sizes_of(model))
-    for array in work:
+    for array in arrays_of(work).values():
         array[...] = np.nan if array.dtype.kind == "f" else 0
     model_at, data_at = table(model), table(work)
     x = np.concatenate([q, v])[None]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -27,6 +26,7 @@ from sim.model.layout import (
 )
 from sim.model.model import Model
 from solvers.compiler import Table, kernel
+from support.records import arrays_of
 
 ALL = Sizes(nbody=3, nq=8, nv=7, ncontact=2, nlimit=4, nu=5, nstage=4)
 BARE = Sizes(nbody=1, nq=1, nv=1, ncontact=0, nlimit=0, nu=0)
@@ -40,14 +40,6 @@ def declared_shapes(cls: type) -> dict[str, list[str] | None]:
         stated = re.search(r"# \(([^)]*)\)", comment)
         shapes[name] = [re.sub(r"[ *]", "", n) for n in stated[1].split(",") if n.strip()] if stated else None
     return shapes
-
-
-def arrays_of(record: Any) -> dict[str, Any]:
-    """All arrays of a record, those of its parts included."""
-    out = {}
-    for name, value in zip(record._fields, record, strict=True):
-        out.update(arrays_of(value) if isinstance(value, tuple) else {name: value})
-    return out
 
 
 @pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Carry, CARRY_FIELDS), (Data, DATA_FIELDS)])
