@@ -203,3 +203,5 @@ class Slot(IntEnum):
     CLOSE_INTERVAL = 166
     # energies of a step that few steps ask for
     ENERGIES_GAINED = 167
+    # gears: the responses of a row to several velocities at once
+    GEAR_RESPONSES = 168

@@ -102,6 +102,7 @@ from sim.dynamics.loops.gears import (
     apply_gears,
     gear_derivatives,
     gear_response,
+    gear_responses,
     unit_gear_impulse,
 )
 from sim.dynamics.loops.loop_velocity import close_velocity
@@ -259,7 +260,7 @@ def link_nodes(model: Model) -> None:
         if np.any(model.dof_damper):
             link(model.optional, close_interval)
     if len(model.gear_dof):
-        link(model.optional, unit_gear_impulse, gear_response)
+        link(model.optional, unit_gear_impulse, gear_response, gear_responses)
 
 
 def link_pairs(model: Model) -> None:

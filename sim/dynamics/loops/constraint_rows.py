@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.dynamics.loops.gears import gear_response, gear_responses, gear_row, unit_gear_impulse
+from sim.dynamics.loops.gears import gear_response, gear_responses, unit_gear_impulse
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
@@ -123,7 +123,7 @@ def enlist(model: Model, data: Data, n: int) -> int:
     for m in range(n):
         k = data.couple_order[m]
         data.couple_start[m] = row
-        first = gear_row(model, k - count) if k >= count else int(model.coupling_row[k])
+        first = int(model.coupling_row[min(k, count)]) + max(k - count, 0)
         last = first + 1 if k >= count else int(model.coupling_row[k + 1])
         pair = is_pair(model, k)
         if pair:
@@ -163,7 +163,8 @@ def row_responses(model: Model, data: Data, p: int, c: int) -> Lanes:
     """Row p of the system times LANES velocities, columns of couple_Y from c on, whose twists are in couple_Z."""
     row, k = data.couple_live[p, 0], data.couple_live[p, 1]
     if k >= model.coupling_body.shape[0]:
-        return gear_responses(model, data, k - model.coupling_body.shape[0], data.couple_Y, c)
+        gear_responses(model, data, k - model.coupling_body.shape[0], data.couple_Y, c, p)
+        return load(data.couple_x, p, 0)
     x = spread(0.0)
     for side in range(2):
         i = model.coupling_body[k, side]
@@ -191,7 +192,8 @@ def column_responses(model: Model, data: Data, p: int, c: int) -> Lanes:
     row, k = data.couple_live[p, 0], data.couple_live[p, 1]
     x = load(data.couple_panel, row, c)
     if k >= model.coupling_body.shape[0]:
-        return x + gear_responses(model, data, k - model.coupling_body.shape[0], data.columns, c)
+        gear_responses(model, data, k - model.coupling_body.shape[0], data.columns, c, p)
+        return x + load(data.couple_x, p, 0)
     for side in range(2):
         i = model.coupling_body[k, side]
         if i >= 0:

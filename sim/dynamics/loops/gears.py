@@ -11,7 +11,7 @@ from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
-from solvers.lanes import Lanes, load
+from solvers.lanes import load, store
 from solvers.types import Matrix, Vector
 
 
@@ -59,11 +59,11 @@ def gear_response(model: Model, data: Data, k: int, y: Vector) -> float:
     return data.gear_rate[k, 0] * y[model.gear_dof[k, 0]] + data.gear_rate[k, 1] * y[model.gear_dof[k, 1]]
 
 
-@kernel
-def gear_responses(model: Model, data: Data, k: int, X: Matrix, c: int) -> Lanes:
-    """d(gap of gear k)/d(v25) X, of the columns from c on."""
+@optional(Slot.GEAR_RESPONSES)
+def gear_responses(model: Model, data: Data, k: int, X: Matrix, c: int, p: int) -> None:
+    """couple_x[p] = d(gap of gear k)/d(v25) X, of LANES columns of X from c on."""
     a, b = data.gear_rate[k, 0], data.gear_rate[k, 1]
-    return a * load(X, model.gear_dof[k, 0], c) + b * load(X, model.gear_dof[k, 1], c)
+    store(data.couple_x, p, 0, a * load(X, model.gear_dof[k, 0], c) + b * load(X, model.gear_dof[k, 1], c))
 
 
 @optional(Slot.GEAR_DERIVATIVES)
