@@ -179,7 +179,7 @@ def fixed(motion: Motion, exact: Vector, steps: tuple[float, ...]) -> Points:
         for h in steps:
             try:
                 sim = dojo.Simulator(motion.mechanism, time_step=h, order=order)
-            except ValueError:  # a damper too stiff for an explicit step of this length
+            except ValueError:  # closed loops have order 2
                 continue
             x, count = sim.start(motion.q, motion.v), round(motion.seconds / h)
             sim.rollout(x, steps=count)  # compiles

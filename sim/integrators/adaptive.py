@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from sim.contact.pairs.clearance import pairs_reached
 from sim.dynamics.external_forces import set_external
 from sim.integrators.halved_step import FAILED, LANDS, shorten_impact, try_short
 from sim.integrators.hamilton import coordinate_rates
@@ -87,7 +88,7 @@ def stand(models: Table, works: Table, line: Stretch, goal: Vector) -> float:
     for k in range(model.limit_dof.shape[0]):
         if data.bound_w[k] > 0.0:
             time = min(time, data.bound_gap[k] / data.bound_w[k])
-    return time
+    return min(time, pairs_reached(model, data))
 
 
 @kernel

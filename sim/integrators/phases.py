@@ -1,6 +1,6 @@
-"""Steps of higher order of a motion with contacts and limits, while all of them are inactive.
+"""Steps of higher order of a motion with contacts, collisions and limits, while all of them are inactive.
 
-A step may omit the impulses kappa/gap of all contacts and limits if their sum is within its tolerance:
+A step may omit the impulses kappa/gap of all contacts, collisions and limits if their sum is within its tolerance:
 
     sum of kappa/g <= tolerance (1 + largest momentum),    g = (g0 + g1 - d)/2
 
@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 from sim.contact.contact_report import report_contacts
 from sim.contact.inactive import cluster_gap, highest
+from sim.contact.pairs.clearance import least_gap, measure_pairs, omitted_pairs
 from sim.dynamics.external_forces import set_external
 from sim.integrators.runge_kutta import advance, begin
 from sim.mechanism.confined import IDLE
@@ -65,12 +66,6 @@ def _limit(model: Model, data: Data, k: int, v: Vector) -> tuple[float, float]:
 
 
 @kernel
-def _least(gap: float, speed: float, before: float, speed_before: float, travel: float) -> float:
-    """g of a step of `travel` times the larger speed; with travel < 0, of a node alone."""
-    return gap if travel < 0.0 else 0.5 * (before + gap - travel * max(speed, speed_before))
-
-
-@kernel
 def left_out(model: Model, data: Data, kappa: float, v: Vector, h: float) -> float:
     """Sum of the impulses kappa/g over a step of length h to the node in `data`; of the node itself with h < 0.
 
@@ -81,15 +76,15 @@ def left_out(model: Model, data: Data, kappa: float, v: Vector, h: float) -> flo
         if model.cluster_end[c] > 0 and model.contact_hold[c] != IDLE:
             row, speed = data.inactive[c], _speed(model, data, c)
             gap = cluster_gap(model, data, c, highest(model, c), False)
-            g = _least(gap, speed, row[Apart.GAP], row[Apart.SPEED], h)
+            g = least_gap(gap, speed, row[Apart.GAP], row[Apart.SPEED], h)
             row[Apart.GAP], row[Apart.SPEED] = gap, speed
             total = total + (model.cluster_end[c] - c) * kappa / g if g > 0.0 else 1e300
     for k in range(model.limit_dof.shape[0]):
         gap, speed = _limit(model, data, k, v)
-        g = _least(gap, speed, data.bound_gap[k], data.bound_w[k], h)
+        g = least_gap(gap, speed, data.bound_gap[k], data.bound_w[k], h)
         data.bound_gap[k], data.bound_w[k] = gap, speed
         total = total + kappa / g if g > 0.0 else 1e300
-    return total
+    return total + omitted_pairs(model, data, kappa, h)
 
 
 @kernel
@@ -141,9 +136,11 @@ def report_apart(model: Model, data: Data, h: float, out: Matrix) -> None:
             data.inactive_first[data.inactive_count[0]] = c
             data.inactive_count[0] += 1
         data.contact_out[c] = 1
+    for c in range(data.cone.shape[0]):
         data.bounce[c, Bounce.FLOOR] = 0.0
         for k in range(data.cone.shape[1]):
             data.cone[c, k] = 0.0
+    measure_pairs(model, data, h)
     report_contacts(model, data, h, out)
     copy(data.pos3, data.pos2)
     copy(data.quat3, data.quat2)

@@ -128,7 +128,7 @@ class Inactive(IntEnum):
 
 
 class Apart(IntEnum):
-    """inactive, in motions of higher order: the node in `data` (integrators/phases.py)."""
+    """inactive and pair_apart, in motions of higher order: the node in `data` (integrators/phases.py)."""
 
     GAP = 0
     SPEED = 1

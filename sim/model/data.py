@@ -135,6 +135,7 @@ class Data(NamedTuple):
     pair_clear: Vector  # (npair,) at its first pair: last measured distance of the shapes, plus Way.BEFORE then [m]
     pair_margin: Vector  # (1,) sum of Way of two bodies up to which no other collision comes within its reach [m]
     body_way: Matrix  # (nbody, 9) Way
+    pair_apart: Matrix  # (npair, 2) Apart of the node, at its first pair, in steps of higher order (pairs/clearance.py)
     pair_trial: Matrix  # (1, 43) last result of `collide`, of a feature pair that is not kept
     pair_frame: Matrix  # (npair, 12) rows n, t1, t2 and the contact point, world axes
     pair_turn: Matrix  # (npair, 18) rotation of the frame by the relative twist

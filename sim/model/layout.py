@@ -94,7 +94,7 @@ DATA_FLOATS = _shapes(
     pair_frame npair 12, pair_trial 1 43,
     pair_before npair 13, pair_activation npair, pair_travel 1, pair_evaluated 1, pair_change 1,
     inactive_pose nbody 7, inactive_wrench nbody 6, pair_share npair 2, pair_clear npair, pair_margin 1,
-    body_way nbody 9,
+    body_way nbody 9, pair_apart npair 2,
     pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
     couple_R nrow 12, couple_E nrow, couple_Y nv 8ncouple, couple_Z 6nbody 8, couple_T nrow 8ncouple,

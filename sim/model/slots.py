@@ -205,3 +205,7 @@ class Slot(IntEnum):
     ENERGIES_GAINED = 167
     # gears: the responses of a row to several velocities at once
     GEAR_RESPONSES = 168
+    # steps of higher order beside collisions
+    OMITTED_PAIRS = 169
+    PAIRS_REACHED = 170
+    MEASURE_PAIRS = 171

@@ -31,7 +31,7 @@ from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, refuse
 from sim.simulator.knot_engine import KnotEngine
-from sim.simulator.link import link_curvature, link_terms
+from sim.simulator.link import link_flight
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
 from solvers.compiler import Table
@@ -72,8 +72,7 @@ class AdaptiveEngine(KnotEngine):
             settings = settings._replace(tolerance=min(settings.tolerance, _CONVERGED * settings.accuracy))
         super().__init__(model, settings)
         self._second = Engine(model, settings._replace(order=2))
-        coupled = len(model.pair_kind) + len(model.loop_ntrans) + len(model.gear_dof)
-        self._is_tree = coupled == 0
+        self._is_tree = len(model.loop_ntrans) + len(model.gear_dof) == 0
         g = float(np.linalg.norm(model.gravity)) or 9.81
         self._lightest = _lightest(model)
         self._settling = (_SETTLED / self._lightest) ** 0.5 / g
@@ -105,7 +104,7 @@ class AdaptiveEngine(KnotEngine):
                 np.zeros(_ROWS, dtype=np.int64),
                 np.zeros(1, dtype=np.int64),
             )
-            models = np.stack([self.linked(link_curvature, link_terms), self._second.step_table()])
+            models = np.stack([self.linked(link_flight), self._second.step_table()])
             self._kept.line = models, errors, line
         found: tuple[Table, Embedded, Stretch] = self._kept.line
         return found

@@ -16,8 +16,11 @@ from sim.simulator.omitted_contacts import reach
 from sim.simulator.settings import Settings
 
 
-def describe(mech: Mechanism, model: Model, settings: Settings, rank: str) -> str:
-    """A page of text; rank: of the loop constraints, if there are any."""
+def describe(mech: Mechanism, model: Model, settings: Settings, rank: str, second_order: str = "") -> str:
+    """A page of text.
+
+    rank: of the loop constraints, if there are any; second_order: why all steps are of order 2, if they are.
+    """
     lines = [
         f"{mech.name}: {_count(mech.nbody, 'body', 'bodies')}, {_count(mech.nv, 'degree', 'degrees')} of freedom, "
         f"{_total_mass(mech):.4g} kg",
@@ -32,7 +35,7 @@ def describe(mech: Mechanism, model: Model, settings: Settings, rank: str) -> st
         *_contact_lines(mech),
         *_collision_lines(mech),
         "a step",
-        *(f"  {what:<18}{state}" for what, state in _parts(mech, settings.order)),
+        *(f"  {what:<18}{state}" for what, state in _parts(mech, settings.order, second_order)),
         *_far_lines(mech, model, settings),
     ]
     return "\n".join(lines)
@@ -138,7 +141,7 @@ def _far_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
     return [f"  {'inactive contacts':<18}omitted from the solver beyond a gap of {span}; their force kappa/gap stays"]
 
 
-def _parts(mech: Mechanism, order: int) -> list[tuple[str, str]]:
+def _parts(mech: Mechanism, order: int, second_order: str) -> list[tuple[str, str]]:
     """The parts of a step, and those that it omits."""
     nlimit = mechanism_sizes(mech).nlimit
     points: list[Contact | Touch] = [*mech.contacts, *mech.touches]
@@ -148,15 +151,13 @@ def _parts(mech: Mechanism, order: int) -> list[tuple[str, str]]:
     springs = sum(bool(np.any(np.asarray(j.spring))) for j in mech.joints)
     dampers = sum(bool(np.any(np.asarray(j.damper))) for j in mech.joints)
     solver = "interior point" if points or nlimit else "Newton's method; interior point omitted"
-    if order > 2:
+    if second_order:
+        solver = f"{solver}; all steps are of order 2: {second_order}"
+    elif order > 2:
         from sim.integrators.tableau import tableau
 
         far = f"{len(tableau(order)[1])} evaluations of the equations of motion"
-        solver = (
-            f"{solver}; none while contacts and limits are inactive: {far}"
-            if mech.contacts or nlimit
-            else f"none: {far}"
-        )
+        solver = f"{solver}; none while contacts and limits are inactive: {far}" if points or nlimit else f"none: {far}"
     counts = (
         ("contacts", len(points), f"{cones} cones, {pyramids} pyramids, {impacts} without friction"),
         ("joint limits", nlimit, _count(nlimit, "bound", "bounds")),

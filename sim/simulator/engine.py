@@ -169,6 +169,7 @@ def chained(A: Floats, rolled: Rolled) -> tuple[Floats, Floats]:
 class Engine:
     """The kernels of one packed mechanism, their scratch, and the arrays that cross the border."""
 
+    second_order = ""  # why all steps are of order 2, of an engine of a higher one
     in_one_kernel = True  # whether a step is one call of the kernel `step`, so that compiled loops can make it
 
     def __init__(self, model: Model, settings: Settings) -> None:

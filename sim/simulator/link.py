@@ -33,6 +33,7 @@ from sim.contact.contact_report import report_contacts, worst_contact
 from sim.contact.inactive import all_stiff, choose_active, has_activated, sunk_contact
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.contact.pairs.active_features import choose_pairs, overlapping
+from sim.contact.pairs.clearance import measure_pairs, omitted_pairs, pairs_reached
 from sim.contact.pairs.cylinder_pairs import choose_cylinders, collide_cylinders, cylinder_before, cylinder_distance
 from sim.contact.pairs.inactive_pairs import all_near, begin_pairs, enlist_pairs, far_pair_impulses, pairs_came_near
 from sim.contact.pairs.pair_contact import pair_kinematics
@@ -279,6 +280,14 @@ def link_step(model: Model) -> None:
     """Link the kernels of a time step of order 2."""
     link(model.optional, step)
     link_terms(model)
+
+
+def link_flight(model: Model) -> None:
+    """Link the kernels of steps of higher order beside contacts, collisions and limits."""
+    link_curvature(model)
+    link_terms(model)
+    if len(model.pair_kind):
+        link(model.optional, omitted_pairs, pairs_reached, measure_pairs)
 
 
 def link_terms(model: Model) -> None:

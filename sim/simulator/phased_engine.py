@@ -1,5 +1,7 @@
 """Calls of a simulator of higher order with contacts or limits: order 2 near them, the higher one otherwise.
 
+Collisions of bodies are contacts here. With a joint that is too stiff for an explicit method all steps are of order 2.
+
 Both have the same states, x = [q; v] with v = M(q)^-1 p of the node. For order 2, p is the momentum that the discrete
 Legendre transform gives the node; that is one to one with the mean velocity of the interval before it, so going over
 from one order to the other changes neither q nor p: momentum and energy are the same on both sides. Which order a step
@@ -24,7 +26,7 @@ from sim.model.pace import pieces
 from sim.simulator.dividing_engine import DividingEngine
 from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted
 from sim.simulator.knot_engine import KnotEngine
-from sim.simulator.link import link_curvature, link_terms
+from sim.simulator.link import link_flight
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
 from solvers.compiler import Table
@@ -46,10 +48,14 @@ class March(NamedTuple):
 
 
 class PhasedEngine(KnotEngine):
-    """The kernels of one packed mechanism with contacts or limits."""
+    """The kernels of one packed mechanism with contacts or limits, or with joints that are too stiff.
 
-    def __init__(self, model: Model, settings: Settings) -> None:
+    second_order: why all steps are of order 2; "" if they are so near contacts and limits alone.
+    """
+
+    def __init__(self, model: Model, settings: Settings, second_order: str = "") -> None:
         super().__init__(model, settings)
+        self.second_order = second_order
         self._second = (DividingEngine if settings.divide else Engine)(model, settings._replace(order=2))
         self._last = threading.local()
 
@@ -94,10 +100,12 @@ class PhasedEngine(KnotEngine):
 
     def _flight_table(self) -> Table:
         """Table of the Model for steps of higher order beside contacts."""
-        return self.linked(link_curvature, link_terms)
+        return self.linked(link_flight)
 
     def _fly(self, flight: phases.Flight, kappa: float | None) -> tuple[int, int]:
         """Steps of higher order while all is inactive: their number, and the reason for the end; see `roll_far`."""
+        if self.second_order:
+            return 0, phases.NEAR
         model, data, settings = self._flight_table(), self._scratch.table(), self.settings.array(kappa)
         taken, why = 0, int(Status.SOLVED)
         try:
@@ -133,7 +141,7 @@ class PhasedEngine(KnotEngine):
                 raise KeyboardInterrupt from None
             nodes = means[1 : solved + 1].copy()
             nodes[:, nq:] = self._second.node_velocities(nodes)
-            far = phases.first_far(self._flight_table(), self._scratch.table(), settings, nodes)
+            far = self._first_far(nodes, settings)
             taken = min(far + 1, solved)
             out.xs[t + 1 : t + 1 + taken] = nodes[:taken]
             out.means[t : t + taken], out.near[t : t + taken] = means[:taken], True
@@ -143,6 +151,12 @@ class PhasedEngine(KnotEngine):
             if solved < count:
                 return t - first, None
         return t - first, mean
+
+    def _first_far(self, nodes: Floats, settings: Vector) -> int:
+        """The first of some nodes (n, nx) from which the steps are of higher order; n if there is none."""
+        if self.second_order:
+            return len(nodes)
+        return int(phases.first_far(self._flight_table(), self._scratch.table(), settings, nodes))
 
     def roll(
         self,

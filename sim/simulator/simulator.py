@@ -67,7 +67,7 @@ class Simulator(RowStepping):
         max_iterations: limit of the iterations of the interior point.
         order: 2, or 4, 6, 8 for trees: explicit steps with 4, 7, 12 evaluations of the dynamics. All keep momentum.
             Order 2 bounds the energy for ever; the others have a much smaller error that grows, and steps of order 2
-            where theirs would omit impulses kappa / gap beyond the tolerance.
+            near contacts, collisions and limits, and with joints too stiff for an explicit step: see `describe()`.
         divide: whether a step that cannot be solved, or turns a body too far, becomes 2, 4, ... up to 1024 steps, as
             few as it needs: see `substeps` of results. Momentum is handed on exactly, unless no poses a step apart have
             it. Then bodies lose momentum against each other: see `shares`.

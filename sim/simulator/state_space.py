@@ -45,11 +45,11 @@ def _engine_of(model: Model, mechanism: Mechanism, settings: Settings) -> Engine
 
     check(mechanism, settings)
     engine = HighOrderEngine(model, settings)
-    if len(model.contact_body) + len(model.limit_dof):
+    stiff = engine.too_stiff(mechanism)
+    if len(model.contact_body) + len(model.limit_dof) or stiff:
         from sim.simulator.phased_engine import PhasedEngine
 
-        engine = PhasedEngine(model, settings)
-    engine.check_stiffness(mechanism)
+        engine = PhasedEngine(model, settings, stiff)
     return engine
 
 
@@ -80,7 +80,7 @@ class StateSpace:
             The parts of the scene, the work of a step, and its omitted terms.
         """
         rank = str(self.loop_rank()) if self._closes else ""
-        return describe(self.mechanism, self.model, self._engine.settings, rank)
+        return describe(self.mechanism, self.model, self._engine.settings, rank, self._engine.second_order)
 
     def parameters(self, wrt: Sequence[str] | None = None) -> Parameters:
         """Names and values of parameters; `dojo.Parameters` describes the names.
