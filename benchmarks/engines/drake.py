@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -141,6 +142,46 @@ class _Travel:
             forces.append(force)
         if forces:
             plant.get_applied_spatial_force_input_port().FixValue(context, forces)
+
+
+def controlled(
+    mechanism: Mechanism, start: Floats, seconds: float, accuracy: float, scheme: str
+) -> tuple[Floats | None, float]:
+    """The continuous plant by an integrator with error control, as "runge_kutta3" or "cenic".
+
+    Args:
+        mechanism: a tree.
+        start: (nq + nv,) [q; v], v at the node.
+        seconds: length of the motion [s].
+        accuracy: the target accuracy of Drake's integrator.
+        scheme: a name of Drake's `GetIntegrationSchemes`.
+
+    Returns:
+        q in the end, None where the motion failed, and the processor time [s].
+
+    Raises:
+        ValueError: for a mechanism that Drake cannot represent.
+    """
+    from pydrake.systems.analysis import ResetIntegratorFromFlags
+    from pydrake.systems.analysis import Simulator as DrakeSimulator
+
+    model = Simulator(mechanism).model
+    scene = drake_scene.load(model, 0.0)
+    simulator = DrakeSimulator(scene.diagram)
+    ResetIntegratorFromFlags(simulator, scheme, seconds)
+    simulator.get_mutable_integrator().set_target_accuracy(accuracy)
+    context = scene.plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    write(model, scene, context, start)
+    if scene.actuated:
+        scene.plant.get_actuation_input_port().FixValue(context, np.zeros(len(scene.actuated)))
+    try:
+        simulator.Initialize()
+        begin = time.process_time()
+        simulator.AdvanceTo(seconds)
+        cost = time.process_time() - begin
+    except (RuntimeError, ValueError, SystemError):
+        return None, np.inf
+    return read(model, scene, context)[: len(start) - len(model.dof_body)], cost
 
 
 def write(model: Model, scene: DrakePlant, context: Any, x: Floats) -> None:
