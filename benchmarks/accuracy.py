@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from command import deliver, number, parser, progress
 from numpy.typing import NDArray
-from reference_motions import Motion, motions
+from reference_motions import ReferenceMotion, motions
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Report, Table
@@ -46,7 +46,7 @@ def error(sim: dojo.Simulator, end: Vector | None, exact: Vector, seconds: float
     return float(np.abs(sim.difference(np.r_[end, zero], np.r_[exact, zero])[: sim.nv]).max() / seconds)
 
 
-def fixed(motion: Motion, exact: Vector, steps: tuple[float, ...]) -> Points:
+def fixed(motion: ReferenceMotion, exact: Vector, steps: tuple[float, ...]) -> Points:
     """Points of fixed orders and steps."""
     out = []
     for order in (2, 4, 6, 8):
@@ -65,7 +65,7 @@ def fixed(motion: Motion, exact: Vector, steps: tuple[float, ...]) -> Points:
     return out
 
 
-def runge_kutta(motion: Motion, exact: Vector, steps: tuple[float, ...]) -> Points:
+def runge_kutta(motion: ReferenceMotion, exact: Vector, steps: tuple[float, ...]) -> Points:
     """Points of MuJoCo's RK4, with its default contacts; empty if it is not installed."""
     try:
         import mujoco
@@ -88,7 +88,7 @@ def runge_kutta(motion: Motion, exact: Vector, steps: tuple[float, ...]) -> Poin
     return out
 
 
-def drake(motion: Motion, exact: Vector, scheme: str, quick: bool) -> Points:
+def drake(motion: ReferenceMotion, exact: Vector, scheme: str, quick: bool) -> Points:
     """Points of an integrator of Drake's with error control, with its default contacts; empty where it has none."""
     try:
         import pydrake.systems.analysis  # noqa: F401
@@ -106,7 +106,7 @@ def drake(motion: Motion, exact: Vector, scheme: str, quick: bool) -> Points:
     return out
 
 
-def reference(motion: Motion) -> tuple[Vector, float]:
+def reference(motion: ReferenceMotion) -> tuple[Vector, float]:
     """(coordinates in the end, their error over the seconds)."""
     if motion.exact is not None:
         return motion.exact, 0.0
@@ -124,7 +124,7 @@ def reference(motion: Motion) -> tuple[Vector, float]:
     return ends[1], error(sim, ends[0], ends[1], motion.seconds)
 
 
-def _asked(motion: Motion, unsure: float, quick: bool) -> tuple[float, ...]:
+def _asked(motion: ReferenceMotion, unsure: float, quick: bool) -> tuple[float, ...]:
     """The accuracies that exist and that the reference of a motion can judge."""
     held = motion.mechanism.contacts or motion.mechanism.loops
     least = max(3.0 * unsure, 0.99 * _LEAST if held else 0.0)
@@ -134,11 +134,11 @@ def _asked(motion: Motion, unsure: float, quick: bool) -> tuple[float, ...]:
 
 def _best(points: Points, got: float) -> tuple[float, str]:
     """The cheapest point of at least this accuracy; nan without one."""
-    found = [(cost, what) for e, cost, what in points if e <= max(got, 1e-13)]
+    found = [(cost, setting) for e, cost, setting in points if e <= max(got, 1e-13)]
     return min(found) if found else (np.nan, "")
 
 
-def study(motion: Motion, quick: bool) -> tuple[list[list[Any]], dict[str, Points]]:
+def study(motion: ReferenceMotion, quick: bool) -> tuple[list[list[Any]], dict[str, Points]]:
     """Lines of the table, and points of the figure."""
     exact, unsure = reference(motion)
     steps = _STEPS[1:4] if quick else _STEPS
@@ -154,9 +154,21 @@ def study(motion: Motion, quick: bool) -> tuple[list[list[Any]], dict[str, Point
         cost = time.process_time() - begin
         got = error(sim, found.x[-1][: sim.nq], exact, motion.seconds) if found.success else np.inf
         told = float(found.errors[0]) if found.success else np.inf
-        (best, what), (rival, step) = _best(others, got), _best(peer, got)
+        (best, setting), (rival, step) = _best(others, got), _best(peer, got)
         shares = [cost / _best(points, got)[0] for points in (rk3, cenic)]
-        line = [motion.name, asked, got, got / asked, told, 1e3 * cost, cost / best, what, cost / rival, step, *shares]
+        line = [
+            motion.name,
+            asked,
+            got,
+            got / asked,
+            told,
+            1e3 * cost,
+            cost / best,
+            setting,
+            cost / rival,
+            step,
+            *shares,
+        ]
         lines.append([*line, found.status.name])
         ours.append((got, cost, f"{asked:g}"))
     curves = {"accuracy=": ours, "fixed order and step": others, "MuJoCo RK4": peer}

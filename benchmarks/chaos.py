@@ -35,7 +35,7 @@ PARTS = ("signals", "caches", "killed", "forks")
 
 
 def signals(count: int, rng: np.random.Generator) -> list[Heard]:
-    """So many interrupts, spread over the calls."""
+    """Send `count` interrupts, spread over the calls."""
     found = []
     for k, name in enumerate(progress()([(name, name) for name in LONG], "chaos, signals")):
         victim = Victim(name)
@@ -69,7 +69,7 @@ DAMAGE: dict[str, Callable[[Path, np.random.Generator], object]] = {
     "bytes flipped": flip,
     "a folder in its place": lambda file, rng: replace_by_folder(file),
     "unreadable": lambda file, rng: file.chmod(0),
-    "another pickle": lambda file, rng: file.write_bytes(pickle.dumps({"not": "what was expected"})),
+    "another pickle": lambda file, rng: file.write_bytes(pickle.dumps({"not": "expected"})),
 }
 
 
@@ -181,7 +181,7 @@ def _add_signals(report: Report, found: list[Heard]) -> None:
     for call in LONG:
         mine = [h for h in found if h.call == call]
         times = [h.seconds for h in mine if np.isfinite(h.seconds)] or [np.nan]
-        bad = [sum(h.outcome == what for h in mine) for what in ("crashed", "different")]
+        bad = [sum(h.outcome == outcome for h in mine) for outcome in ("crashed", "different")]
         lines.append(
             [call, len(mine), *bad, float(np.median(times)), max(times), ", ".join(sorted({h.kept for h in mine}))]
         )

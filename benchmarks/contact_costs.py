@@ -1,4 +1,4 @@
-"""What steps in contact cost, beside MuJoCo: towers of boxes, and robots that fall on the ground.
+"""The cost of steps in contact, beside MuJoCo: towers of boxes, and robots that fall on the ground.
 
     pip install mujoco
     python benchmarks/contact_costs.py

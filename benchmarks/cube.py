@@ -189,7 +189,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments.add_argument("--window", type=int, default=40)
     arguments.add_argument("--further", nargs="*", default=["inertia:cube", "com:cube"])
     arguments.add_argument(
-        "--no-prior", action="store_true", help="without what a ruler, scales and tables tell: PRIOR"
+        "--no-prior", action="store_true", help="without the prior from a ruler, scales and tables: PRIOR"
     )
     arguments.add_argument("--all", action="store_true", help="also fit to all tosses, held-out ones included")
     return deliver("cube", run, arguments, argv)

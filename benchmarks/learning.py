@@ -58,7 +58,7 @@ SETTINGS: dict[str, dict[str, dict[str, Any]]] = {  # of shac, beside those of t
 PEERS = ("ppo", "sac")  # of learning_peers.py
 JUDGED = ("HalfCheetah", "Hopper", "Walker2d", "Ant")
 UNSEEN = (10, 3e-5)  # time steps per action, smoothing [N s m]
-BARS: dict[str, list[tuple[str, float]]] = {  # of shac: quantity of its seeds, and what it should be at least
+BARS: dict[str, list[tuple[str, float]]] = {  # of shac: quantity of its seeds, and its least acceptable value
     "HalfCheetah": [
         ("mean return after 60 s", 5500.0), ("least return", 4500.0), ("mean return in MuJoCo", 4500.0),
         ("mean return in MuJoCo, time step / 5", 6000.0),

@@ -25,7 +25,7 @@ FALLING = ("ant", "atlas", "halfcheetah", "hopper", "humanoid", "quadruped", "ra
 FLYING = (*FALLING, "panda", "youbot")
 
 
-class Motion(NamedTuple):
+class ReferenceMotion(NamedTuple):
     """A motion from a node, and its expected end."""
 
     name: str
@@ -43,29 +43,29 @@ def _at(q: Vector, k: int, value: float) -> Vector:
     return out
 
 
-def pendulum(links: int) -> Motion:
+def pendulum(links: int) -> ReferenceMotion:
     """Released from rest."""
     q = np.full(links, 0.4)
-    return Motion(f"pendulum of {links}", dojo.models.npendulum(links), q, np.zeros(links), 2.0, None)
+    return ReferenceMotion(f"pendulum of {links}", dojo.models.npendulum(links), q, np.zeros(links), 2.0, None)
 
 
-def free_body() -> Motion:
+def free_body() -> ReferenceMotion:
     """Turning about all axes."""
     mech = dojo.models.tennisracket()
     q = np.array(mech.neutral, dtype=np.float64)
-    return Motion("free body", mech, q, np.random.default_rng(4).normal(size=6), 2.0, None)
+    return ReferenceMotion("free body", mech, q, np.random.default_rng(4).normal(size=6), 2.0, None)
 
 
-def tree() -> Motion:
+def tree() -> ReferenceMotion:
     """A quadruped without a ground."""
     mech = replace(dojo.models.quadruped(damper=0.0, limits=False), contacts=(), name="tree")
     rng = np.random.default_rng(1)
     q = np.array(mech.neutral, dtype=np.float64)
     q[7:] += 0.3 * rng.normal(size=12)
-    return Motion("tree of 13 bodies", mech, q, rng.normal(size=18), 0.5, None)
+    return ReferenceMotion("tree of 13 bodies", mech, q, rng.normal(size=18), 0.5, None)
 
 
-def bouncing(seconds: float = 2.0, share: float = 0.8) -> Motion:
+def bouncing(seconds: float = 2.0, share: float = 0.8) -> ReferenceMotion:
     """A ball without friction, dropped from 1 m."""
     mech = ball(friction=0.0)
     mech = replace(mech, contacts=tuple(replace(c, restitution=share) for c in mech.contacts))
@@ -75,17 +75,17 @@ def bouncing(seconds: float = 2.0, share: float = 0.8) -> Motion:
     rest = seconds - when
     q = np.array([0.0, 0.0, 1.1, 1.0, 0.0, 0.0, 0.0])
     end = _at(q, 2, 0.1 + speed * rest - 0.5 * _G * rest**2)
-    return Motion("bouncing ball", mech, q, np.zeros(6), seconds, end)
+    return ReferenceMotion("bouncing ball", mech, q, np.zeros(6), seconds, end)
 
 
-def sliding() -> Motion:
+def sliding() -> ReferenceMotion:
     """A block that comes to rest after 0.68 s."""
     q = np.array([0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0])
     end = _at(q, 0, 2.0**2 / (2.0 * 0.3 * _G))
-    return Motion("sliding block", block(friction=0.3), q, np.eye(6)[0] * 2.0, 1.0, end)
+    return ReferenceMotion("sliding block", block(friction=0.3), q, np.eye(6)[0] * 2.0, 1.0, end)
 
 
-def rolling(height: float, speed: float, seconds: float) -> Motion:
+def rolling(height: float, speed: float, seconds: float) -> ReferenceMotion:
     """A ball of radius .1 m falls from a height with a speed along x, loses mu w of this speed at the impact w, slides,
     and rolls as soon as the point in contact is at rest.
     """
@@ -99,24 +99,26 @@ def rolling(height: float, speed: float, seconds: float) -> Motion:
     q = np.array([0.0, 0.0, 0.1 + height, 1.0, 0.0, 0.0, 0.0])
     end = np.array([x, 0.0, 0.1, np.cos(0.5 * turn), 0.0, np.sin(0.5 * turn), 0.0])
     name = "thrown ball" if height else "rolling ball"
-    return Motion(name, ball(friction=mu), q, np.eye(6)[0] * speed, seconds, end)
+    return ReferenceMotion(name, ball(friction=mu), q, np.eye(6)[0] * speed, seconds, end)
 
 
-def tumbling() -> Motion:
+def tumbling() -> ReferenceMotion:
     """A block that falls onto a corner."""
     turn = np.array([1.0, 0.2, 0.1, 0.05])
     q = np.r_[0.0, 0.0, 0.6, turn / np.linalg.norm(turn)]
-    return Motion("tumbling block", block(friction=0.5), q, np.array([0.5, 0.0, 0.0, 1.0, 2.0, 0.0]), 0.6, None)
+    return ReferenceMotion(
+        "tumbling block", block(friction=0.5), q, np.array([0.5, 0.0, 0.0, 1.0, 2.0, 0.0]), 0.6, None
+    )
 
 
-def fall(robot: str) -> Motion:
+def fall(robot: str) -> ReferenceMotion:
     """A robot of the library, 5 cm above the ground, with random velocities."""
     mech = getattr(dojo.models, robot)()
     sim = dojo.Simulator(mech)
     q, rng = np.array(sim.neutral()[: sim.nq]), np.random.default_rng(1)
     up = 1 if mech.joints[0].kind == "planar_axis" else 2  # planar: x, z, pitch
     q[up] += 0.05 + _clearance(sim, q, up)
-    return Motion(f"{robot} falling", mech, q, 0.5 * rng.normal(size=sim.nv), 0.3, None)
+    return ReferenceMotion(f"{robot} falling", mech, q, 0.5 * rng.normal(size=sim.nv), 0.3, None)
 
 
 def _clearance(sim: dojo.Simulator, q: Vector, up: int) -> float:
@@ -126,19 +128,19 @@ def _clearance(sim: dojo.Simulator, q: Vector, up: int) -> float:
     return 5.0 - float(sim.step(high, throw=True).contacts.gap.min())
 
 
-def fourbar() -> Motion:
+def fourbar() -> ReferenceMotion:
     """Let go: a closed loop."""
     mech = plain_fourbar()
-    return Motion("four-bar", mech, np.array(mech.neutral, dtype=np.float64), np.zeros(3), 0.5, None)
+    return ReferenceMotion("four-bar", mech, np.array(mech.neutral, dtype=np.float64), np.zeros(3), 0.5, None)
 
 
-def stack() -> Motion:
+def stack() -> ReferenceMotion:
     """Two boxes that stand on each other and fall by 0.1 mm each."""
     mech = tower(dojo.Box(0.2, 0.2, 0.2), [1.0, 1.0])
-    return Motion("stack", mech, np.array(mech.neutral, dtype=np.float64), np.zeros(12), 0.2, None)
+    return ReferenceMotion("stack", mech, np.array(mech.neutral, dtype=np.float64), np.zeros(12), 0.2, None)
 
 
-def chain() -> Motion:
+def chain() -> ReferenceMotion:
     """Five links with a ball at each joint, 2 cm above the ground."""
     links = dojo.models.npendulum(5)
     points = [dojo.Contact(body.name, radius=0.05, friction=0.5) for body in links.bodies]
@@ -148,10 +150,10 @@ def chain() -> Motion:
     q = np.array(sim.neutral()[: sim.nq])
     q[3:7], q[7:] = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0), 0.2
     q[2] += 0.02 + _clearance(sim, q, 2)
-    return Motion("chain on the ground", mech, q, np.zeros(sim.nv), 0.3, None)
+    return ReferenceMotion("chain on the ground", mech, q, np.zeros(sim.nv), 0.3, None)
 
 
-def flight(robot: str) -> Motion:
+def flight(robot: str) -> ReferenceMotion:
     """A robot of the library without ground and limits, thrown with random velocities."""
     mech = getattr(dojo.models, robot)()
     joints = [replace(j, limits=None, cone=None) for j in mech.joints]
@@ -159,12 +161,12 @@ def flight(robot: str) -> Motion:
     sim = dojo.Simulator(mech)
     rng = np.random.default_rng(3)
     start = sim.integrate(sim.neutral(), np.r_[0.1 * rng.normal(size=sim.nv), np.zeros(sim.nv)])
-    return Motion(f"{robot} in flight", mech, start[: sim.nq], 0.5 * rng.normal(size=sim.nv), 0.5, None)
+    return ReferenceMotion(f"{robot} in flight", mech, start[: sim.nq], 0.5 * rng.normal(size=sim.nv), 0.5, None)
 
 
-def motions(quick: bool) -> list[Callable[[], Motion]]:
+def motions(quick: bool) -> list[Callable[[], ReferenceMotion]]:
     """All motions, or a few."""
-    found: list[Callable[[], Motion]] = [partial(pendulum, 1), bouncing, sliding]
+    found: list[Callable[[], ReferenceMotion]] = [partial(pendulum, 1), bouncing, sliding]
     if quick:
         return found
     return [

@@ -36,7 +36,7 @@ REACHED = 0.005  # [m] of a hand
 LEAST = 0.9  # share of the tasks that have to be done
 
 
-class Robot(NamedTuple):
+class TestedRobot(NamedTuple):
     """A file of the package, and the numbers that it omits."""
 
     path: str
@@ -50,22 +50,22 @@ def _four(names: str, radius: float) -> dict[str, float]:
 
 
 ROBOTS = {
-    "Go1": Robot("go1_description/urdf/go1.urdf"),
-    "Go2": Robot("go2_description/urdf/go2.urdf", _four("FL_foot FR_foot RL_foot RR_foot", 0.022)),
-    "A1": Robot("a1_description/urdf/a1.urdf"),
-    "B1": Robot("b1_description/urdf/b1.urdf"),
-    "Laikago": Robot("laikago_description/urdf/laikago.urdf", _four("FL_foot FR_foot RL_foot RR_foot", 0.026)),
-    "Solo12": Robot("solo_description/robots/solo12.urdf", _four("FL_FOOT FR_FOOT HL_FOOT HR_FOOT", 0.016)),
-    "ANYmal B": Robot("anymal_b_simple_description/robots/anymal.urdf"),
-    "ANYmal C": Robot("anymal_c_simple_description/urdf/anymal.urdf"),
-    "HyQ": Robot("hyq_description/robots/hyq_no_sensors.urdf"),
-    "Bolt": Robot("bolt_description/robots/bolt.urdf", {"FL_FOOT": 0.0275, "FR_FOOT": 0.0275}),
-    "G1": Robot("g1_description/urdf/g1_29dof_rev_1_0.urdf"),
-    "Panda": Robot(
+    "Go1": TestedRobot("go1_description/urdf/go1.urdf"),
+    "Go2": TestedRobot("go2_description/urdf/go2.urdf", _four("FL_foot FR_foot RL_foot RR_foot", 0.022)),
+    "A1": TestedRobot("a1_description/urdf/a1.urdf"),
+    "B1": TestedRobot("b1_description/urdf/b1.urdf"),
+    "Laikago": TestedRobot("laikago_description/urdf/laikago.urdf", _four("FL_foot FR_foot RL_foot RR_foot", 0.026)),
+    "Solo12": TestedRobot("solo_description/robots/solo12.urdf", _four("FL_FOOT FR_FOOT HL_FOOT HR_FOOT", 0.016)),
+    "ANYmal B": TestedRobot("anymal_b_simple_description/robots/anymal.urdf"),
+    "ANYmal C": TestedRobot("anymal_c_simple_description/urdf/anymal.urdf"),
+    "HyQ": TestedRobot("hyq_description/robots/hyq_no_sensors.urdf"),
+    "Bolt": TestedRobot("bolt_description/robots/bolt.urdf", {"FL_FOOT": 0.0275, "FR_FOOT": 0.0275}),
+    "G1": TestedRobot("g1_description/urdf/g1_29dof_rev_1_0.urdf"),
+    "Panda": TestedRobot(
         "panda_description/urdf/panda.urdf", None, "panda_hand", (0, -0.8, 0, -2.3, 0, 1.6, 0.8, 0.02, 0.02)
     ),
-    "Z1": Robot("z1_description/urdf/z1.urdf", None, "gripperStator", (0, 1.5, -1.5, 0.5, 0, 0, -0.5)),
-    "UR5": Robot("ur_description/urdf/ur5_robot.urdf", None, "tool0", (0, -1.2, 1.2, -1.5, -1.5, 0)),
+    "Z1": TestedRobot("z1_description/urdf/z1.urdf", None, "gripperStator", (0, 1.5, -1.5, 0.5, 0, 0, -0.5)),
+    "UR5": TestedRobot("ur_description/urdf/ur5_robot.urdf", None, "tool0", (0, -1.2, 1.2, -1.5, -1.5, 0)),
 }
 WAY = np.array([-0.1, 0.15, 0.1])  # of a hand [m]
 FAR = np.array([0.2, 0.0])  # of a box [m]
@@ -74,7 +74,7 @@ TASKS = ("stand_up", "trot", "walk", "jump")
 BIPEDS = ("Bolt",)  # without feet that balance: only in closed loop
 
 
-def path_of(robot: Robot) -> Path:
+def path_of(robot: TestedRobot) -> Path:
     """The file of a robot."""
     for file in files("example-robot-data") or ():
         if str(file).endswith(f"robots/{robot.path}"):
@@ -82,7 +82,7 @@ def path_of(robot: Robot) -> Path:
     raise FileNotFoundError(f"example-robot-data has no {robot.path}")
 
 
-def loaded(robot: Robot) -> Any:
+def loaded(robot: TestedRobot) -> Any:
     """Its mechanism."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", dojo.UrdfWarning)
@@ -97,7 +97,7 @@ def replayed(plan: Any) -> Any:
     return fine.closed_loop(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=parts, limits=limits)
 
 
-def walked(robot: Robot, task: str) -> list[Cell]:
+def walked(robot: TestedRobot, task: str) -> list[Cell]:
     """A line of a robot with legs."""
     begin = time.perf_counter()
     plan = dojo.ilqr(getattr(dojo.problems, task)(loaded(robot), feet=robot.feet))
@@ -109,7 +109,7 @@ def walked(robot: Robot, task: str) -> list[Cell]:
     return [plan.status.name, plan.nit, seconds, float(np.abs(plan.u).max()), off, upright, done]
 
 
-def reached(robot: Robot) -> list[Cell]:
+def reached(robot: TestedRobot) -> list[Cell]:
     """A line of an arm."""
     mech = loaded(robot)
     begin = time.perf_counter()
@@ -123,7 +123,7 @@ def reached(robot: Robot) -> list[Cell]:
     return [plan.status.name, plan.nit, seconds, float(np.abs(plan.u).max()), off, None, done]
 
 
-def pushed(robot: Robot) -> list[Cell]:
+def pushed(robot: TestedRobot) -> list[Cell]:
     """A line of an arm that pushes a box."""
     mech, box = loaded(robot), dojo.Body("box", 0.5, shape=dojo.Box(0.1, 0.1, 0.1))
     begin = time.perf_counter()
@@ -136,7 +136,7 @@ def pushed(robot: Robot) -> list[Cell]:
     return [plan.status.name, plan.nit, seconds, float(np.abs(plan.u).max()), off, None, done]
 
 
-def steered(robot: Robot) -> list[Cell]:
+def steered(robot: TestedRobot) -> list[Cell]:
     """A line of a robot under a velocity command; its time is the median of a tick."""
     mech = loaded(robot)
     legs = Legs(mech, robot.feet)

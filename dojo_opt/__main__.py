@@ -170,7 +170,7 @@ def _run_suite(args: argparse.Namespace) -> int:
         print(json.dumps(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()}))
     else:
         print(f"{'success' if outcome.success else 'no success'}: {loop.message}")
-        print("  " + ", ".join(f"{what} {value:.3g}" for what, value in outcome.measures.items()))
+        print("  " + ", ".join(f"{measure} {value:.3g}" for measure, value in outcome.measures.items()))
         ticks = "ticks at {rate_hz:g} Hz: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms of the processor"
         print((ticks + ", {fallbacks} fallbacks; penetration {penetration_mm:.2g} mm").format(**numbers))
     return 0 if outcome.success else 1

@@ -17,12 +17,12 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, register_model
+from numba.extending import intrinsic, models, register_model
 from numpy.typing import NDArray
 
 from solvers.compiler import kernel
 from solvers.compiler.instructions import compiled_as
+from solvers.compiler.operators import kernel_operator
 from solvers.types import Matrix, Vector
 
 __all__ = [
@@ -171,27 +171,21 @@ def total(x: Lanes) -> float:
     return float(x.reshape(-1, 2).sum(axis=1).reshape(-1, 2).sum(axis=1).sum())
 
 
-def _operator(function: Any, instruction: str) -> None:
-    """Signatures of an operator on lanes, and on a number and lanes."""
-    cases_ = [signature(_LANES, _LANES, _LANES), signature(_LANES, types.float64, _LANES)]
+def _operator(op: Any, instruction: str) -> None:
+    """An operator on lanes, and on a number and lanes."""
 
-    class Cases(ConcreteTemplate):
-        key = function
-        cases = cases_
+    def both(builder: Any, x: Any, y: Any) -> Any:
+        return getattr(builder, instruction)(x, y)
 
-    infer_global(function)(Cases)
+    def number_first(builder: Any, x: Any, y: Any) -> Any:
+        return getattr(builder, instruction)(_spread(builder, x), y)
 
-    @lower_builtin(function, LanesType, LanesType)
-    def both(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return getattr(builder, instruction)(*args)
-
-    @lower_builtin(function, types.Float, LanesType)
-    def number_first(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return getattr(builder, instruction)(_spread(builder, args[0]), args[1])
+    kernel_operator(op, _LANES, _LANES, _LANES, both)
+    kernel_operator(op, types.float64, _LANES, _LANES, number_first)
 
 
-for _function, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
-    _operator(_function, _instruction)
+for _op, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
+    _operator(_op, _instruction)
 
 
 @kernel

@@ -143,12 +143,12 @@ def test_the_python_for_jax_runs(tmp_path: Path) -> None:
     python("import numpy as np, dojo_opt as dojo\n" + blocks[0], cwd=tmp_path)
 
 
-@pytest.mark.parametrize("package", PACKAGES)
+@pytest.mark.parametrize("package", [*PACKAGES, "benchmarks", "examples"])
 def test_prose_has_nouns_for_clauses(package: str) -> None:
-    """At most two "what" in 1000 lines, names of variables included: 10 was the dialect, 0 to 1.6 are our models."""
-    texts = [file.read_text() for file in (HOME / package).rglob("*.py")]
+    """At most 1.6 "what" in 1000 lines, names of variables included: 10 was the dialect, 0 to 1.6 are our models."""
+    texts = [file.read_text() for file in (ROOT / package).rglob("*.py")]
     lines = sum(len(text.splitlines()) for text in texts)
-    assert 1000 * sum(len(re.findall(r"\bwhat\b", text, re.IGNORECASE)) for text in texts) <= 2 * lines
+    assert 1000 * sum(len(re.findall(r"\bwhat\b", text, re.IGNORECASE)) for text in texts) <= 1.6 * lines
 
 
 KERNEL_MARKS = ("kernel", "inner_kernel", "parallel_kernel", "local_kernel", "inlined", "optional")

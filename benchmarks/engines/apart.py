@@ -27,7 +27,7 @@ class ProcessEnded(Exception):
     """The process of an engine ended during a call; the message has the signal."""
 
 
-class _Worker:
+class _EngineProcess:
     """The process, and the pipes to and from it."""
 
     def __init__(self) -> None:
@@ -73,7 +73,7 @@ def _exchange(process: subprocess.Popen[bytes], request: bytes) -> Any:
     return pickle.load(process.stdout)
 
 
-_worker = _Worker()
+_worker = _EngineProcess()
 _serving = False
 atexit.register(_worker.stop)
 

@@ -115,7 +115,7 @@ def _held(sim: Simulator, state: Array, left: Array, by: str) -> Array:
 
 
 def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int = 20) -> tuple[Array, Array]:
-    """A state of rest near x, and the input that holds it: of robots on feet, arms, hands, and what a joint holds.
+    """A state of rest near x, and the input that holds it: for robots on feet, arms, and hands that hold an object.
 
     The contacts press straight down, so nothing creeps on level ground, and share the load as evenly as balance allows.
     The joints balance gravity and springs. Inputs that act on bodies are zero. On the central path a contact with the

@@ -29,7 +29,7 @@ class ActionDelay:
         self._steps = np.full((longest + 1, rows), _BEFORE, dtype=np.int64)
 
     def begin(self) -> None:
-        """A new rollout: what was decided before it has no derivative in it."""
+        """Begin a new rollout: actions decided before it have no derivative in it."""
         self._steps[:] = _BEFORE
 
     def forget(self, rows: Any) -> None:
@@ -37,7 +37,7 @@ class ActionDelay:
         self.actions[:, rows], self._steps[:, rows] = 0.0, _BEFORE
 
     def apply(self, t: int, decided: Floats, delay: int, rows: Any = slice(None)) -> tuple[Floats, Integers]:
-        """What is applied in step t, in which some rows decide.
+        """The actions applied in step t, in which some rows decide.
 
         Args:
             t: number of the step in the rollout.

@@ -63,7 +63,7 @@ class Ground:
         self.forget()
 
     def _check_level(self) -> None:
-        """Refuse to learn the slope of what is no level plane under a floating base."""
+        """Refuse to learn a slope unless there is a level plane under a floating base."""
         mechanism, flat = self._sim.mechanism, self._flat
         level = not self._surfaces and np.all(self._level == (0.0, 0.0, 1.0)) and np.all(flat == flat[:1])
         if not level or mechanism.joints[0].kind != "floating" or flat.size == 0:
@@ -86,7 +86,7 @@ class Ground:
 
     @property
     def plane(self) -> GroundPlane:
-        """What was learnt: references that were made for the ground at the beginning are carried onto it."""
+        """The learnt change of the ground: references made for the initial ground are carried onto it."""
         if not self._slope:
             return GroundPlane(self.rise)
         n = self._normal[0]

@@ -98,8 +98,8 @@ class Objective:
             size = term.violation()
             if size.size and size.max() > found[0]:
                 row, entry = divmod(int(size.argmax()), size.shape[1])
-                what = term.entry_name(self._sim, entry)
-                found = float(size.max()), f"{term.name} of {what} at knot {term.knots[row]}"
+                entry_name = term.entry_name(self._sim, entry)
+                found = float(size.max()), f"{term.name} of {entry_name} at knot {term.knots[row]}"
         return found
 
     def mismatch(self, xs: Matrix, us: Matrix) -> float:

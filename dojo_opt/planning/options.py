@@ -142,8 +142,8 @@ class Options:
         """Refuse anything but numbers >= 0, and fractions for counts; infinity is allowed."""
         kinds = (int, np.integer) if whole else (int, float, np.integer, np.floating)
         if isinstance(value, bool) or not isinstance(value, kinds) or not value >= 0:
-            what = "a whole number" if whole else "a number"
-            raise ValueError(f"ilqr({name}=...): expected {what} >= 0, got {checks.shown(value)}")
+            expected = "a whole number" if whole else "a number"
+            raise ValueError(f"ilqr({name}=...): expected {expected} >= 0, got {checks.shown(value)}")
         if isinstance(value, int) and value > checks.LARGEST:
             raise ValueError(f"ilqr({name}=...): expected a number <= 2^53, got {checks.shown(value)}")
 

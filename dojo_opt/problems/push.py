@@ -58,7 +58,7 @@ def push(
     object's shapes, 0.5 where they have none, acts at the table and at the ball.
 
     Args:
-        arm: the mechanism, or its simulator, whose time step is then `time_step`; its own contacts are left out.
+        arm: the mechanism, or its simulator, whose time step is then `time_step`; its own contacts are omitted.
         object: a body with a shape that stands on the table: a Box, Sphere, Capsule or Polytope.
         goal: (2,) displacement of the object along x and y [m].
         frame: name of the link that has the ball (default None: the body at the end of the longest row of hinges).

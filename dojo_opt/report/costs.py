@@ -70,7 +70,7 @@ def costs(scenes: Sequence[CostScene], rounds: int) -> list[Cost]:
     for k, (scene, path) in enumerate(zip(scenes, paths, strict=True)):
         nothing = np.full(rounds, np.nan)
         step, known, knot = (
-            seconds.get(f"{what} {k}", nothing) / max(path.knot, 1) for what in ("step", "known", "knot")
+            seconds.get(f"{part} {k}", nothing) / max(path.knot, 1) for part in ("step", "known", "knot")
         )
         iterations = float(np.mean(path.iterations)) if path.knot else float("nan")
         message = "" if path.success else path.message
@@ -103,7 +103,7 @@ def median_us(seconds: Any) -> float:
 
 def raw_cost(cost: Cost) -> dict[str, Any]:
     """Every number of a cost, times in microseconds round by round."""
-    times = {f"{what}_us": (1e6 * getattr(cost, what)).tolist() for what in ("step", "knot", "gradient")}
+    times = {f"{part}_us": (1e6 * getattr(cost, part)).tolist() for part in ("step", "knot", "gradient")}
     return {
         **cost._asdict(),
         **times,

@@ -75,7 +75,7 @@ def _times(mechanism: Mechanism, rounds: int) -> list[StepTime]:
     nothing = np.full(rounds, np.nan)
     out = []
     for h, path in zip(TIME_STEPS, paths, strict=True):
-        step, both = (seconds.get(f"{what} {h}", nothing) / max(path.knot, 1) for what in ("step", "both"))
+        step, both = (seconds.get(f"{part} {h}", nothing) / max(path.knot, 1) for part in ("step", "both"))
         iterations = float(np.mean(path.iterations)) if path.knot else float("nan")
         out.append(StepTime(h, iterations, step, both - step, "" if path.success else path.message))
     return out

@@ -218,7 +218,7 @@ def node_of(kind: str, number: int, name: str, group: tuple[str, ...] = ("meshca
 
 
 def _clips(m: Motion, group: tuple[str, ...], end: float) -> dict[Any, Any]:
-    """One clip per body, a key at every knot; the browser interpolates. What ends before the others stays there."""
+    """One clip per body, a key at every knot; the browser interpolates. A motion that ends early stays at its end."""
     from meshcat.animation import AnimationClip
 
     clips = {}

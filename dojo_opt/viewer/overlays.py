@@ -1,4 +1,4 @@
-"""What a page draws over a motion: bars for contact forces, and the paths of the base and of the ends of limbs."""
+"""Overlays of a page on a motion: bars for contact forces, and the paths of the base and of the ends of limbs."""
 
 from __future__ import annotations
 

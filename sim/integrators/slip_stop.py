@@ -17,7 +17,8 @@ from solvers.types import Cube, Vector
 @kernel
 def _first_stop(model: Model, parts: Cube, c: int, h: float) -> float:
     """Error where contact c stops sliding at once [m]: s^2/(2 a) of the slip s that its friction f took away beyond
-    what holds it in the second half, in the ratio of the normal impulses n, at the deceleration a = mu n'/(m h/2).
+    the friction that holds it in the second half, in the ratio of the normal impulses n, at the deceleration
+    a = mu n'/(m h/2).
     """
     f, n = (0.0, 0.0), (0.0, 0.0)
     for half in range(2):

@@ -47,7 +47,7 @@ def floats(call: str, value: Any) -> Floats:
 
 
 def shape(call: str, value: Any) -> tuple[int, ...]:
-    """The shape of what is to become an array; ragged lists are refused."""
+    """The shape of an array-like; ragged lists are refused."""
     try:
         return np.shape(value)
     except ValueError:
@@ -55,7 +55,7 @@ def shape(call: str, value: Any) -> tuple[int, ...]:
 
 
 def ndim(call: str, value: Any) -> int:
-    """The number of axes of what is to become an array."""
+    """The number of axes of an array-like."""
     return len(shape(call, value))
 
 

@@ -110,7 +110,7 @@ class Mechanism:
     def __repr__(self) -> str:
         parts: dict[str, Any] = {"bodies": self.bodies, "inputs": self.inputs, "contacts": self.contacts}
         parts |= {"collisions": self.collisions, "loops": self.loops, "gears": self.gears}
-        sizes = "".join(f", {what} {len(found)}" for what, found in parts.items() if found)
+        sizes = "".join(f", {part} {len(found)}" for part, found in parts.items() if found)
         return f"{type(self).__name__}({self.name}, nq {self.nq}, nv {self.nv}{sizes})"
 
     @property
@@ -280,7 +280,7 @@ class Mechanism:
         """The pairs of `collisions="self"`: all of shapes of bodies that no joint connects.
 
         Returns:
-            (the collisions, the names of the pairs that overlap in the neutral state and are left out).
+            (the collisions, the names of the pairs that overlap in the neutral state and are omitted).
         """
         return self_collisions(self.bodies, self.joints, self.loops, np.array(self.neutral))
 

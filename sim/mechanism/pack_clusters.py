@@ -9,7 +9,7 @@ from sim.model.model import Model
 
 Floats = NDArray[np.float64]
 
-STIFFNESS = 1000.0  # largest e (inactive.py) of a contact that is left out, in units of the tolerance
+STIFFNESS = 1000.0  # largest e (inactive.py) of an omitted contact, in units of the tolerance
 
 
 def pack_clusters(model: Model) -> None:

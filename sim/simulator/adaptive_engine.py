@@ -68,7 +68,7 @@ class AdaptiveEngine(KnotEngine):
     """The kernels of one packed mechanism, with steps of the accuracy of its settings."""
 
     def __init__(self, model: Model, settings: Settings) -> None:
-        if len(model.loop_ntrans) + len(model.gear_dof):  # many sub-steps add up what each leaves of its residual
+        if len(model.loop_ntrans) + len(model.gear_dof):  # the residuals of many sub-steps add up
             settings = settings._replace(tolerance=min(settings.tolerance, _CONVERGED * settings.accuracy))
         super().__init__(model, settings)
         self._second = Engine(model, settings._replace(order=2))
@@ -344,8 +344,8 @@ class AdaptiveEngine(KnotEngine):
         carried: Floats = self._kept.contacts
         return np.asarray(np.linalg.norm(carried[:, :3], axis=1) <= self.settings.tolerance)
 
-    def _refuse(self, what: str) -> NoReturn:
-        raise ValueError(f"Simulator(accuracy=...): {what} those of steps of order 2; use replace(accuracy=None)")
+    def _refuse(self, feature: str) -> NoReturn:
+        raise ValueError(f"Simulator(accuracy=...): {feature} those of steps of order 2; use replace(accuracy=None)")
 
 
 def _lightest(model: Model) -> float:
@@ -370,8 +370,8 @@ def check_adaptive(mechanism: Mechanism, accuracy: float) -> None:
     names = [("dry friction of", j.name) for j in mechanism.joints if np.any(j.friction)]
     names += [("limited servo", part.name) for _, part in limited_servos(mechanism.inputs or ())]
     if names:
-        what, name = names[0]
+        feature, name = names[0]
         raise ValueError(
-            f"Simulator(accuracy=...): {mechanism.name!r} has the {what} {name!r}; steps of a given accuracy are for "
-            "mechanisms without dry friction and limits of servos: use a time step"
+            f"Simulator(accuracy=...): {mechanism.name!r} has the {feature} {name!r}; steps of a given accuracy are "
+            "for mechanisms without dry friction and limits of servos: use a time step"
         )

@@ -158,13 +158,13 @@ class Arguments:
         with np.errstate(over="ignore"):
             length = np.linalg.norm(zs[..., 6:10], axis=-1)
             turn = np.linalg.norm(zs[..., 10:], axis=-1) * self.time_step
-        for bad, what in (
+        for bad, why in (
             (np.abs(length - 1.0) > UNIT, "expected a unit quaternion"),
             (turn >= np.pi, MESSAGES[Status.ANGULAR_STEP]),
         ):
             if bad.any():
                 raise ValueError(
-                    f"Simulator.{method}(z): body {self.mechanism.body_names[np.argwhere(bad)[0, 1]]!r}: {what}"
+                    f"Simulator.{method}(z): body {self.mechanism.body_names[np.argwhere(bad)[0, 1]]!r}: {why}"
                 )
         zs[..., 6:10] /= length[..., None]
 

@@ -35,7 +35,7 @@ def describe(mech: Mechanism, model: Model, settings: Settings, rank: str, secon
         *_contact_lines(mech),
         *_collision_lines(mech),
         "a step",
-        *(f"  {what:<18}{state}" for what, state in _parts(mech, settings.order, second_order)),
+        *(f"  {part:<18}{state}" for part, state in _parts(mech, settings.order, second_order)),
         *_far_lines(mech, model, settings),
     ]
     return "\n".join(lines)
@@ -164,4 +164,4 @@ def _parts(mech: Mechanism, order: int, second_order: str) -> list[tuple[str, st
         ("springs", springs, _count(springs, "joint", "joints")),
         ("dampers", dampers, _count(dampers, "joint", "joints")),
     )
-    return [("solver", solver), *((what, text if n else "omitted") for what, n, text in counts)]
+    return [("solver", solver), *((part, text if n else "omitted") for part, n, text in counts)]

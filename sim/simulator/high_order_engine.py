@@ -126,8 +126,8 @@ class HighOrderEngine(Engine):
         """Refused."""
         self._refuse("Jacobians are")
 
-    def _refuse(self, what: str) -> NoReturn:
-        raise ValueError(f"Simulator of order {self.settings.order}: {what} those of order 2; use replace(order=2)")
+    def _refuse(self, feature: str) -> NoReturn:
+        raise ValueError(f"Simulator of order {self.settings.order}: {feature} those of order 2; use replace(order=2)")
 
     def too_stiff(self, mechanism: Mechanism) -> str:
         """Which spring or damper is too fast for an explicit method; "" if none is.
@@ -139,14 +139,14 @@ class HighOrderEngine(Engine):
             return ""
         q = np.asarray(mechanism.neutral, dtype=np.float64)
         M = self.mass_matrix(np.concatenate([q, np.zeros(self.sizes.nv)]))
-        for what, values, power in (("spring", stiff[0], 0.5), ("damper", stiff[1], 1.0)):
+        for feature, values, power in (("spring", stiff[0], 0.5), ("damper", stiff[1], 1.0)):
             rates, modes = np.linalg.eig(np.linalg.solve(M, np.diag(values)))
             worst = int(np.argmax(rates.real))
             rate = max(rates[worst].real, 0.0) ** power
             if rate * self.settings.time_step > stable(self.settings.order):
                 joint = mechanism.joint_names[self.model.dof_body[int(np.argmax(np.abs(modes[:, worst])))]]
                 return (
-                    f"joint {joint!r}: its {what} acts at {rate:.3g} 1/s, too fast for an explicit step of "
+                    f"joint {joint!r}: its {feature} acts at {rate:.3g} 1/s, too fast for an explicit step of "
                     f"{self.settings.time_step:g} s; use a time step below {stable(self.settings.order) / rate:.2g} s"
                 )
         return ""
@@ -158,10 +158,10 @@ def check(mechanism: Mechanism, settings: Settings) -> None:
     parts = [("loop joint", loops), ("gear", gears)]
     parts.append(("dry friction of", [j.name for j in mechanism.joints if np.any(j.friction)]))
     parts.append(("limited servo", [part.name for _, part in limited_servos(mechanism.inputs or ())]))
-    for what, names in parts:
+    for feature, names in parts:
         if names:
             more = f" and {len(names) - 1} more" if len(names) > 1 else ""
             raise ValueError(
-                f"Simulator(order={settings.order}): {mechanism.name!r} has the {what} {names[0]!r}{more}; steps of "
+                f"Simulator(order={settings.order}): {mechanism.name!r} has the {feature} {names[0]!r}{more}; steps of "
                 "higher order are for trees without dry friction and limits of servos: use order=2, or leave them out"
             )

@@ -30,7 +30,7 @@ class Kinematics:
 
         M(q) = sum J_i^T diag(m_i I, J_i) J_i,   tau = M dv + b(q, v) + g(q)
 
-    Loops, gears, springs, dampers and contacts are left out: these are equations of the tree of joints.
+    Loops, gears, springs, dampers and contacts are omitted: these are equations of the tree of joints.
 
     Args:
         sim: the simulator.

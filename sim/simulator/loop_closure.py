@@ -228,11 +228,11 @@ class Closure:
         alone = [name for name in names if not nearest(self._error(place, name), len(d), _ALONE).found]
         worst = max(alone or gaps, key=lambda name: gaps[name])
         welds = {j.name: j.name.removeprefix(f"{j.parent}.") for j in self._mechanism.loops if is_weld(j)}
-        what = worst if worst.startswith("gear ") else f"loop joint {welds.get(worst, worst)!r}"
+        constraint = worst if worst.startswith("gear ") else f"loop joint {welds.get(worst, worst)!r}"
         why = "two loops contradict each other"
         if alone or len(gaps) == 1:
             why = "links are too short, or its frames contradict the joints of the tree"
         return (
-            f"Mechanism({self._mechanism.name!r}): {what} cannot be closed near this state, it is off by "
+            f"Mechanism({self._mechanism.name!r}): {constraint} cannot be closed near this state, it is off by "
             f"{gaps[worst]:.2g} at best; give neutral=... a configuration near one that closes, or see whether {why}"
         )

@@ -29,18 +29,18 @@ _SETTINGS = (
 )  # of Simulator(...), in order
 
 
-def archived(sim: Any, what: str) -> tuple[dict[str, Any], Arrays]:
+def archived(sim: Any, kind: str) -> tuple[dict[str, Any], Arrays]:
     """Head of an archive, and the arrays of its simulator.
 
     Args:
         sim: the simulator (None: none).
-        what: kind of the archive.
+        kind: kind of the archive.
 
     Returns:
         (head as plain data, arrays by name).
     """
     arrays: Arrays = {}
-    head: dict[str, Any] = {"format": f"dojo-opt {what}", "version": VERSION}
+    head: dict[str, Any] = {"format": f"dojo-opt {kind}", "version": VERSION}
     if sim is not None:
         mechanism, *settings = sim.__reduce__()[1]  # as given: kappa None for the default
         head["simulator"] = {"part": "Simulator", "mechanism": packed_part(mechanism, arrays)}
@@ -48,13 +48,13 @@ def archived(sim: Any, what: str) -> tuple[dict[str, Any], Arrays]:
     return head, arrays
 
 
-def opened(call: str, path: str | PathLike[str], what: str) -> tuple[dict[str, Any], dict[str, Any]]:
+def opened(call: str, path: str | PathLike[str], kind: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Head and arrays of an archive.
 
     Args:
         call: the call that an error names.
-        path: path of the file, or what it was saved as: NumPy adds .npz to other endings.
-        what: kind of the archive.
+        path: path of the file, or the name it was saved under, to which NumPy adds .npz.
+        kind: kind of the archive.
 
     Returns:
         (head, arrays by name).
@@ -70,10 +70,10 @@ def opened(call: str, path: str | PathLike[str], what: str) -> tuple[dict[str, A
             arrays = {name: data[name] for name in data.files}
         head = json.loads(str(arrays.pop("meta")))
     except (KeyError, ValueError) as error:
-        raise ValueError(f"{call}: {path} is no {what} of dojo-opt") from error
-    form = head.pop("format", f"dojo-opt {what}")
-    if form != f"dojo-opt {what}":
-        raise ValueError(f"{call}: {path} is a {form!r}, expected a {what}")
+        raise ValueError(f"{call}: {path} is no {kind} of dojo-opt") from error
+    form = head.pop("format", f"dojo-opt {kind}")
+    if form != f"dojo-opt {kind}":
+        raise ValueError(f"{call}: {path} is a {form!r}, expected a {kind}")
     if head.pop("version", 0) > VERSION:
         raise ValueError(f"{call}: {path} was written by a later version of dojo-opt")
     return head, arrays

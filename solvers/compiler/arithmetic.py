@@ -15,7 +15,7 @@ from numba import types
 from numba.core.typing import Context
 from numba.core.typing.templates import Signature, signature
 
-__all__ = ["ARITHMETIC", "KernelTyping", "choice"]
+__all__ = ["ARITHMETIC", "OPERATORS", "KernelTyping", "choice"]
 
 _COMPARED = (operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne)
 
@@ -36,6 +36,7 @@ def _arithmetic() -> dict[Any, Callable[..., Any]]:
 
 
 ARITHMETIC = _arithmetic()
+OPERATORS: dict[tuple[Any, types.Type, types.Type], tuple[types.Type, Callable[..., Any]]] = {}  # of other types
 _CHOICES = {min: operator.lt, max: operator.gt}
 
 
@@ -88,6 +89,8 @@ class KernelTyping(Context):
             if left is right and (op, left) in ARITHMETIC:
                 func._impl_keys.setdefault((left, left), op)  # where lowering looks for calls of operator.add(x, y)
                 return signature(types.boolean if op in _COMPARED else left, left, left)
+            if (op, left, right) in OPERATORS:
+                return signature(OPERATORS[op, left, right][0], left, right)
         if len(args) > 1 and choice(func.typing_key, kinds := [*map(types.unliteral, args)]):
             return signature(kinds[0], *kinds)
         call = func, tuple(args)

@@ -267,7 +267,7 @@ def prepare() -> None:
 
 
 def renew(context: Any) -> None:
-    """Let Numba register what modules have added since: a refresh also imports all of its own modules again."""
+    """Let Numba register later additions of modules: a refresh also imports all of its own modules again."""
     context.install_registry(builtin_registry)
     context.typing_context._load_builtins()
 

@@ -90,7 +90,7 @@ class InnerLibrary(JITCodeLibrary):
         self._finalized = True
 
     def serialize_using_object_code(self) -> Any:
-        """What `inner_result` reads."""
+        """The state that `inner_result` reads."""
         self._ensure_finalized()
         return self.name, self._shared_module.as_bitcode()
 

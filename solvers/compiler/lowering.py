@@ -22,7 +22,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
-from solvers.compiler.arithmetic import ARITHMETIC, choice
+from solvers.compiler.arithmetic import ARITHMETIC, OPERATORS, choice
 from solvers.compiler.array_words import DATA, SHAPE, STRIDES, WORD, ArrayWords
 from solvers.compiler.records import RecordType, field_words
 
@@ -162,14 +162,16 @@ class _Lower(Lower):
         return self.call_conv._get_arg_packer((kind,)).as_arguments(self.builder, [self._cast_var(var, kind)])
 
     def lower_binop(self, resty: Any, expr: Any, op: Any) -> Any:
-        """An operator of two numbers."""
+        """An operator of two numbers, or of types that have one in kernels."""
         kinds = self.fndesc.calltypes[expr].args
         write = ARITHMETIC.get((op, kinds[0])) if kinds[0] == kinds[1] else None
+        if write is None and (op, *kinds) in OPERATORS:
+            write = OPERATORS[op, *kinds][1]
         if write is None:
             return super().lower_binop(resty, expr, op)
         x, y = (
-            self.context.cast(self.builder, self.loadvar(side.name), self.typeof(side.name), kinds[0])
-            for side in (expr.lhs, expr.rhs)
+            self.context.cast(self.builder, self.loadvar(side.name), self.typeof(side.name), kind)
+            for side, kind in zip((expr.lhs, expr.rhs), kinds, strict=True)
         )
         result = self.fndesc.calltypes[expr].return_type
         return self.context.cast(self.builder, write(self.builder, x, y), result, resty)

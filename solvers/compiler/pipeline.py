@@ -49,7 +49,7 @@ class UsersCompiler(PlainCompiler):
 
 def _compilers() -> tuple[bool, type[Compiler], type[Compiler], type[Compiler], Any]:
     """(whether they are fast, the compiler of entries, of entries that are seldom called, of kernels which kernels
-    call, and what makes a result of the last from one that was kept).
+    call, and the function that rebuilds a cached result of the last).
     """
     if os.environ.get("DOJO_OPT_PLAIN_NUMBA", "0") in ("", "0"):
         if any(numba.__version__.startswith(f"{known}.") for known in _KNOWN):

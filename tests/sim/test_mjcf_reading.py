@@ -55,7 +55,7 @@ def test_omitted_elements_are_reported() -> None:
     with pytest.warns(MjcfWarning):
         report = load_mjcf(text).report
     assert report is not None
-    for words in ("that hold one joint, or are not linear, are left out: w", "hinges and slides: j", "drag of a fluid",
+    for words in ("that hold one joint, or are not linear, are omitted: w", "hinges and slides: j", "drag of a fluid",
                   "bodies do not collide"):  # fmt: skip
         assert words in str(report), words
     with pytest.warns(MjcfWarning):
@@ -78,17 +78,17 @@ EQUALITIES = {
     '<connect name="e" body1="a" body2="b" anchor="1 0 0"/>': "equality constraints are rigid here: e",
     '<weld name="e" body1="a" body2="b"/>': "equality constraints are rigid here: e",
     '<joint name="e" joint1="j" joint2="k" polycoef="0 2 0 0 0"/>': "equality constraints are rigid here: e",
-    '<joint name="e" joint1="j"/>': "that hold one joint, or are not linear, are left out: e",
-    '<joint name="e" joint1="j" joint2="k" polycoef="0 1 2 0 0"/>': "or are not linear, are left out: e",
-    '<tendon name="e" tendon1="t"/>': "other than connect, weld and joint are left out: e (tendon)",
-    '<tendon name="e" tendon1="t" active="false"/>': "that the file switches off are left out: e",
+    '<joint name="e" joint1="j"/>': "that hold one joint, or are not linear, are omitted: e",
+    '<joint name="e" joint1="j" joint2="k" polycoef="0 1 2 0 0"/>': "or are not linear, are omitted: e",
+    '<tendon name="e" tendon1="t"/>': "other than connect, weld and joint are omitted: e (tendon)",
+    '<tendon name="e" tendon1="t" active="false"/>': "that the file switches off are omitted: e",
 }
 
 
 @pytest.mark.parametrize("given", EQUALITIES)
 def test_every_equality_is_read_or_named(given: str) -> None:
     words = EQUALITIES[given]
-    warns = "left out" in words and "switches" not in words
+    warns = "omitted" in words and "switches" not in words
     with pytest.warns(MjcfWarning, match="equality") if warns else nullcontext():
         mech = load_mjcf(HELD.format(given))
     assert mech.report is not None and words in str(mech.report)

@@ -69,9 +69,9 @@ def test_geoms_meet_where_mujoco_lets_them() -> None:
     assert (pairs["table-ball"].law, pairs["cube-ball"].law) == ("nonlinear", "nonlinear")  # condim: the larger
     assert not quietly(TABLE).collisions
     notes = "\n".join(str(note) for note in (quietly(TABLE).report or mech.report).notes)  # type: ignore[union-attr]
-    for words in ("explicit contact pairs are left out: pair_0", "no obstacles (collisions=True makes them): table"):
+    for words in ("explicit contact pairs are omitted: pair_0", "no obstacles (collisions=True makes them): table"):
         assert words in notes
-    assert not any(words in str(mech.report) for words in ("pairs are left out", "no obstacles", "do not collide"))
+    assert not any(words in str(mech.report) for words in ("pairs are omitted", "no obstacles", "do not collide"))
 
 
 def test_a_box_lies_on_a_table_and_carries_a_ball() -> None:
@@ -86,11 +86,11 @@ def test_a_box_lies_on_a_table_and_carries_a_ball() -> None:
 def test_tendons_that_pull_are_warned_of() -> None:
     text = """<mujoco><worldbody><site name="a" pos="0 0 1"/><body><freejoint/><geom size=".1"/><site name="b"/></body>
     </worldbody><tendon><spatial name="rope" {}><site site="a"/><site site="b"/></spatial></tendon></mujoco>"""
-    with pytest.warns(MjcfWarning, match="tendons are left out: rope"):
+    with pytest.warns(MjcfWarning, match="tendons are omitted: rope"):
         load_mjcf(text.format('range="0 2" limited="true"'))
     with warnings.catch_warnings():
         warnings.simplefilter("error", MjcfWarning)
-        assert "tendons are left out: rope" in str(load_mjcf(text.format("")).report)
+        assert "tendons are omitted: rope" in str(load_mjcf(text.format("")).report)
 
 
 STONES = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1" euler="10 -20 0" pos="0 0 .1"/>

@@ -63,7 +63,7 @@ def test_a_polytope_of_the_corners_of_a_box_is_the_box() -> None:
     corners = 0.5 * np.array(list(product((-0.4, 0.4), (-0.3, 0.3), (-0.2, 0.2))))
     turn = np.array([0.8, 0.4, -0.2, 0.4]) / np.sqrt(1.0)
     turn /= np.linalg.norm(turn)
-    inside = np.vstack([corners, 0.1 * corners])  # points that are no corners are left out
+    inside = np.vstack([corners, 0.1 * corners])  # points that are no corners are omitted
     polytope = Polytope(inside, orientation=turn)
     assert len(np.asarray(polytope.vertices)) == 8
     np.testing.assert_allclose(polytope.inertia(2.0), Box(0.4, 0.3, 0.2, orientation=turn).inertia(2.0), atol=1e-14)

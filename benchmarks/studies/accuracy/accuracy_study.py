@@ -99,14 +99,14 @@ def _compare(report: Report, scene: SmoothScene, measured: Curves) -> None:
     if _PEER in measured:
         attitude = "attitude" if scene.name == "free body" else "position"
         floors = curves.floors(scene)
-        for what, at_least in (("energy", 0.0), ("angular", 0.0), (attitude, 1e-3)):
-            if what == "angular" and not scene.floating:
+        for quantity, at_least in (("energy", 0.0), ("angular", 0.0), (attitude, 1e-3)):
+            if quantity == "angular" and not scene.floating:
                 continue
-            over = curves.ratios(measured, _PEER, what, floors[what])
+            over = curves.ratios(measured, _PEER, quantity, floors[quantity])
             value, note = curves.worst(over, at_least)
-            name = {"angular": "angular momentum"}.get(what, what)
+            name = {"angular": "angular momentum"}.get(quantity, quantity)
             report.rows.append(Row(f"{scene.name}: {name}, ours / RK4 at equal time", value, "", 1.0, note=note))
-            report.details.setdefault("ours / RK4", {})[f"{scene.name}, {what}"] = over
+            report.details.setdefault("ours / RK4", {})[f"{scene.name}, {quantity}"] = over
     if scene.floating:
         for name, points in measured.items():
             if name.startswith("dojo-opt"):

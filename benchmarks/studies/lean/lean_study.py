@@ -77,11 +77,11 @@ def _features(report: Report, rounds: int) -> None:
     )
     report.details["features"] = [raw_cost(cost) for cost in measured]
     base, far, near = measured[-3:]
-    for what in ("step", "gradient", "total"):
-        t0, t1, t2 = (np.asarray(getattr(cost, what)) for cost in (base, far, near))
+    for time_of in ("step", "gradient", "total"):
+        t0, t1, t2 = (np.asarray(getattr(cost, time_of)) for cost in (base, far, near))
         share = float(np.median((t1 - t0) / (t2 - t0)))
         note = f"{median_us(t1 - t0) / MANY * 1e3:.3g} of {median_us(t2 - t0) / MANY * 1e3:.3g} ns per contact"
-        name = {"total": "step and gradient"}.get(what, what)
+        name = {"total": "step and gradient"}.get(time_of, time_of)
         report.rows.append(Row(f"far contact / near contact: {name}", share, "", SHARE, note=note))
     report.rows.append(Row(f"{MANY} far contacts / none: step", ratio(far.step, base.step), "", note="the whole step"))
 
@@ -89,15 +89,15 @@ def _features(report: Report, rounds: int) -> None:
 def _absent(report: Report, rounds: int) -> None:
     """Features that a model mentions and does not have, against one that never had them; and a model against itself."""
     cases = absent()
-    scenes = [pendulum_scene(what, mechanism) for what, *both in cases for mechanism in both]
+    scenes = [pendulum_scene(feature, mechanism) for feature, *both in cases for mechanism in both]
     measured = costs([*scenes, scenes[0]], rounds)
-    for k, (what, *_) in enumerate(cases):
+    for k, (feature, *_) in enumerate(cases):
         never, absent_here = measured[2 * k : 2 * k + 2]
         value = ratio(absent_here.total, never.total)
         note = "bytes and unknowns equal" if absent_here[1:5] == never[1:5] else "bytes or unknowns DIFFER"
-        report.rows.append(Row(f"absent {what}: step and gradient / never had it", value, "", ABSENT, note=note))
+        report.rows.append(Row(f"absent {feature}: step and gradient / never had it", value, "", ABSENT, note=note))
         same = float(absent_here[1:5] != never[1:5])
-        report.rows.append(Row(f"absent {what}: sizes that differ", same, "", 0.0))
+        report.rows.append(Row(f"absent {feature}: sizes that differ", same, "", 0.0))
     noise = ratio(measured[-1].total, measured[0].total)
     report.rows.append(Row("the same model twice: step and gradient", noise, "", note="the noise of the rows above"))
     report.details["absent"] = [raw_cost(cost) for cost in measured]

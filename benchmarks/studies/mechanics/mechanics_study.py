@@ -70,9 +70,9 @@ class MechanicsStudy:
             for c, value in values.items():
                 group = groups.setdefault((c.partition(" ")[0], collisions.bar(name, c)), {})
                 group[f"{name}{c[c.index(' ') :]}"] = value
-        for (what, bar), values in sorted(groups.items()):
-            title = f"pairs: {what}" + (", rounded" if bar > collisions.BARS[what] else "")
-            report.rows.append(_worst(title, values, bar, "" if what == "derivative" else "m"))
+        for (measure, bar), values in sorted(groups.items()):
+            title = f"pairs: {measure}" + (", rounded" if bar > collisions.BARS[measure] else "")
+            report.rows.append(_worst(title, values, bar, "" if measure == "derivative" else "m"))
 
     def _parameters(self, report: Report, progress: Progress) -> None:
         """A line per kind of parameter, couplings of bodies apart; a row per situation with its worst value."""

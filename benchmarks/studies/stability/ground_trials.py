@@ -50,15 +50,15 @@ def on_a_foot(ratio: float, time_step: float) -> StabilityTrial:
     )
 
 
-def impact(what: str, time_step: float) -> StabilityTrial:
+def impact(shape: str, time_step: float) -> StabilityTrial:
     """A ball, a box on a corner, or a quadruped at 100 m/s.
 
     Its shanks leave the ground with 300 rad/s and more: in 10 ms that is half a turn, which no step represents.
     """
     velocity = np.r_[0.0, 0.0, -100.0, np.zeros(3)]
-    if what == "ball":
+    if shape == "ball":
         mechanism, q = sphere(radius=0.1, friction=0.5), np.array([0.0, 0.0, 0.1, *REST])
-    elif what == "box":
+    elif shape == "box":
         mechanism, q = block(friction=0.5), np.array([0.0, 0.0, 0.5, *TILTED])
         velocity += (30.0, 0.0, 0.0, 5.0, -5.0, 5.0)
     else:
@@ -67,7 +67,7 @@ def impact(what: str, time_step: float) -> StabilityTrial:
     q[2] += 100.0 * time_step * 3.33
     return StabilityTrial(
         "impacts",
-        f"{what} at 100 m/s, at {1e3 * time_step:g} ms",
+        f"{shape} at 100 m/s, at {1e3 * time_step:g} ms",
         "no penetration (1e-8 m)",
         mechanism,
         q,
@@ -195,7 +195,7 @@ def trials() -> list[StabilityTrial]:
     """All trials on the ground."""
     return [
         *(on_a_foot(ratio, h) for ratio in (1e2, 1e4, 1e6) for h in (1e-3, 1e-2)),
-        *(impact(what, h) for what in ("ball", "box") for h in (1e-3, 1e-2, 1e-1)),
+        *(impact(shape, h) for shape in ("ball", "box") for h in (1e-3, 1e-2, 1e-1)),
         impact("quadruped", 1e-3),
         impact("quadruped", 5e-3),
         drop(1e-5, 0.2),

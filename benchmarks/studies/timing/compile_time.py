@@ -60,8 +60,8 @@ class CompileTimeStudy:
             shipped = [_start(folder, shipped=True) for _ in range(several)] if len(shipped_code()) else []
         report.details = {"cold": cold, "warm": warm, "shipped": shipped, "cache_bytes": size}
 
-        def median(what: str, clock: int, runs: list[dict[str, Any]] = warm) -> float:
-            return float(np.median([run[what][clock] for run in runs]))
+        def median(quantity: str, clock: int, runs: list[dict[str, Any]] = warm) -> float:
+            return float(np.median([run[quantity][clock] for run in runs]))
 
         beyond = float(np.median([run["first"][0] - run["again"][0] for run in warm]))
         report.rows = [

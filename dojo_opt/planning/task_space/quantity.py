@@ -76,7 +76,7 @@ class Momenta(Quantity):
 
     def __init__(self, sim: Any, knots: Integers) -> None:
         groups = {"place": (0, 1, 2), "linear": (3, 4, 5), "angular": (6, 7, 8)}
-        super().__init__(sim, knots, [f"{what}{axis}" for what in ("", "p", "l") for axis in "xyz"], groups)
+        super().__init__(sim, knots, [f"{letter}{axis}" for letter in ("", "p", "l") for axis in "xyz"], groups)
 
     def fill(self, xs: Matrix, us: Matrix, *, derivatives: bool) -> None:
         self.space.momenta(xs, us, self.buffers, derivatives=derivatives)

@@ -81,21 +81,21 @@ def point(scene: SmoothScene, engine: PhysicsEngine, h: float, exact: Run) -> Cu
 def floors(scene: SmoothScene) -> dict[str, float]:
     """Errors that count as equal: FLOOR, or the effect of one rounding of the start, if that is larger."""
     moved = replace(scene, q=np.nextafter(scene.q, np.inf), v=np.nextafter(scene.v, np.inf))
-    return {what: max(FLOOR, error) for what, error in scene.errors(moved.exact(), scene.exact()).items()}
+    return {quantity: max(FLOOR, error) for quantity, error in scene.errors(moved.exact(), scene.exact()).items()}
 
 
-def at_time(points: Sequence[CurvePoint], what: str, seconds: float, floor: float = FLOOR) -> float:
+def at_time(points: Sequence[CurvePoint], quantity: str, seconds: float, floor: float = FLOOR) -> float:
     """Smallest error reached within a processor time, interpolated between time steps on logarithmic axes."""
-    good = [p for p in points if np.isfinite(p.errors[what]) and p.seconds > 0.0]
+    good = [p for p in points if np.isfinite(p.errors[quantity]) and p.seconds > 0.0]
     good.sort(key=lambda p: p.seconds)
     if not good or seconds < good[0].seconds:
         return np.inf
     times = np.log([p.seconds for p in good])
-    errors = np.minimum.accumulate(np.log([max(p.errors[what] / floor, 1.0) for p in good]))
+    errors = np.minimum.accumulate(np.log([max(p.errors[quantity] / floor, 1.0) for p in good]))
     return float(floor * np.exp(np.interp(np.log(seconds), times, errors)))
 
 
-def ratios(curves: Curves, peer: str, what: str, floor: float = FLOOR) -> dict[float, float]:
+def ratios(curves: Curves, peer: str, quantity: str, floor: float = FLOOR) -> dict[float, float]:
     """Our error over the peer's at equal processor time, by time step of the peer [s].
 
     Ours is the best of our orders, whose time steps may differ from the peer's; infinite where all of them take longer.
@@ -103,9 +103,10 @@ def ratios(curves: Curves, peer: str, what: str, floor: float = FLOOR) -> dict[f
     """
     mine = [points for name, points in curves.items() if name.startswith("dojo-opt")]
     return {
-        p.time_step: min(at_time(points, what, p.seconds, floor) for points in mine) / max(p.errors[what], floor)
+        p.time_step: min(at_time(points, quantity, p.seconds, floor) for points in mine)
+        / max(p.errors[quantity], floor)
         for p in curves[peer]
-        if np.isfinite(p.errors[what])
+        if np.isfinite(p.errors[quantity])
     }
 
 

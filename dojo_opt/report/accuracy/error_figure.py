@@ -11,7 +11,7 @@ from dojo_opt.plots.axes import plain_ticks
 from dojo_opt.report.accuracy.error_curves import Curves
 from dojo_opt.report.palette import is_ours, palette
 
-PANELS = (  # scene, what, title
+PANELS = (  # scene, quantity, title
     ("free body", "attitude", "free body: attitude [rad]"),
     ("tree of 13 bodies", "position", "tree of 13 bodies: position [m]"),
     ("tree of 13 bodies", "energy", "tree: energy, relative"),
@@ -32,10 +32,10 @@ def figure(measured: Mapping[str, Curves], panels: Sequence[tuple[str, str, str]
     out = Figure(figsize=(4.6 * columns, 3.6 * rows + 0.8), layout="constrained")
     axes = np.atleast_1d(out.subplots(rows, columns)).ravel()
     names = palette(name for curves in measured.values() for name in curves)
-    for axis, (scene, what, title) in zip(axes, panels, strict=False):
+    for axis, (scene, quantity, title) in zip(axes, panels, strict=False):
         for name, points in measured[scene].items():
-            good = [p for p in points if np.isfinite(p.errors[what]) and p.errors[what] < 10.0]
-            x, y = [1e3 * p.seconds for p in good], [max(p.errors[what], 1e-16) for p in good]
+            good = [p for p in points if np.isfinite(p.errors[quantity]) and p.errors[quantity] < 10.0]
+            x, y = [1e3 * p.seconds for p in good], [max(p.errors[quantity], 1e-16) for p in good]
             ours = is_ours(name)
             style: dict[str, Any] = {
                 "lw": 2.0 if ours else 1.2,

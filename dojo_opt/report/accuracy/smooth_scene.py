@@ -90,13 +90,13 @@ def not_in_reference(mechanism: Mechanism) -> str:
     """The first element of a mechanism, contacts aside, that `TreeReference` does not support; empty if none."""
     model = model_of(replace(mechanism, contacts=(), collisions=()))
     swings = [mechanism.joint_names[i] for i in np.flatnonzero(model.joint_nrot == 2)]
-    for what, names in (
+    for feature, names in (
         ("loop", [joint.name for joint in mechanism.loops]),
         ("gear", [gear.name for gear in mechanism.gears]),
         ("joint with two rotations", swings),
     ):
         if names:
-            return f"{what} ({', '.join(map(repr, names))})"
+            return f"{feature} ({', '.join(map(repr, names))})"
     return ""
 
 

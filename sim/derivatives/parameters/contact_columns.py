@@ -1,7 +1,7 @@
 """Parameters of contacts and of collisions: dR/d(parameter) of the residual of a step, columns[:, col] -= w dR.
 
-The impulse follows its law, W = d(impulse)/d(gap, slip) on the central path, and its arm r and frame what they are
-made of; f = n gamma + T^T beta acts on the body, so dR_d = -S2_d.(df, (d2 + r) x df + dr x f).
+The impulse follows its law, W = d(impulse)/d(gap, slip) on the central path; its arm r and frame follow poses and
+shapes. f = n gamma + T^T beta acts on the body, so dR_d = -S2_d.(df, (d2 + r) x df + dr x f).
 """
 
 from __future__ import annotations

@@ -108,16 +108,16 @@ class Draft:
 
     def _change_shape(self, name: str, kind: str, entries: Entries) -> None:
         """The shape of a collision sits elsewhere in its body, or has another size; other collisions keep theirs."""
-        what, letter = kind.split("_")
+        part, letter = kind.split("_")
         shape: Any = shape_of(self.mech, self.collisions[name], letter)
-        if what == "shape":
+        if part == "shape":
             changed: Any = replace(shape, center=_entries(shape.center, entries))
         elif isinstance(shape, Polytope):
             changed = replace(shape, vertices=entries["scale"] * np.asarray(shape.vertices))
         else:
             changed = replace(shape, **entries)
         fields = {f"shape_{letter}": changed}
-        if what == "size" and isinstance(shape, String):  # one length, written on both ends
+        if part == "size" and isinstance(shape, String):  # one length, written on both ends
             fields = {f: replace(getattr(self.collisions[name], f), **entries) for f in ("shape_a", "shape_b")}
         self.collisions[name] = replace(self.collisions[name], **fields)
 

@@ -34,7 +34,7 @@ def find_inputs(
         wrench = _at_site(model, a, name, where)
         on_joint = int(model.actuator_trntype[a]) in (_JOINT, _JOINT_IN_PARENT)
         if wrench is None and (not on_joint or model.jnt_type[j] in (FREE, BALL)):
-            notes.add("actuators that do not drive a hinge, a slide or a site are left out", [name], warn=True)
+            notes.add("actuators that do not drive a hinge, a slide or a site are omitted", [name], warn=True)
             continue
         servo = None if wrench else _servo(model, a)
         if servo is not None:
@@ -124,7 +124,7 @@ def with_friction(
         name, dof = homes[j]
         forces[name][dof] = model.dof_frictionloss[model.jnt_dofadr[j]]
     if missing:
-        text = "dry friction of joints is left out, which joint_friction=True adds to hinges and slides"
+        text = "dry friction of joints is omitted; joint_friction=True adds that of hinges and slides"
         notes.add(text, missing, warn=True)
     return [replace(joint, friction=forces[joint.name]) if forces[joint.name].any() else joint for joint in joints]
 
@@ -134,14 +134,14 @@ def left_out(model: Any, collisions: bool, notes: Notes) -> None:
     if model.ntendon:
         forces = (model.tendon_stiffness, model.tendon_damping, model.tendon_limited, model.tendon_frictionloss)
         felt = any(np.any(field) for field in forces)
-        notes.add("tendons are left out", [name_of(model, "tendon", k) for k in range(model.ntendon)], warn=felt)
+        notes.add("tendons are omitted", [name_of(model, "tendon", k) for k in range(model.ntendon)], warn=felt)
     if model.npair and not collisions:
-        notes.add("explicit contact pairs are left out", [name_of(model, "pair", k) for k in range(model.npair)])
-    for field, what in (("dof_dampingpoly", "nonlinear damping"), ("jnt_stiffnesspoly", "nonlinear stiffness")):
+        notes.add("explicit contact pairs are omitted", [name_of(model, "pair", k) for k in range(model.npair)])
+    for field, feature in (("dof_dampingpoly", "nonlinear damping"), ("jnt_stiffnesspoly", "nonlinear stiffness")):
         if np.any(getattr(model, field, 0.0)):
-            notes.add(f"{what} is left out", warn=True)
+            notes.add(f"{feature} is omitted", warn=True)
     if model.opt.density or model.opt.viscosity:
-        notes.add("the drag of a fluid is left out", warn=True)
+        notes.add("the drag of a fluid is omitted", warn=True)
     moving = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] != 0]
     types, affinities = model.geom_contype[moving], model.geom_conaffinity[moving]
     if collisions or not len(moving):

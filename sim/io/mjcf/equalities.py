@@ -4,7 +4,7 @@
     weld      the pose of body 2 in body 1 stays: a fixed joint
     joint     a coordinate is a linear function of another one
 
-Others (of tendons and flexes, curved functions, a coordinate that is held) are left out, with a warning that names
+Others (of tendons and flexes, curved functions, a coordinate that is held) are omitted, with a warning that names
 them. MuJoCo's are soft, those of the mechanism are not.
 """
 
@@ -36,12 +36,12 @@ def find_loops(model: Any, where: Where, notes: Notes) -> list[Joint]:
         if kind == JOINT:
             continue
         if not model.eq_active0[k]:
-            notes.add("equality constraints that the file switches off are left out", [name])
+            notes.add("equality constraints that the file switches off are omitted", [name])
             continue
         if kind not in (CONNECT, WELD):
-            what = _OTHERS.get(kind, f"type {kind}")
-            text = "equality constraints other than connect, weld and joint are left out"
-            notes.add(text, [f"{name} ({what})"], warn=True)
+            label = _OTHERS.get(kind, f"type {kind}")
+            text = "equality constraints other than connect, weld and joint are omitted"
+            notes.add(text, [f"{name} ({label})"], warn=True)
             continue
         first, second = _ends(model, k, kind, where)
         if first[0] is second[0]:
@@ -59,9 +59,9 @@ def find_gears(model: Any, homes: dict[int, tuple[str, int]], notes: Notes) -> l
         name, poly = name_of(model, "equality", int(k)), np.array(model.eq_data[k, :5], dtype=np.float64)
         first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
         if not model.eq_active0[k]:
-            notes.add("equality constraints that the file switches off are left out", [name])
+            notes.add("equality constraints that the file switches off are omitted", [name])
         elif second < 0 or poly[2:].any():
-            notes.add("equality constraints that hold one joint, or are not linear, are left out", [name], warn=True)
+            notes.add("equality constraints that hold one joint, or are not linear, are omitted", [name], warn=True)
         else:
             start, other = (float(model.qpos0[model.jnt_qposadr[j]]) for j in (first, second))
             (joint, dof), (leader, leading) = homes[first], homes[second]

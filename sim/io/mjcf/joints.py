@@ -149,9 +149,9 @@ def _ball_notes(model: Any, j: int, armature: Floats, notes: Notes) -> None:
     name = [name_of(model, "joint", j)]
     if model.jnt_limited[j]:
         notes.add(
-            "ranges of ball joints are left out (a cone= of the joint limits the swing of its axis)", name, warn=True
+            "ranges of ball joints are omitted (a cone= of the joint limits the swing of its axis)", name, warn=True
         )
     if model.jnt_stiffness[j] > 0.0:
-        notes.add("springs of ball joints are left out", name, warn=True)
+        notes.add("springs of ball joints are omitted", name, warn=True)
     if armature.any():
-        notes.add("armature of ball joints is left out", name, warn=True)
+        notes.add("armature of ball joints is omitted", name, warn=True)

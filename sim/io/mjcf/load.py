@@ -199,7 +199,7 @@ def _without_constant_gaps(mech: MjcfMechanism, notes: Notes) -> MjcfMechanism:
     if moving.all():
         return mech
     notes.add(
-        "contacts that no joint can open or close are left out",
+        "contacts that no joint can open or close are omitted",
         [c.name for c, moves in zip(mech.contacts, moving, strict=True) if not moves],
         warn=True,
     )

@@ -30,11 +30,11 @@ class Element:
     line: int
     children: list[Element] = field(default_factory=list)
 
-    def error(self, what: str) -> UrdfError:
+    def error(self, problem: str) -> UrdfError:
         """The error to raise about this element."""
         name = self.attributes.get("name")
         shown = f"<{self.tag} name={name!r}>" if name is not None else f"<{self.tag}>"
-        return UrdfError(f"load_urdf: {self.file}, line {self.line}, {shown}: {what}")
+        return UrdfError(f"load_urdf: {self.file}, line {self.line}, {shown}: {problem}")
 
     def all(self, tag: str) -> list[Element]:
         """Direct children of that tag."""
