@@ -1,7 +1,9 @@
-"""All active contacts of a step at once, those of pairs included: one kernel per operation of the interior point.
+"""All active contacts of a step at once: one kernel per operation of the interior point.
 
 Every kernel here is optional: a scene with joint limits alone compiles none of them, nor anything below them. An empty
-slot returns the sum over no contact. Inactive contacts (inactive.py) have no part in the variables and the
+slot returns the sum over no contact. Those up to `add_slip_jacobians` are of contacts with the ground alone; their
+counterparts for pairs of bodies are in pairs/, and sim/solve/inequalities.py calls both, so that a scene compiles what
+it has. The others are of both. Inactive contacts (inactive.py) have no part in the variables and the
 matrix of the interior point; they only add their impulses.
 """
 
@@ -32,11 +34,8 @@ from sim.contact.ground_contact import (
     contact_rate,
 )
 from sim.contact.inactive_impulses import add_inactive_wrenches, update_inactive
-from sim.contact.pairs.inactive_pairs import far_pair_impulses
-from sim.contact.pairs.pair_contact import pair_kinematics
 from sim.contact.pairs.pair_jacobian import pair_rate
-from sim.contact.pairs.pair_stiffness import apply_pairs, condense_pairs, pair_constants
-from sim.contact.restitution import subtract_floors
+from sim.contact.pairs.pair_stiffness import pair_constants
 from sim.contact.terrain_contact import add_frame_matrix
 from sim.dynamics.elimination import dot_six, subtree_sums
 from sim.dynamics.pose_jacobians import add_slip_jacobian
@@ -49,15 +48,63 @@ from solvers.compiler import optional
 from solvers.types import Matrix
 
 
+@optional(Slot.HAS_PYRAMIDS, default=False)
+def has_pyramids(model: Model, data: Data) -> bool:
+    """Whether an active contact with the ground has a friction pyramid."""
+    for m in range(data.active_ground_count[0]):
+        if law_of(model, data.active[m]) == Law.LINEAR:
+            return True
+    return False
+
+
 @optional(Slot.CONTACTS_KINEMATICS)
 def contacts_kinematics(model: Model, data: Data, h: float) -> None:
-    """Gaps and slips of active contacts, impulses of inactive ones, at configuration 3."""
+    """Gaps and slips of active contacts with the ground, impulses of inactive ones, at configuration 3."""
     for m in range(data.active_ground_count[0]):
         contact_kinematics(model, data, h, data.active[m])
     update_inactive(model, data, h)
-    pair_kinematics(model, data, h)
-    far_pair_impulses(model, data, h, data.carry.inactive_kappa[0])
-    subtract_floors(model, data)
+
+
+@optional(Slot.APPLY_CONTACTS, default=0.0)
+def apply_contacts(model: Model, data: Data) -> float:
+    """wrench -= impulses of all contacts with the ground; returns the largest equality residual."""
+    r = 0.0
+    for m in range(data.active_ground_count[0]):
+        c = data.active[m]
+        fn, f1, f2 = contact_impulse(model, data, c)
+        add_contact_wrench(model, data, c, fn, f1, f2, data.wrench)
+        r = max(r, contact_error(model, data, c))
+    add_inactive_wrenches(model, data)
+    return r
+
+
+@optional(Slot.CONDENSE_CONTACTS)
+def condense_contacts(model: Model, data: Data, h: float, kappa: float, share: float, form: int, out: Matrix) -> None:
+    """out += contacts with the ground, condensed at kappa.  (nbody, 36)
+
+    share: of the terms that can make the matrix indefinite, the growth of the friction with the normal impulse and the
+    turning of the arms of the impulses; 1 for the derivative.
+    form: LawForm.PLAIN, LawForm.LINEAR or LawForm.SOFT, see `condense_contact`.
+    """
+    for m in range(data.active_ground_count[0]):
+        c = data.active[m]
+        contact_jacobian(model, data, h, c)
+        condense_contact(model, data, h, c, kappa, share, form)
+        fn, f1, f2 = contact_impulse(model, data, c)
+        if form != LawForm.SOFT or data.bounce[c, Bounce.RESTITUTION] == 0.0:  # for impacts see restitution_gradient.py
+            add_contact_law(model, data, c, out)
+        add_contact_turn(model, data, c, share * fn, share * f1, share * f2, out)
+        if model.contact_terrain[c] > 0:
+            add_frame_matrix(model, data, c, share * fn, share * f1, share * f2, out)
+
+
+@optional(Slot.ADD_SLIP_JACOBIANS)
+def add_slip_jacobians(model: Model, data: Data, h: float) -> None:
+    """A2 -= contacts: slips depend on pose 2."""
+    for m in range(data.active_ground_count[0]):
+        c = data.active[m]
+        if data.bounce[c, Bounce.RESTITUTION] == 0.0:
+            add_slip_jacobian(model, data, h, c)
 
 
 @optional(Slot.CONTACTS_OVERLAP, default=(0.0, 0.0))
@@ -102,49 +149,6 @@ def normal_impulses(model: Model, data: Data) -> float:
     for m in range(data.active_count[0]):
         total += data.cone[data.active[m], Cone.IMPULSE]
     return total
-
-
-@optional(Slot.APPLY_CONTACTS, default=0.0)
-def apply_contacts(model: Model, data: Data) -> float:
-    """wrench -= impulses of all contacts; returns the largest equality residual."""
-    r = 0.0
-    for m in range(data.active_ground_count[0]):
-        c = data.active[m]
-        fn, f1, f2 = contact_impulse(model, data, c)
-        add_contact_wrench(model, data, c, fn, f1, f2, data.wrench)
-        r = max(r, contact_error(model, data, c))
-    add_inactive_wrenches(model, data)
-    return max(r, apply_pairs(model, data))
-
-
-@optional(Slot.CONDENSE_CONTACTS)
-def condense_contacts(model: Model, data: Data, h: float, kappa: float, share: float, form: int, out: Matrix) -> None:
-    """out += contacts, condensed at kappa.  (nbody, 36)
-
-    share: of the terms that can make the matrix indefinite, the growth of the friction with the normal impulse and the
-    turning of the arms of the impulses; 1 for the derivative.
-    form: LawForm.PLAIN, LawForm.LINEAR or LawForm.SOFT, see `condense_contact`.
-    """
-    for m in range(data.active_ground_count[0]):
-        c = data.active[m]
-        contact_jacobian(model, data, h, c)
-        condense_contact(model, data, h, c, kappa, share, form)
-        fn, f1, f2 = contact_impulse(model, data, c)
-        if form != LawForm.SOFT or data.bounce[c, Bounce.RESTITUTION] == 0.0:  # for impacts see restitution_gradient.py
-            add_contact_law(model, data, c, out)
-        add_contact_turn(model, data, c, share * fn, share * f1, share * f2, out)
-        if model.contact_terrain[c] > 0:
-            add_frame_matrix(model, data, c, share * fn, share * f1, share * f2, out)
-    condense_pairs(model, data, h, kappa, share, form)
-
-
-@optional(Slot.ADD_SLIP_JACOBIANS)
-def add_slip_jacobians(model: Model, data: Data, h: float) -> None:
-    """A2 -= contacts: slips depend on pose 2."""
-    for m in range(data.active_ground_count[0]):
-        c = data.active[m]
-        if data.bounce[c, Bounce.RESTITUTION] == 0.0:
-            add_slip_jacobian(model, data, h, c)
 
 
 @optional(Slot.CONTACT_CONSTANTS)
@@ -235,12 +239,3 @@ def slip_error(model: Model, data: Data, kappa: float) -> float:
     for m in range(data.active_count[0]):
         e = max(e, slip_violation(model, data, data.active[m], kappa))
     return e
-
-
-@optional(Slot.HAS_PYRAMIDS, default=False)
-def has_pyramids(model: Model, data: Data) -> bool:
-    """Whether an active contact with the ground has a friction pyramid."""
-    for m in range(data.active_ground_count[0]):
-        if law_of(model, data.active[m]) == Law.LINEAR:
-            return True
-    return False

@@ -10,7 +10,7 @@ from sim.model.columns import Bound
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.compiler import optional
+from solvers.compiler import kernel, optional
 from solvers.types import Matrix
 
 
@@ -35,12 +35,19 @@ def worst_contact(model: Model, data: Data, kappa: float) -> float:
     return worst
 
 
-@optional(Slot.REPORT_CONTACTS)
+@kernel
 def report_contacts(model: Model, data: Data, h: float, out: Matrix) -> None:
     """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3), after a step.
 
     (ncontact, 11)
     """
+    report_ground(model, data, h, out)
+    report_pairs(model, data, out)
+
+
+@optional(Slot.REPORT_CONTACTS)
+def report_ground(model: Model, data: Data, h: float, out: Matrix) -> None:
+    """The rows of contacts with the ground."""
     for m in range(data.inactive_count[0]):
         first = data.inactive_first[m]
         for c in range(first, model.cluster_end[first]):
@@ -50,4 +57,3 @@ def report_contacts(model: Model, data: Data, h: float, out: Matrix) -> None:
         if model.contact_hold[c] != 0:
             contact_kinematics(model, data, h, c)
         report_contact(model, data, c, data.contact_frame[c], out[c])
-    report_pairs(model, data, out)

@@ -34,7 +34,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.ground_contact import contact_kinematics
-from sim.contact.pairs.inactive_pairs import COUPLED, all_near, enlist_pairs, pairs_came_near
+from sim.contact.pairs.inactive_pairs import COUPLED, enlist_pairs
 from sim.contact.terrain_contact import terrain_gap
 from sim.mechanism.confined import SUNK
 from sim.mechanism.pack_clusters import STIFFNESS
@@ -82,12 +82,11 @@ def sunk_contact(model: Model) -> int:
 
 @optional(Slot.CHOOSE_ACTIVE)
 def choose_active(model: Model, data: Data, options: StepOptions) -> None:
-    """Sort contacts into active and inactive ones, from configuration 2 and the motion that led there.
+    """Sort contacts with the ground into active and inactive ones, from configuration 2 and the motion that led there.
 
     Impulses of the step before stand until the motion changes them; a motion that begins forgets them (rollout.py).
     """
     known = data.carry.inactive_kappa[0] == options.kappa
-    data.carry.inactive_kappa[0] = options.kappa
     count = model.contact_height.shape[0]
     least = STIFFNESS * options.tolerance / (max(1, count) * options.kappa)
     data.active_ground_count[0] = 0
@@ -116,7 +115,6 @@ def choose_active(model: Model, data: Data, options: StepOptions) -> None:
         _enlist(model, data, c)
         c = model.cluster_end[c]
     data.active_count[0] = data.active_ground_count[0]
-    enlist_pairs(model, data)
     data.inactive_share[0] = options.tolerance / max(1, data.inactive_count[0])
 
 
@@ -196,7 +194,7 @@ def _stiffness(model: Model, h: float, c: int, a: float) -> float:
 @optional(Slot.HAS_ACTIVATED, default=False)
 def has_activated(model: Model, data: Data) -> bool:
     """Whether an inactive cluster has become active at configuration 3; it is active from now on."""
-    found = pairs_came_near(model, data)
+    found = False
     for m in range(data.inactive_count[0]):
         if _came_near(model, data, data.inactive_first[m]):
             found = True
@@ -236,13 +234,13 @@ def _enlist_all(model: Model, data: Data) -> None:
         if model.cluster_end[c] > 0:
             _enlist(model, data, c)
     data.active_count[0] = data.active_ground_count[0]
-    enlist_pairs(model, data)
 
 
 @optional(Slot.ALL_STIFF)
 def all_stiff(model: Model, data: Data, h: float) -> None:
-    """All contacts whose stiffness counts taken as active, for the derivatives of a step that has been solved."""
-    all_near(model, data)
+    """All contacts with the ground whose stiffness counts taken as active, for the derivatives of a step that has been
+    solved.
+    """
     found = False
     for m in range(data.inactive_count[0]):
         c = data.inactive_first[m]
@@ -255,3 +253,4 @@ def all_stiff(model: Model, data: Data, h: float) -> None:
                     contact_kinematics(model, data, h, k)
     if found:
         _enlist_all(model, data)
+        enlist_pairs(model, data)

@@ -7,6 +7,7 @@ central path the condensed contact matrices W are the exact derivatives of the i
 from __future__ import annotations
 
 from sim.contact.inactive import all_stiff
+from sim.contact.pairs.inactive_pairs import all_near
 from sim.derivatives.coupling_gradient import add_coupling_composites, add_coupling_derivatives
 from sim.derivatives.residual_gradient import residual_derivatives
 from sim.derivatives.restitution_gradient import add_bounce_composites, add_bounce_derivatives
@@ -38,6 +39,7 @@ def gradient(model: Model, data: Data, h: float, kappa: float, q: Vector, v: Vec
     inertial_jacobians(model, data, h)
     velocity_columns(model, data.S3, data.nu, h, data.S3nu)
     joint_blocks(model, data, h, q, v)
+    all_near(model, data)
     all_stiff(model, data, h)
     add_stiffness(model, data, h, kappa)
     pose2_to_origin(data)

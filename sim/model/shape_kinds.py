@@ -71,6 +71,16 @@ class Pair(IntEnum):
     CYLINDER_CYLINDER = 20
 
 
+CHOSEN = (  # kinds whose points are made of chosen elements; the others have one contact at every pose, and no choice
+    Pair.CAPSULE_CAPSULE,
+    Pair.CAPSULE_BOX,
+    Pair.BOX_BOX,
+    Pair.CAPSULE_FIELD,
+    Pair.POLYTOPE_POLYTOPE,
+    Pair.POLYTOPE_CYLINDER,
+    Pair.CYLINDER_CYLINDER,
+)
+
 _PAIRS: dict[tuple[Shape | None, Shape | None], Pair] = {
     (Shape.SPHERE, Shape.SPHERE): Pair.SPHERE_SPHERE,
     (Shape.SPHERE, Shape.CAPSULE): Pair.SPHERE_CAPSULE,

@@ -209,3 +209,6 @@ class Slot(IntEnum):
     OMITTED_PAIRS = 169
     PAIRS_REACHED = 170
     MEASURE_PAIRS = 171
+    # elements of pairs of shapes: chosen, and where a step begins
+    CHOOSE_SHAPES = 172
+    OPEN_PAIRS = 173

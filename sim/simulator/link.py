@@ -29,10 +29,10 @@ from sim.contact.active_contacts import (
 )
 from sim.contact.collision.pair_kernels import KERNELS
 from sim.contact.contact_law import slip_noise
-from sim.contact.contact_report import report_contacts, worst_contact
+from sim.contact.contact_report import report_ground, worst_contact
 from sim.contact.inactive import all_stiff, choose_active, has_activated, sunk_contact
 from sim.contact.inactive_terrain import evaluate_on_terrain
-from sim.contact.pairs.active_features import choose_pairs, overlapping
+from sim.contact.pairs.active_features import choose_pairs, choose_shapes, open_pairs, overlapping
 from sim.contact.pairs.clearance import measure_pairs, omitted_pairs, pairs_reached
 from sim.contact.pairs.cylinder_pairs import choose_cylinders, collide_cylinders, cylinder_before, cylinder_distance
 from sim.contact.pairs.inactive_pairs import all_near, begin_pairs, enlist_pairs, far_pair_impulses, pairs_came_near
@@ -110,7 +110,7 @@ from sim.dynamics.loops.loop_velocity import close_velocity
 from sim.dynamics.loops.loop_work import loop_slack, loops_gained
 from sim.integrators.closed_interval import close_interval
 from sim.model.model import Law, Model
-from sim.model.shape_kinds import SWAPPED, Pair
+from sim.model.shape_kinds import CHOSEN, SWAPPED, Pair
 from sim.solve.delassus import contact_answers, contact_rates
 from sim.solve.energy_balance import energies_gained
 from sim.solve.inequalities import add_stiffness
@@ -123,17 +123,11 @@ from solvers.compiler import link
 from solvers.riccati import backward_knots
 
 _CONTACTS = (
-    sunk_contact,
-    choose_active,
-    has_activated,
-    contacts_kinematics,
     contacts_overlap,
     start_contacts,
     resume_contacts,
     return_contacts,
     normal_impulses,
-    apply_contacts,
-    condense_contacts,
     contact_constants,
     recover_contacts,
     keep_contacts,
@@ -144,7 +138,15 @@ _CONTACTS = (
     slip_error,
     slip_noise,
     worst_contact,
-    report_contacts,
+)
+_GROUND = (
+    sunk_contact,
+    choose_active,
+    has_activated,
+    contacts_kinematics,
+    apply_contacts,
+    condense_contacts,
+    report_ground,
 )
 _DRY = (
     add_dry_blocks,
@@ -192,7 +194,8 @@ _PAIRS = (
     pair_constants,
     report_pairs,
     choose_pairs,
-    overlapping,
+    choose_shapes,
+    open_pairs,
     begin_pairs,
     enlist_pairs,
     far_pair_impulses,
@@ -299,7 +302,9 @@ def link_terms(model: Model) -> None:
     else:
         link(model.optional, newton)
     if len(model.contact_body):
-        link(model.optional, *_CONTACTS, *_PREDICTION)
+        link(model.optional, *_CONTACTS)
+    if len(model.contact_height):
+        link(model.optional, *_GROUND, *_PREDICTION)
     if np.any(model.limit_cone):
         link(model.optional, cone_gap, cone_block)
     if len(model.dry_dof):
@@ -318,6 +323,8 @@ def link_terms(model: Model) -> None:
     if len(model.pair_kind):
         link(model.optional, *_PAIRS)
         link_pairs(model)
+    if np.any(np.isin(model.pair_kind % SWAPPED, CHOSEN)):
+        link(model.optional, overlapping)
     if np.any(model.pair_kind % SWAPPED >= int(Pair.POLYTOPE_CYLINDER)):
         link(model.optional, *_CYLINDERS)
     if _has_strings(model):
@@ -335,7 +342,7 @@ def link_gradient(model: Model) -> None:
         link(model.optional, solve_deep_panel)
     if len(model.contact_body) + len(model.limit_dof) + len(model.dry_dof):
         link(model.optional, add_stiffness)
-    if len(model.contact_body):
+    if len(model.contact_height):
         link(model.optional, add_slip_jacobians, all_stiff)
     if len(model.limit_dof):
         link(model.optional, add_limit_derivatives)

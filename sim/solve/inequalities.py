@@ -1,7 +1,7 @@
 """All active contacts, limits and dry friction of a step at once: the operations of the interior point, one per kernel.
 
-Those of contacts alone are in sim/contact/active_contacts.py, those of limits in sim/dynamics/joints/limits.py; the
-complementarity products are in complementarity.py.
+Those of contacts are in sim/contact/active_contacts.py and sim/contact/pairs/, those of limits in
+sim/dynamics/joints/limits.py; the complementarity products are in complementarity.py.
 """
 
 from __future__ import annotations
@@ -21,6 +21,11 @@ from sim.contact.active_contacts import (
     return_contacts,
     start_contacts,
 )
+from sim.contact.inactive import choose_active, has_activated
+from sim.contact.pairs.inactive_pairs import begin_pairs, enlist_pairs, far_pair_impulses, pairs_came_near
+from sim.contact.pairs.pair_contact import pair_kinematics
+from sim.contact.pairs.pair_stiffness import apply_pairs, condense_pairs
+from sim.contact.restitution import subtract_floors
 from sim.dynamics.joints.dry_friction import (
     add_dry_blocks,
     apply_dry,
@@ -48,7 +53,7 @@ from sim.dynamics.loops.closure import keep_loops, move_loops
 from sim.model.columns import Bound
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import LawForm, NewtonTarget
+from sim.model.options import LawForm, NewtonTarget, StepOptions
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 
@@ -57,9 +62,31 @@ _LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit wh
 
 
 @kernel
+def choose_inequalities(model: Model, data: Data, options: StepOptions) -> None:
+    """Sort contacts into active and inactive ones, where a step begins."""
+    begin_pairs(model, data, options)
+    choose_active(model, data, options)
+    data.carry.inactive_kappa[0] = options.kappa
+    enlist_pairs(model, data)
+
+
+@kernel
+def inequalities_activated(model: Model, data: Data) -> bool:
+    """Whether inactive contacts have become active at configuration 3; they are from now on."""
+    pairs = pairs_came_near(model, data)
+    ground = has_activated(model, data)
+    if pairs or ground:
+        enlist_pairs(model, data)
+    return pairs or ground
+
+
+@kernel
 def inequality_kinematics(model: Model, data: Data, h: float) -> None:
     """Gaps and slips of active contacts, impulses of inactive ones, gaps of limits, at configuration 3."""
     contacts_kinematics(model, data, h)
+    pair_kinematics(model, data, h)
+    far_pair_impulses(model, data, h, data.carry.inactive_kappa[0])
+    subtract_floors(model, data)
     limit_gaps(model, data, h)
     dry_kinematics(model, data, h)
 
@@ -118,7 +145,7 @@ def total_impulse(model: Model, data: Data) -> float:
 @kernel
 def apply_inequalities(model: Model, data: Data) -> float:
     """wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
-    r = max(apply_contacts(model, data), dry_error(model, data))
+    r = max(apply_contacts(model, data), apply_pairs(model, data), dry_error(model, data))
     for k in range(model.limit_dof.shape[0]):
         r = max(r, abs(data.bound_gap[k] - data.bound[k, Bound.SLACK]))
     return r
@@ -136,6 +163,7 @@ def apply_limits(model: Model, data: Data) -> None:
 def condense_inequalities(model: Model, data: Data, h: float, kappa: float, share: float, form: int) -> None:
     """A += contacts, joint_block += limits: their slacks and impulses eliminated.  See `condense_contacts`."""
     condense_contacts(model, data, h, kappa, share, form, data.A)
+    condense_pairs(model, data, h, kappa, share, form)
     add_limit_blocks(model, data, h)
     add_dry_blocks(model, data, h)
 
@@ -145,6 +173,7 @@ def add_stiffness(model: Model, data: Data, h: float, kappa: float) -> None:
     """A3, A2 and joint_block += contacts and limits at the solution of a step, for its derivatives."""
     data.contact_hard[0] = 0.0
     condense_contacts(model, data, h, kappa, 1.0, LawForm.SOFT, data.A3)
+    condense_pairs(model, data, h, kappa, 1.0, LawForm.SOFT)
     add_slip_jacobians(model, data, h)
     add_limit_blocks(model, data, h)
     add_dry_blocks(model, data, h)

@@ -23,9 +23,8 @@ from __future__ import annotations
 
 from sim.contact.active_contacts import slip_error
 from sim.contact.contact_law import slip_noise
-from sim.contact.inactive import choose_active, has_activated, sunk_contact
+from sim.contact.inactive import sunk_contact
 from sim.contact.pairs.active_features import overlapping
-from sim.contact.pairs.inactive_pairs import begin_pairs
 from sim.contact.pairs.pair_energy import pairs_gained
 from sim.contact.restitution import find_impacts, impacts_gained
 from sim.dynamics.joints.dry_friction import fit_dry
@@ -46,6 +45,7 @@ from sim.solve.globalization import (
     start_on_path,
     strategy,
 )
+from sim.solve.inequalities import choose_inequalities, inequalities_activated
 from sim.solve.merit import Merit, follow, is_near, judge, residuals
 from sim.solve.residual import absorb_residual, residual_scale, rounding
 from sim.solve.step_length import search
@@ -224,13 +224,12 @@ def interior_point(
     if sunk_contact(model) >= 0:
         return Outcome(Status.CONTACT_SUNK.value, 1, 1e300, 0.0)
     data.overlap_allowed[0] = 0  # `find_impacts` chooses features, too
-    begin_pairs(model, data, options)
-    choose_active(model, data, options)
+    choose_inequalities(model, data, options)
     find_impacts(model, data, options.h)
     fit_dry(model, data, options.h, q, v, u)
     while True:
         out = solve_active(model, data, options, (q, v, u), guess, out)
-        if has_activated(model, data):
+        if inequalities_activated(model, data):
             continue
         if out.status != Status.SOLVED or not impacts_gained(model, data, options.h):
             break

@@ -20,11 +20,11 @@ from numba.core.ssa import reconstruct_ssa
 
 from solvers.compiler.arithmetic import KernelTyping
 from solvers.compiler.inference import KernelInference
-from solvers.compiler.libraries import EntryLibrary, InnerLibrary, SeldomLibrary
+from solvers.compiler.libraries import EntryLibrary, InnerLibrary, OptionalLibrary, SeldomLibrary
 from solvers.compiler.lowering import KernelLowering
 from solvers.compiler.notice import compiling
 
-__all__ = ["EntryCompiler", "InnerCompiler", "SeldomCompiler"]
+__all__ = ["EntryCompiler", "InnerCompiler", "OptionalCompiler", "SeldomCompiler"]
 
 _IDLE = (  # features that kernels do not use: closures, array expressions, literals as types, exceptions; print types
     untyped_passes.WithLifting,
@@ -226,12 +226,18 @@ class InnerCompiler(_Compiler):
 
 
 class EntryCompiler(_Compiler):
-    """For functions called from Python or by their address."""
+    """For functions called from Python."""
 
     library = EntryLibrary
 
 
+class OptionalCompiler(_Compiler):
+    """For functions called by their address."""
+
+    library = OptionalLibrary
+
+
 class SeldomCompiler(_Compiler):
-    """For entries that few steps call."""
+    """For those that few steps call."""
 
     library = SeldomLibrary

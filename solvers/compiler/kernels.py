@@ -19,7 +19,7 @@ from numba.core.sigutils import normalize_signature
 from numba.core.types.misc import unliteral
 
 from solvers.compiler.cache import INNER, STORE, KernelCache, cache_folder, prepare, shipped
-from solvers.compiler.pipeline import EntryCompiler, InnerCompiler, SeldomCompiler, UsersCompiler
+from solvers.compiler.pipeline import EntryCompiler, InnerCompiler, OptionalCompiler, SeldomCompiler, UsersCompiler
 
 __all__ = [
     "FLAGS",
@@ -179,7 +179,7 @@ def entry(func: Callable[..., Any], signature: tuple[Any, ...], seldom: bool = F
 
     seldom: that it is called, so that to compile it fast is worth more than fast code.
     """
-    form = registered(cached(_Form(func, SeldomCompiler if seldom else EntryCompiler, no_cpython_wrapper=True)))
+    form = registered(cached(_Form(func, SeldomCompiler if seldom else OptionalCompiler, no_cpython_wrapper=True)))
     form.compile(signature)
     return form.overloads[signature]
 

@@ -16,7 +16,7 @@ from numba.core.codegen import CodeLibrary, JITCodeLibrary
 from numba.core.compiler import CompileResult
 from numba.core.environment import lookup_environment
 
-__all__ = ["EntryLibrary", "InnerLibrary", "SeldomLibrary", "inner_result"]
+__all__ = ["EntryLibrary", "InnerLibrary", "OptionalLibrary", "SeldomLibrary", "inner_result"]
 
 _ENVIRONMENT = "_ZN08NumbaEnv"  # Numba looks for such a variable of every function
 
@@ -166,6 +166,16 @@ class EntryLibrary(JITCodeLibrary):
             if not function.is_declaration and function.linkage == llvm.Linkage.external:
                 text += f'\ndefine void @"{function.name}"() {{\n  ret void\n}}'
         return llvm.parse_assembly(text)
+
+
+class OptionalLibrary(EntryLibrary):
+    """An optional kernel: its loops run over a few joints, axes or contacts. Vectors of several rounds of a loop make
+    them slower, by up to a tenth, and take a tenth of a cold start; kernels that need vectors have lanes.py.
+    """
+
+    def _optimize(self) -> None:
+        passes, builder = self._codegen._module_pass_manager(loop_vectorize=False)
+        passes.run(self._final_module, builder)
 
 
 class SeldomLibrary(EntryLibrary):

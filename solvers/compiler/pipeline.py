@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 from numba.core.compiler import Compiler, CompileResult
@@ -21,6 +21,7 @@ __all__ = [
     "FAST",
     "EntryCompiler",
     "InnerCompiler",
+    "OptionalCompiler",
     "PlainCompiler",
     "SeldomCompiler",
     "UsersCompiler",
@@ -47,22 +48,31 @@ class UsersCompiler(PlainCompiler):
     own = False
 
 
-def _compilers() -> tuple[bool, type[Compiler], type[Compiler], type[Compiler], Any]:
-    """(whether they are fast, the compiler of entries, of entries that are seldom called, of kernels which kernels
-    call, and the function that rebuilds a cached result of the last).
-    """
+class _Compilers(NamedTuple):
+    """Those of each form of a kernel."""
+
+    fast: bool
+    entry: type[Compiler]  # called from Python
+    optional: type[Compiler]  # called by its address
+    seldom: type[Compiler]  # the same, by few steps
+    inner: type[Compiler]  # called by kernels
+    inner_result: Any  # rebuilds a cached result of the last
+
+
+def _compilers() -> _Compilers:
     if os.environ.get("DOJO_OPT_PLAIN_NUMBA", "0") in ("", "0"):
         if any(numba.__version__.startswith(f"{known}.") for known in _KNOWN):
-            from solvers.compiler.fast_pipeline import EntryCompiler, InnerCompiler, SeldomCompiler
+            from solvers.compiler import fast_pipeline as fast
             from solvers.compiler.libraries import inner_result
 
-            return True, EntryCompiler, SeldomCompiler, InnerCompiler, inner_result
+            own = (fast.EntryCompiler, fast.OptionalCompiler, fast.SeldomCompiler, fast.InnerCompiler)
+            return _Compilers(True, *own, inner_result)
         print(
             f"dojo_opt: Numba {numba.__version__} is not one of {', '.join(_KNOWN)}, which the fast compiler knows: "
             "kernels are compiled by Numba alone, and steps take about 1.3 times as long",
             file=sys.stderr,
         )
-    return False, PlainCompiler, PlainCompiler, PlainCompiler, CompileResult._rebuild
+    return _Compilers(False, *(PlainCompiler,) * 4, CompileResult._rebuild)
 
 
-FAST, EntryCompiler, SeldomCompiler, InnerCompiler, inner_result = _compilers()
+FAST, EntryCompiler, OptionalCompiler, SeldomCompiler, InnerCompiler, inner_result = _compilers()

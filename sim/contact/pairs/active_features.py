@@ -45,7 +45,7 @@ _OVERLAP = 1e-4  # part of the smallest size by which shapes may overlap at the 
 _LAST_RESORT = 1e-2  # the same, where elements are chosen at every pose, and where other attempts found no less
 
 
-@kernel
+@optional(Slot.OPEN_PAIRS)
 def open_pairs(model: Model, data: Data, j: int) -> float:
     """Where a collision begins: pair_before, the pose at configuration 2 now in pair_relative, and pair_sides, the axes
     that separate the shapes; returns their distance.
@@ -79,7 +79,7 @@ def distance(model: Model, data: Data, first: int) -> float:
     return least
 
 
-@kernel
+@optional(Slot.CHOOSE_SHAPES)
 def choose_shapes(model: Model, data: Data, first: int) -> None:
     """pair_code, pair_out: the elements of all points of a collision, chosen at pair_relative."""
     kind = model.pair_kind[first]

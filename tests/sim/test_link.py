@@ -1,0 +1,59 @@
+"""The kernels that a scene links: those of its own features."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from sim.model.slots import Slot
+
+GROUND = (
+    Slot.CHOOSE_ACTIVE,
+    Slot.HAS_ACTIVATED,
+    Slot.SUNK_CONTACT,
+    Slot.CONTACTS_KINEMATICS,
+    Slot.APPLY_CONTACTS,
+    Slot.CONDENSE_CONTACTS,
+    Slot.REPORT_CONTACTS,
+    Slot.CHOOSE_CONTACTS,
+    Slot.CONTACT_RATES,
+    Slot.ADD_SLIP_JACOBIANS,
+    Slot.ALL_STIFF,
+)
+PAIRS = (Slot.PAIR_KINEMATICS, Slot.CONDENSE_PAIRS, Slot.CHOOSE_SHAPES, Slot.OPEN_PAIRS, Slot.ALL_NEAR)
+
+
+def linked(shape: dojo.Shape | None, *, ground: bool) -> np.ndarray:
+    """Which slots a step and a derivative of two bodies fill: with this shape each, above the ground."""
+    bodies = [dojo.Body(name, 1.0, (0.1, 0.1, 0.1)) for name in "ab"]
+    sim = dojo.Simulator(
+        dojo.Mechanism(
+            bodies,
+            [dojo.Joint("floating", None, name) for name in "ab"],
+            [dojo.Contact(name, radius=0.1) for name in "ab"] if ground else [],
+            collisions=[dojo.Collision("a", "b", shape, shape)] if shape else [],
+            neutral={"a": (0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0), "b": (0.3, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0)},
+        ),
+        time_step=0.01,
+    )
+    sim.linearize(sim.neutral())
+    return np.flatnonzero(sim.model.optional)
+
+
+@pytest.mark.parametrize("ground", [False, True])
+def test_a_scene_links_kernels_of_the_ground_only_if_it_has_one(ground: bool) -> None:
+    slots = linked(dojo.Sphere(0.1), ground=ground)
+    assert set(PAIRS) <= set(slots)
+    assert {slot for slot in GROUND if slot in slots} == (set(GROUND) if ground else set())
+
+
+def test_a_scene_without_pairs_links_none_of_their_kernels() -> None:
+    slots = linked(None, ground=True)
+    assert set(GROUND) <= set(slots)
+    assert not set(PAIRS) & set(slots)
+
+
+def test_shapes_of_one_contact_link_no_choice_of_elements() -> None:
+    assert Slot.OVERLAPPING not in linked(dojo.Sphere(0.1), ground=False)
+    assert Slot.OVERLAPPING in linked(dojo.Box(0.1, 0.1, 0.1), ground=False)
