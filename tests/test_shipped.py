@@ -26,7 +26,7 @@ TARGET = (targets.runnable() or ("none",))[0]
 pytestmark = pytest.mark.skipif(TARGET == "none", reason="no target is known for this processor")
 
 OWN = """
-from solvers.compiler import kernel, parallel_kernel, prange
+from solvers.compiler import kernel, parallel_kernel, prange, users_callee, users_loop
 
 @kernel
 def inner(x):
@@ -42,6 +42,14 @@ def total(a):
     for i in prange(a.shape[0]):
         out += one(a[i])
     return out
+
+@users_callee
+def half(x):
+    return 0.5 * x
+
+@users_loop
+def looped(x):
+    return half(x) + half(x)
 """
 CALL = """
 import json, warnings
@@ -60,6 +68,7 @@ from solvers.compiler.cache import ship
 ship(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3])
 """
 CALL_ONE = CALL.replace("total(np.ones(3))", "3.0 * one(1.0)")  # the loop over threads takes longest to compile
+CALL_LOOP = CALL.replace("import one, total", "import looped").replace("one(1.0), total(np.ones(3))", "looped(3.0)")
 NUMBERS = [4.0, 12.0]
 HEAD = 17 + 32 + 8  # bytes before the index: a magic text, its digest and its length
 
@@ -108,6 +117,8 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Package:
     built = Package(root)
     why, _ = built.compiles(**targets.build_environment(TARGET))
     assert why == "no code is shipped"
+    build = {"NUMBA_CACHE_DIR": str(root / "cache"), **targets.build_environment(TARGET)}
+    assert json.loads(python(CALL_LOOP, home=root, **build))[:2] == [[3.0], 1]
     program = SHIP.replace("sys.argv[1]", repr(str(root / "cache"))).replace("sys.argv[2]", repr(str(built.folder)))
     python(program.replace("sys.argv[3]", repr(TARGET)), home=root)
     moved = root.with_name("second")
@@ -129,11 +140,15 @@ def test_shipped_code_runs_elsewhere_and_nothing_is_compiled(package: Package) -
     assert package.call(OMP_NUM_THREADS="1", NUMBA_NUM_THREADS="1") == (NUMBERS, 0, "", [])
 
 
-def test_only_entries_are_shipped(package: Package) -> None:
+def test_kernels_that_loops_of_users_call_are_shipped(package: Package) -> None:
+    assert package.call(CALL_LOOP) == ([3.0], 0, "", [])
+
+
+def test_only_entries_and_what_users_call_are_shipped(package: Package) -> None:
     assert len(Shipped(package.folder, TARGET, "another stamp")) == 0
     stamp = package.index()["stamp"]
     names = sorted(name.split("-")[0] for name in package.index()["entries"])
-    assert names == ["own_one", "own_total"] and len(Shipped(package.folder, TARGET, stamp)) == 2
+    assert names == ["own_half", "own_one", "own_total"] and len(Shipped(package.folder, TARGET, stamp)) == 3
 
 
 def test_an_edited_source_is_compiled(package: Package) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.compiler import kernel
+from solvers.compiler import kernel, users_callee
 from solvers.rotation import inverse_right_jacobian, quat_exp, quat_log, quat_mul
 
 Vector = NDArray[np.float64]
@@ -65,7 +65,7 @@ def state_residual(layout: Integers, xs: Matrix, knots: Integers, reference: Mat
                 i += 3
 
 
-@kernel
+@users_callee
 def displace(layout: Integers, x: Vector, i: int, step: float, out: Vector) -> None:
     """out = x (+) step e_i"""
     for j in range(x.shape[0]):

@@ -223,6 +223,18 @@ def _task_space() -> None:
         term.expand(np.stack([x] * 3), us, g, H)
 
 
+def _users() -> None:
+    """Kernels that loops around functions of the user call."""
+    sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01)
+    x = sim.neutral()
+
+    def angle(x: Any, u: Any, out: Any) -> None:
+        out[0] = x[0]
+
+    (term,) = dojo.Problem(sim, x, 1, cost=dojo.cost.ResidualCost(angle, 1)).costs
+    term.expand(np.stack([x] * 2), np.zeros((1, 1)), np.zeros((2, 3)), np.zeros((2, 3, 3)))
+
+
 def _mpc() -> None:
     for make in (dojo.tasks.hopper_mpc, dojo.tasks.quadruped_mpc):
         mpc = make()
@@ -257,6 +269,7 @@ _SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to co
     "plans": _plans,
     "closed loops": _mpc,
     "task space": _task_space,
+    "functions of the user": _users,
 }
 
 

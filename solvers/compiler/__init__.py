@@ -5,7 +5,7 @@ inlined                 a kernel whose text becomes part of its callers
 local_kernel            a kernel that a function makes, not kept on disk
 entry                   a kernel for given types, called by its address
 parallel_kernel         a loop over the threads, with `prange`; `threads` sets their number
-users_kernel            a function of the user; users_loop is a loop around one
+users_kernel            a function of the user; users_loop is a loop around one, users_callee a kernel that it calls
 optional, link          a kernel with a slot in a table of addresses, for features that few scenes have
 record, Field, Table    NamedTuples of arrays that kernels take as one pointer
 reduced                 how an object is pickled that holds functions
@@ -28,6 +28,7 @@ from solvers.compiler.kernels import (
     kernel,
     local_kernel,
     reduced,
+    users_callee,
     users_kernel,
     users_loop,
 )
@@ -60,6 +61,7 @@ __all__ = [
     "shipped",
     "table",
     "threads",
+    "users_callee",
     "users_kernel",
     "users_loop",
 ]

@@ -45,9 +45,21 @@ from solvers.compiler.ownership import OTHERS, WORLD, foreign
 from solvers.compiler.pipeline import FAST, inner_result
 from solvers.compiler.shipped import Shipped, open_shipped, write_shipped
 
-__all__ = ["INNER", "STORE", "KernelCache", "cache_folder", "open_store", "prepare", "ship", "shipped", "stamp"]
+__all__ = [
+    "CALLEE",
+    "INNER",
+    "STORE",
+    "KernelCache",
+    "cache_folder",
+    "open_store",
+    "prepare",
+    "ship",
+    "shipped",
+    "stamp",
+]
 
 INNER = "inner"  # the form of a kernel that kernels call
+CALLEE = "callee"  # the same of one that loops around functions of the user call, and that is shipped
 
 _KEEP = 4  # digests kept on disk however old they are, so that switching between two versions stays warm
 _IN_USE = 14 * 24 * 3600.0  # [s] since its last use for which a folder is kept
@@ -319,14 +331,18 @@ class KernelCache(FunctionCache):
         try:
             kept, payload = pickle.loads(STORE.read(name))
             if kept == key:
-                rebuild = inner_result if self._form == INNER else CompileResult._rebuild
-                return rebuild(target_context, *payload)
+                return self._rebuild(target_context, payload)
         except FileNotFoundError:
             return None
         except Exception:  # of a damaged file, whatever unpickling runs into
             pass
         STORE.drop(name)
         return None
+
+    def _rebuild(self, target_context: Any, payload: tuple[Any, ...]) -> Any:
+        """Numba's compile result, from the reduced one."""
+        rebuild = inner_result if self._form in (INNER, CALLEE) else CompileResult._rebuild
+        return rebuild(target_context, *payload)
 
     def holds(self, sig: Any, codegen: Any) -> bool:
         """Whether there is a file for this signature, of use or not."""
@@ -345,7 +361,7 @@ class KernelCache(FunctionCache):
             kept, payload = pickle.loads(shipped().read(name))
             if kept == key:
                 rtsys.initialize(target_context)
-                return CompileResult._rebuild(target_context, *payload)
+                return self._rebuild(target_context, payload)
         except Exception as error:  # as above; but this one cannot be mended by writing it again
             warnings.warn(f"dojo_opt: shipped code is not used: {error}", RuntimeWarning, stacklevel=2)
         shipped().drop(name)

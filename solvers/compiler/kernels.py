@@ -18,7 +18,7 @@ from numba.core.serialize import custom_reduce
 from numba.core.sigutils import normalize_signature
 from numba.core.types.misc import unliteral
 
-from solvers.compiler.cache import INNER, STORE, KernelCache, cache_folder, prepare, shipped
+from solvers.compiler.cache import CALLEE, INNER, STORE, KernelCache, cache_folder, prepare, shipped
 from solvers.compiler.pipeline import EntryCompiler, InnerCompiler, OptionalCompiler, SeldomCompiler, UsersCompiler
 
 __all__ = [
@@ -34,6 +34,7 @@ __all__ = [
     "local_kernel",
     "reduced",
     "registered",
+    "users_callee",
     "users_kernel",
     "users_loop",
 ]
@@ -192,6 +193,22 @@ def is_kept(func: Callable[..., Any], signature: tuple[Any, ...]) -> bool:
 def local_kernel(func: F) -> F:
     """A kernel made inside a function: Numba never finds such a closure in its cache, so it leaves no file there."""
     return func if numba.config.DISABLE_JIT else cast(F, registered(Kernel(func, keep=False)))
+
+
+class Callee(Kernel):
+    """A kernel that loops around functions of the user call. Those are compiled in every process, so that its code for
+    kernels is shipped.
+    """
+
+    @cached_property
+    def inner(self) -> _Form:
+        """The form without a way in for Python."""
+        return cached(_Form(self.py_func, InnerCompiler, no_cpython_wrapper=True), CALLEE)
+
+
+def users_callee(func: F) -> F:
+    """A kernel that users' loops call."""
+    return func if numba.config.DISABLE_JIT else cast(F, registered(Callee(func)))
 
 
 class UsersKernel(Kernel):

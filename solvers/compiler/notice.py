@@ -1,9 +1,10 @@
 """Signs of life during compilation, which happens once and takes a while; and the count of compiled functions.
 
 dojo_opt: compiling, once: no code is shipped; kept in /home/me/.cache/dojo_opt/0123456789abcdef
-dojo_opt: compiling sim.solve.interior_point.interior_point (function 34 of about 120, 5 s so far, part 2 of 14)
+dojo_opt: compiling function 34 of about 120 (5 s so far, part 2 of 14): the active set of contacts with the ground
 
-The second line is written again and again while it lasts. Both are for users who wait: at a terminal or in a notebook.
+The second line is written again and again while it lasts; its words are the first ones of the module of the kernel that
+Python, or the table of optional kernels, asked for. Both are for users who wait: at a terminal or in a notebook.
 
 DOJO_OPT_QUIET=1 says nothing.
 """
@@ -11,6 +12,7 @@ DOJO_OPT_QUIET=1 says nothing.
 from __future__ import annotations
 
 import os
+import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -31,6 +33,15 @@ def _is_watched() -> bool:
     return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
 
 
+def _topic(func: Callable[..., Any]) -> str:
+    """The feature that a kernel belongs to, in words: the docstring of its module up to the first stop; or its name."""
+    text = " ".join((getattr(sys.modules.get(func.__module__), "__doc__", None) or "").split())
+    words = re.split(r"[:;.](?:\s|$)| \(", text, maxsplit=1)[0]
+    if not words:
+        return f"{func.__module__}.{func.__qualname__}"
+    return words if words[1:2].isupper() else words[0].lower() + words[1:]
+
+
 class _Clock:
     """Time spent on compilations so far; those of its callees are part of that of a kernel."""
 
@@ -41,6 +52,7 @@ class _Clock:
         self.begin = 0.0
         self.next_word = _PATIENCE
         self.reason = ""
+        self.topic = ""
         self.part = ""
         self.expected = 0  # functions, with those before
         self.told = self.written = False
@@ -57,7 +69,7 @@ class _Clock:
             self.told = True
             print(f"dojo_opt: compiling, once{self.reason}", file=sys.stderr)
         count = f"{len(self.names)} of about {self.expected}" if self.expected else f"{len(self.names)}"
-        text = f"dojo_opt: compiling {self.names[-1][0]} (function {count}, {spent:.0f} s so far{self.part})"
+        text = f"dojo_opt: compiling function {count} ({spent:.0f} s so far{self.part}): {self.topic}"
         print(f"\r{text[:_WIDTH]:<{_WIDTH}}", end="", file=sys.stderr, flush=True)
         self.written = True
 
@@ -77,6 +89,7 @@ def compiling(func: Callable[..., Any], own: bool = True) -> Iterator[None]:
     _CLOCK.names.append((f"{func.__module__}.{func.__qualname__}", own))
     if _CLOCK.depth == 0:
         _CLOCK.begin = time.perf_counter()
+        _CLOCK.topic = _topic(func) if own else f"{func.__module__}.{func.__qualname__}"
     _CLOCK.depth += 1
     _CLOCK.look()
     try:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import sys
 from collections.abc import Iterable
+from importlib import import_module
 from types import SimpleNamespace
 
 import pytest
@@ -33,7 +35,9 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
 
 def watched(monkeypatch: pytest.MonkeyPatch, stream: io.StringIO, *modules: str) -> io.StringIO:
     """The stream as standard error; `sys.stderr` itself changes between a fixture and its test."""
-    monkeypatch.setattr(notice, "sys", SimpleNamespace(stderr=stream, modules=modules))
+    monkeypatch.setattr(
+        notice, "sys", SimpleNamespace(stderr=stream, modules={**sys.modules, **dict.fromkeys(modules)})
+    )
     return stream
 
 
@@ -55,17 +59,32 @@ def test_compiling_for_longer_than_a_second_is_announced(clock: list[float], ter
     assert terminal.getvalue() == ""
     compile_for(clock, 0.5, within=4)
     assert terminal.getvalue().count("dojo_opt: compiling, once: no code is shipped\n") == 1
-    assert "parts_of (function 5, 1 s so far)" in terminal.getvalue()
+    assert "compiling function 5 (1 s so far): progress messages during compilation " in terminal.getvalue()
     compile_for(clock, 9.0)
-    assert "(function 10, 12 s so far)" in terminal.getvalue()
+    assert "compiling function 10 (12 s so far)" in terminal.getvalue()
     assert terminal.getvalue().count("once") == 1
     assert terminal.getvalue().endswith(" \r"), "the line is removed at the end"
+
+
+def test_the_topic_is_that_of_the_entry_in_words() -> None:
+    def function() -> None: ...
+
+    for module, topic in (
+        ("sim.contact.inactive", "the active set of contacts with the ground"),
+        ("sim.dynamics.joints.limits", "joint limits on the central path"),
+        ("solvers.lu", "LU factors with row pivoting of small matrices"),
+    ):
+        import_module(module)
+        function.__module__ = module
+        assert notice._topic(function) == topic
+    function.__module__, function.__qualname__ = "of_a_user", "f"
+    assert notice._topic(function) == "of_a_user.f"
 
 
 def test_parts_of_a_task_are_counted(clock: list[float], terminal: io.StringIO) -> None:
     for _ in notice.parts("abc", 3):
         compile_for(clock, 0.7)
-    assert "part 2 of 3)" in terminal.getvalue()
+    assert "part 2 of 3): progress" in terminal.getvalue()
     before = len(terminal.getvalue())
     compile_for(clock, 2.0)
     assert "part" not in terminal.getvalue()[before:].replace("parts_of", "")
@@ -106,6 +125,6 @@ def test_the_number_of_functions_is_told_as_far_as_it_is_known(clock: list[float
     for _ in notice.parts([1], 1):
         notice.expect(8)
         compile_for(clock, 3.0)
-    assert "(function 4 of about 10, 3 s so far)" in terminal.getvalue()
+    assert "function 4 of about 10 (3 s so far)" in terminal.getvalue()
     compile_for(clock, 3.0)
-    assert "(function 6, 6 s so far)" in terminal.getvalue()
+    assert "function 6 (6 s so far)" in terminal.getvalue()
