@@ -18,7 +18,7 @@ from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.footfall import Footfall
 from dojo_opt.gaits.gait import Gait, assemble
 from sim.mechanism import checks
-from sim.mechanism.checks import whole_number
+from sim.mechanism.memory import room_for
 from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -324,12 +324,12 @@ def _periodic(
         checks.number(f"{call}({name}=...)", value)
     if not 0.0 < checks.number(f"{call}(duty=...)", duty) < 1.0:
         raise ValueError(f"{call}(duty=...): expected a share of the period between 0 and 1, got {duty}")
-    whole_number(f"{call}(cycles=...)", cycles)
     for name, value in (("step_height", step_height), ("tilt", tilt)):
         checks.number(f"{call}({name}=...)", value, at_least=0.0)
     if height is not None:
         checks.number(f"{call}(height=...)", height)
-    steps = _whole(f"{call}(period=...)", period, sim.time_step) * cycles
+    once = _whole(f"{call}(period=...)", period, sim.time_step)
+    steps = once * room_for(f"{call}(cycles=...)", cycles, 8.0 * once * sim.nx, remedy="repeat a plan: Plan.repeated")
     feet, ground, neutral = Feet(sim), _ground(sim), sim.neutral()
     places = ground[:, :2] - neutral[:2]
     if footholds is not None:

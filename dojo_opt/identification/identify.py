@@ -29,6 +29,7 @@ from dojo_opt.identification.windows import Predictor, Window, WindowErrors, cut
 from dojo_opt.planning.executors import check_executor, results_in_order
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_table
+from sim.mechanism.memory import room_for
 from sim.simulator.simulator import Simulator
 from solvers.status import MESSAGES, Status
 
@@ -324,7 +325,7 @@ def identify(
         raise ValueError(f"{call}(noise=...): expected numbers above 0, not all infinite, got {noise!r}")
     check_executor(call, executor)
     known, windows = Prior(space, prior or {}), cut_windows(sim, trajectories, o.window)
-    count = checks.whole_number(f"{call}(starts=...)", starts)
+    count = room_for(f"{call}(starts=...)", starts, 8.0 * sum(w.x.size for w in windows))
     first = _first_values(space, known, count, checks.whole_number(f"{call}(seed=...)", seed, 0))
     calls = [(space, windows, deviations, o, known, values) for values in first]
     found = list(results_in_order(_fitted, calls, executor))

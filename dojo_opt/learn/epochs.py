@@ -37,19 +37,30 @@ def learn(
     return _run_epochs(run, resume)
 
 
+def _check_state(call: str, own: dict[str, Any], given: dict[str, Any]) -> None:
+    """Refuse a state to resume from that is not like one's own, as of a damaged file or of other options."""
+    for name, value in own.items():
+        there: Any = given.get(name)
+        like = isinstance(there, int | float if isinstance(value, int | float) else type(value))
+        if not like or (isinstance(value, np.ndarray) and value.shape != there.shape):
+            raise ValueError(f"{call}: its {name!r} is missing, or does not fit the options")
+
+
 def _run_epochs(search: Any, resume: Learned | None) -> Learned:
     """All epochs of an algorithm, evaluated at its marks, from the start or from where `resume` ended."""
     o, name = search.options, search.algorithm
     if resume is not None:
         if resume.algorithm != name or resume.seed != search.seed or (
-            resume.state["weights"].shape != search.policy.weights.shape
+            resume.policy.weights.shape != search.policy.weights.shape
         ):  # fmt: skip
             raise ValueError(
                 f"{name}(resume=...): expected a run of {name} with seed {search.seed} and this policy, got {resume!r}"
             )
+        _check_state(f"{name}(resume=...)", search.state(), resume.state)
         search.resume(resume)
     progress = LearningProgress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
-    marks = {round((k + 1) * o.epochs / o.evaluations) for k in range(o.evaluations)} | {o.epochs}
+    count = min(o.evaluations, o.epochs)
+    marks = {round((k + 1) * o.epochs / count) for k in range(count)} | {o.epochs}
     status, state = Status.SOLVED, search.state()
     try:
         while search.epoch < o.epochs and status == Status.SOLVED:

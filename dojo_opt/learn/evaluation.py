@@ -11,12 +11,15 @@ from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.randomisation import Drawn
 from sim.mechanism.checks import whole_number
+from sim.mechanism.memory import room_for
 from solvers.status import Status
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 __all__ = ["Evaluation", "evaluate"]
+
+_EPISODE = 1000.0  # bytes of its generator
 
 
 class Evaluation(NamedTuple):
@@ -63,7 +66,7 @@ def evaluate(
     task = policy.task
     if task is None:
         raise ValueError("evaluate(policy): expected a policy with a task")
-    count = whole_number("evaluate(episodes)", episodes)
+    count = room_for("evaluate(episodes)", episodes, 8.0 * (task.nx + task.observations) + _EPISODE)
     model = Drawn.of(task)
     if substeps is not None:
         steps = whole_number("evaluate(substeps=...)", substeps)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Callable
@@ -13,16 +12,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.learn.network import Network
-from dojo_opt.learn.policy import LearnedPolicy
+from dojo_opt.learn.policy import LearnedPolicy, policy_of
 from dojo_opt.learn.task import Task
 from sim.mechanism.brief import brief_table
+from sim.simulator.npz_file import check_head, read_npz, reading, write_npz
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
 
 __all__ = ["Learned", "LearningProgress"]
 
+_SAVED: dict[str, Any] = {  # fields in the head of a file
+    **{"success": bool, "status": int, "message": str, "algorithm": str, "seed": int, "best": float, "steps": int},
+    **{"unsolved": int, "infinite": int, "seconds": float, "history": list},
+}
 COLUMNS = ("epoch", "steps", "return", "evaluated", "gradient", "clipped", "unsolved", "infinite", "seconds")
 HEADER = "{:>6} {:>10} {:>9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8}".format(*COLUMNS)
 
@@ -102,25 +105,13 @@ class Learned:
         Args:
             path: of the file.
         """
-        names = (
-            "success",
-            "message",
-            "algorithm",
-            "seed",
-            "best",
-            "steps",
-            "unsolved",
-            "infinite",
-            "seconds",
-            "history",
-        )
-        meta = {name: getattr(self, name) for name in names} | {"status": int(self.status)}
+        meta = {name: getattr(self, name) for name in _SAVED} | {"status": int(self.status)}
         arrays: dict[str, Any] = {f"state_{k}": v for k, v in self.state.items() if isinstance(v, np.ndarray)}
         meta["state"] = {k: v for k, v in self.state.items() if not isinstance(v, np.ndarray)}
         p = self.policy
         meta["network"] = {"sizes": p.network.sizes, "activation": p.network.activation}
-        arrays |= {"weights": p.weights, "mean": p.mean, "deviation": p.deviation, "meta": np.array(json.dumps(meta))}
-        np.savez(path, **arrays)
+        arrays |= {"weights": p.weights, "mean": p.mean, "deviation": p.deviation}
+        write_npz("Learned.save(path)", path, meta, arrays)
 
     @classmethod
     def load(cls, path: str | Path, task: Task | None = None) -> Learned:
@@ -132,13 +123,19 @@ class Learned:
 
         Returns:
             The run.
+
+        Raises:
+            OSError: the file cannot be read.
+            ValueError: it is another file, damaged, or its policy does not fit the task.
         """
-        with np.load(path, allow_pickle=False) as data:
-            meta = json.loads(str(data["meta"]))
-            shape = meta.pop("network")
-            network = Network(tuple(shape["sizes"]), shape["activation"])
-            policy = LearnedPolicy(network, data["weights"], data["mean"], data["deviation"], task)
-            state = meta.pop("state") | {k[6:]: data[k] for k in data.files if k.startswith("state_")}
+        call = "Learned.load"
+        with reading(call, path, "run of learning"):
+            meta, data = read_npz(call, path)
+            check_head(meta, _SAVED | {"network": dict, "state": dict})
+            for record in meta["history"]:
+                table_line(record)
+            policy = policy_of(meta.pop("network"), data, task)
+            state = meta.pop("state") | {k[6:]: array for k, array in data.items() if k.startswith("state_")}
             meta["status"] = Status(meta["status"])
             return cls(policy=policy, state=state, **meta)
 

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.mechanism import checks
+from sim.mechanism.memory import check_room
 from solvers.compiler import kernel
 from solvers.types import Integers, Vector
 
@@ -51,6 +53,15 @@ class Network:
 
     sizes: tuple[int, ...]  # inputs, hidden layers, outputs; two numbers: a linear map
     activation: str = "tanh"
+
+    def __post_init__(self) -> None:
+        sizes = self.sizes if isinstance(self.sizes, tuple | list) else ()
+        if len(sizes) < 2:
+            raise ValueError(f"Network(sizes): expected inputs, hidden layers and outputs, got {self.sizes!r}")
+        for size in sizes:
+            checks.whole_number("Network(sizes)", size)
+        checks.one_of("Network(activation=...)", self.activation, ACTIVATIONS)
+        check_room("Network(sizes)", max(sizes) ** 2, 8.0, "choose smaller layers")  # orthogonal weights are squares
 
     @property
     def count(self) -> int:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -17,10 +16,11 @@ from dojo_opt.learn.onnx_file import write_onnx
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
+from sim.simulator.npz_file import check_head, check_shapes, read_npz, reading, write_npz
 
 Floats = NDArray[np.float64]
 
-__all__ = ["LearnedPolicy"]
+__all__ = ["LearnedPolicy", "policy_of"]
 
 _SPAN = 10.0  # standard deviations: scaled observations beyond are cut off, without a derivative
 
@@ -47,6 +47,20 @@ class LearnedPolicy:
     task: Task | None = field(default=None, repr=False)
 
     __repr__ = brief_repr
+
+    def __post_init__(self) -> None:
+        sizes = self.network.sizes
+        for name, length in (("weights", self.network.count), ("mean", sizes[0]), ("deviation", sizes[0])):
+            if np.shape(getattr(self, name)) != (length,):
+                raise ValueError(
+                    f"LearnedPolicy({name}=...): expected shape ({length},) for a network of {sizes}, got "
+                    f"{np.shape(getattr(self, name))}"
+                )
+        if self.task is not None and (sizes[0], sizes[-1]) != (self.task.observations, self.task.sim.nu):
+            raise ValueError(
+                f"LearnedPolicy(task=...): expected a task with {sizes[0]} observations and {sizes[-1]} inputs, got "
+                f"{self.task.observations} and {self.task.sim.nu}"
+            )
 
     def scaled(self, observations: Floats) -> Floats:
         """Scaled and limited to ten standard deviations.
@@ -158,8 +172,9 @@ class LearnedPolicy:
         Args:
             path: of the file.
         """
-        shape = json.dumps({"sizes": self.network.sizes, "activation": self.network.activation})
-        np.savez(path, network=shape, weights=self.weights, mean=self.mean, deviation=self.deviation)
+        shape = {"sizes": self.network.sizes, "activation": self.network.activation}
+        arrays = {"weights": self.weights, "mean": self.mean, "deviation": self.deviation}
+        write_npz("LearnedPolicy.save(path)", path, shape, arrays, "network")
 
     @classmethod
     def load(cls, path: str | Path, task: Task | None = None) -> LearnedPolicy:
@@ -171,8 +186,36 @@ class LearnedPolicy:
 
         Returns:
             The policy.
+
+        Raises:
+            OSError: the file cannot be read.
+            ValueError: it is another file, damaged, or its policy does not fit the task.
         """
-        with np.load(path, allow_pickle=False) as data:
-            shape = json.loads(str(data["network"]))
-            network = Network(tuple(shape["sizes"]), shape["activation"])
-            return cls(network, data["weights"], data["mean"], data["deviation"], task)
+        call = "LearnedPolicy.load"
+        with reading(call, path, "policy"):
+            shape, arrays = read_npz(call, path, "network")
+            return policy_of(shape, arrays, task)
+
+
+def policy_of(shape: Mapping[str, Any], arrays: Mapping[str, Any], task: Task | None) -> LearnedPolicy:
+    """The policy of a file.
+
+    Args:
+        shape: {"sizes": of the layers, "activation": name}.
+        arrays: "weights", "mean" and "deviation".
+        task: the task of the policy, if it is known.
+
+    Returns:
+        The policy.
+
+    Raises:
+        ValueError: an entry is missing, or does not fit the others.
+    """
+    check_head(shape, {"sizes": list, "activation": str})
+    network = Network(tuple(shape["sizes"]), shape["activation"])
+    lengths = {"weights": network.count, "mean": network.sizes[0], "deviation": network.sizes[0]}
+    check_shapes(arrays, {name: (length,) for name, length in lengths.items()})
+    weights, mean, deviation = (checks.array(name, arrays[name], (length,)) for name, length in lengths.items())
+    if not np.all(deviation > 0.0):
+        raise ValueError("array deviation: expected numbers > 0")
+    return LearnedPolicy(network, weights, mean, deviation, task)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
+from sim.mechanism.memory import room_for
 from sim.simulator.row_batch import BatchStep
 from sim.simulator.simulator import Simulator
 
@@ -63,7 +64,7 @@ class Randomisation:
         if self.kappa is not None and not 0.0 < self.kappa[0] <= self.kappa[1]:
             raise ValueError(f"Randomisation(kappa=...): expected 0 < low <= high, got {self.kappa}")
         checks.number("Randomisation(noise=...)", self.noise, at_least=0.0)
-        checks.whole_number("Randomisation(models=...)", self.models)
+        room_for("Randomisation(models=...)", self.models, 8.0 * (1 + len(self.values) + len(self.factors)))
         if self.pushes is not None:
             checks.number("Randomisation(pushes=...)", self.pushes[0], above=0.0)
             checks.floats("Randomisation(pushes=...)", self.pushes[1])

@@ -12,6 +12,7 @@ from dojo_opt.learn.evaluation import Evaluation, evaluate
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.task import Task
+from sim.mechanism.memory import check_room
 
 Floats = NDArray[np.float64]
 
@@ -34,8 +35,20 @@ class Training:
 
     def __init__(self, task: Task, options: Any, seed: int) -> None:
         self.task, self.options, self.seed = task, options, seed
+        self._check_memory()
         self.rng = np.random.default_rng((seed, 1))
         self.epoch, self.steps, self.unsolved, self.infinite, self.best = 0, 0, 0, 0, -np.inf
+
+    def _check_memory(self) -> None:
+        """Refuse rollouts of an epoch, with their derivatives, that do not fit the memory."""
+        o, task, sim = self.options, self.task, self.task.sim
+        kind = next((name for name in ("environments", "directions") if hasattr(o, name)), None)
+        if kind is None:
+            return
+        numbers = 2 * task.nx + task.observations + 3 * sim.nu
+        numbers += sim.ndx * (sim.ndx + sim.nu + task.observations) if kind == "environments" else 0
+        steps = task.steps if o.horizon is None else o.horizon
+        check_room(f"{self.algorithm}({kind}=..., horizon=...)", getattr(o, kind) * steps, 8.0 * numbers)
 
     def train(self) -> dict[str, Any]:
         """One epoch: its record, without an evaluation."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.learn.randomisation import Drawn
 from dojo_opt.learn.task import Task
-from sim.mechanism.checks import whole_number
+from sim.mechanism.memory import room_for
 from solvers.status import Status
 
 try:
@@ -39,7 +39,7 @@ class VectorEnvironment(VectorEnv if gymnasium else object):  # type: ignore[mis
     ) -> None:
         if gymnasium is None:
             raise ImportError('VectorEnvironment needs gymnasium: pip install "dojo-opt[gym]"')
-        self.task, self.num_envs = task, whole_number("VectorEnvironment(num_envs=...)", num_envs)
+        self.task, self.num_envs = task, room_for("VectorEnvironment(num_envs=...)", num_envs, 8.0 * task.nx + 1000.0)
         mode = AutoresetMode.NEXT_STEP if autoreset_mode is None else AutoresetMode(autoreset_mode)
         self.metadata = {**type(self).metadata, "autoreset_mode": mode}
         self._mode, self._limit = mode, task.steps if max_episode_steps is None else max_episode_steps

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from sim.mechanism.checks import whole_number
+from dojo_opt.models.links import LINK_BYTES
+from sim.mechanism.memory import room_for
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Box
 
@@ -17,7 +18,7 @@ def box_chain(
     joint: kind of all joints; axes: theirs, in turn; size: length, width, height [m]; spring and damper of
     each joint. ValueError: n is not a whole number of boxes; the message names `call`.
     """
-    n = whole_number(f"{call}(n)", n)
+    n = room_for(f"{call}(n)", n, LINK_BYTES)
     links = [Body(f"link_{i}", mass, shape=Box(*size)) for i in range(n)]
     front, rear = (size[0] / 2, 0.0, 0.0), (-size[0] / 2, 0.0, 0.0)
     joints = [Joint("floating", None, "link_0", name="base")]

@@ -18,6 +18,7 @@ from sim.mechanism.stance import gaps
 
 Floats = NDArray[np.float64]
 
+LINK_BYTES = 20_000.0  # of memory, of a link as a part and in the arrays of kernels
 _PAD = 0.04  # [m] radius of a ball that stands for a link of 1 kg
 _CLEAR = 1e-9  # [m] of the lowest contact over the ground
 

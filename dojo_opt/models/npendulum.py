@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from sim.mechanism.checks import whole_number
+from dojo_opt.models.links import LINK_BYTES
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.memory import room_for
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Box
 
@@ -46,7 +47,7 @@ def npendulum(
     Raises:
         ValueError: for an argument out of range; the message names the part.
     """
-    n = whole_number("npendulum(n)", n)
+    n = room_for("npendulum(n)", n, LINK_BYTES)
     half = (0.0, 0.0, length / 2)
     below = (0.0, 0.0, -length / 2)
     pivot = (0.0, 0.0, 1.1 * n * length)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from sim.mechanism.checks import whole_number
+from dojo_opt.models.links import LINK_BYTES
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.memory import room_for
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Cylinder
 
@@ -41,7 +42,7 @@ def nslider(
     Raises:
         ValueError: for an argument out of range; the message names the part.
     """
-    n = whole_number("nslider(n)", n)
+    n = room_for("nslider(n)", n, LINK_BYTES)
     rods = [Body(f"rod_{i}", mass, shape=Cylinder(radius, length)) for i in range(n)]
     top = (0.0, 0.0, length / 2)
     rails = [

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from sim.mechanism.checks import whole_number
+from dojo_opt.models.links import LINK_BYTES
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.memory import room_for
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Box
 
@@ -41,7 +42,7 @@ def orbital(
     Raises:
         ValueError: for an argument out of range; the message names the part.
     """
-    n = whole_number("orbital(n)", n, 2)
+    n = room_for("orbital(n)", n, LINK_BYTES, least=2)
     upper, lower = (0.0, 0.0, length / 2), (0.0, 0.0, -length / 2)
     links = [Body(f"link_{i}", mass, shape=Box(width, width, length)) for i in range(n)]
     joints = [Joint("fixed", None, "link_0", name="joint_0", child_point=upper)]

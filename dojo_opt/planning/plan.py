@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.planning.options import Options
+from sim.mechanism import checks
 from sim.mechanism.brief import brief_table, drawn
 from sim.mechanism.checks import whole_number
 from sim.simulator.motion_file import archived, export, opened, restored
+from sim.simulator.npz_file import check_head, check_shapes, reading, write_npz
 from sim.simulator.results import Shot
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
@@ -32,6 +33,30 @@ RECORDED = (
     *("iteration", "cost", "merit", "gradient", "kappa_eval", "kappa_grad"),
     *("mu", "alpha", "gap", "violation", "milliseconds"),
 )
+
+
+SAVED: dict[str, Any] = {  # fields in the head of a file
+    **{"success": bool, "status": int, "message": str, "nit": int, "fun": float, "violation": float, "gap": float},
+    **{"seconds": float, "time_step": float, "substeps": int, "history": list},
+}
+
+
+def _check_arrays(sim: Any, meta: dict[str, Any], data: dict[str, Any]) -> None:
+    """Refuse a file whose arrays or records do not fit one another, or its simulator."""
+    check_shapes(data, {"x": (None, None), "u": (None, None), "K": (None, None, None)})
+    (knots, nu), ndx = data["u"].shape, data["K"].shape[2]
+    nx = data["x"].shape[1] if sim is None else sim.nx
+    if sim is not None:
+        nu, ndx = sim.nu, sim.ndx
+    shapes = {"x": (knots + 1, nx), "u": (knots, nu), "K": (knots, nu, ndx), "k": (knots, nu)}
+    shapes |= {"stride": (ndx,)} if "stride" in data else {}
+    parts = ("multiplier_", "penalty_")
+    check_shapes(data, {**shapes, **{name: (None, None) for name in data if name.startswith(parts)}})
+    for name in shapes:
+        checks.array(name, data[name], shapes[name])
+    for record in meta["history"]:
+        if not all(isinstance(record[name], int | float) for name in RECORDED):
+            raise ValueError(f"a record of the history: {checks.shown(record)}")
 
 
 def table_line(record: dict[str, Any]) -> str:
@@ -196,9 +221,8 @@ class Plan:
         arrays |= {} if self.stride is None else {"stride": self.stride}
         arrays |= {f"multiplier_{i}": a for i, a in enumerate(self.multipliers)}
         arrays |= {f"penalty_{i}": a for i, a in enumerate(self.penalties)}
-        scalars = ("message", "nit", "fun", "violation", "gap", "seconds", "time_step", "substeps", "history")
-        meta = {name: getattr(self, name) for name in scalars} | {"status": int(self.status), "success": self.success}
-        np.savez(path, allow_pickle=False, meta=json.dumps(head | meta), **arrays)
+        meta = {name: getattr(self, name) for name in SAVED} | {"status": int(self.status)}
+        write_npz("Plan.save(path)", path, head | meta, arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> Plan:
@@ -214,14 +238,18 @@ class Plan:
             OSError: the file cannot be read.
             ValueError: it is another file, or of a later version.
         """
-        meta, data = opened("Plan.load", path, "plan")
-        meta["status"] = Status(meta["status"])
-        sim = restored(meta, data)
-        count = sum(name.startswith("multiplier_") for name in data)
-        multipliers = [data[f"multiplier_{i}"] for i in range(count)]
-        penalties = [data[f"penalty_{i}"] for i in range(count)]
-        arrays = {name: data[name] for name in ("x", "u", "K", "k", "stride") if name in data}
-        return cls(**meta, **arrays, multipliers=multipliers, penalties=penalties, simulator=sim)
+        call = "Plan.load"
+        meta, data = opened(call, path, "plan")
+        with reading(call, path, "plan"):
+            sim = restored(meta, data)
+            check_head(meta, SAVED)
+            _check_arrays(sim, meta, data)
+            meta["status"] = Status(meta["status"])
+            count = sum(name.startswith("multiplier_") for name in data)
+            multipliers = [data[f"multiplier_{i}"] for i in range(count)]
+            penalties = [data[f"penalty_{i}"] for i in range(count)]
+            arrays = {name: data[name] for name in ("x", "u", "K", "k", "stride") if name in data}
+            return cls(**meta, **arrays, multipliers=multipliers, penalties=penalties, simulator=sim)
 
     def export(self, path: str | Path) -> None:
         """Write the motion for other tools.

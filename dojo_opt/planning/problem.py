@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import os
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -15,6 +14,7 @@ from dojo_opt.planning.names import chosen_components
 from dojo_opt.planning.term import Spec, numbers, state_table, table
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
+from sim.mechanism.memory import check_room
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -50,14 +50,6 @@ def _components(call: str, chosen: Any, sim: Any) -> Any:
     if chosen is None or chosen is False:
         return None
     return np.unique(chosen_components(call, None if chosen is True else chosen, sim))
-
-
-def _memory() -> float:
-    """Bytes of the machine, infinite where it does not say."""
-    try:
-        return float(os.sysconf("SC_PHYS_PAGES")) * float(os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, ValueError, OSError):
-        return float("inf")
 
 
 def _terms(given: Any) -> tuple[Spec, ...]:
@@ -140,12 +132,8 @@ class Problem:
     def _check_memory(self) -> None:
         """Refuse a horizon whose derivatives alone are larger than the memory of the machine."""
         size = self.sim.ndx + self.sim.nu
-        needed = 8.0 * (self.horizon + 1) * (2 * self.sim.ndx * size + 2 * size**2)  # A, B, twice; H, and its copy
-        if needed > (memory := _memory()):
-            raise ValueError(
-                f"Problem(horizon=...): derivatives at {self.horizon} knots with {size} numbers each take "
-                f"{needed / 2**30:.3g} GiB of memory, and this machine has {memory / 2**30:.3g} GiB"
-            )
+        each = 8.0 * (2 * self.sim.ndx * size + 2 * size**2)  # A, B, twice; H, and its copy
+        check_room("Problem(horizon=...)", self.horizon + 1, each, "plan fewer knots, and go on from the last")
 
     def refined(self, count: int = 5) -> Problem:
         """The same problem with shorter time steps: same knots, inputs and terms, and `refined_constraints`.

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.planning.executors import results_in_order
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
+from sim.mechanism.memory import room_for
 from sim.simulator.results import Interrupted
 
 Vector = NDArray[np.float64]
@@ -60,6 +61,8 @@ def multi_start(
         Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the best of the finished plans, None without
             any.
     """
+    numbers = problem.horizon * (problem.sim.nx + problem.sim.nu * (2 + problem.sim.ndx))  # x, u, k, K of a plan
+    room_for("ilqr(starts=...)", starts, 8.0 * numbers)
     controls, _, warm_start = guess
     center = problem.controls0 if warm_start is None else warm_start.u
     center = center if controls is None else problem.check_controls("ilqr(controls=...)", controls)

@@ -15,6 +15,7 @@ from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import Tick
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_table
+from sim.mechanism.memory import check_room
 from sim.simulator.results import Contacts, Interrupted
 from sim.simulator.simulator import Simulator
 from solvers.status import MESSAGES, Status
@@ -24,7 +25,9 @@ Matrix = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Controller = Callable[[float, Vector], ArrayLike]
 
-__all__ = ["ClosedLoop", "closed_loop"]
+__all__ = ["ClosedLoop", "closed_loop", "steps_of"]
+
+_RECORD = 500.0  # bytes of the objects that keep a step
 
 
 @dataclass(frozen=True, repr=False)
@@ -156,8 +159,7 @@ def closed_loop(
         raise TypeError(f"closed_loop(plant): expected a Plant, such as Plant(simulator), got {plant!r}")
     if not callable(controller):
         raise TypeError(f"closed_loop(controller): expected an MPC or a function of (time, x), got {controller!r}")
-    h = plant.sim.time_step
-    steps = round(checks.number("closed_loop(duration)", duration, above=0.0) / h)
+    h, steps = plant.sim.time_step, steps_of("closed_loop(duration)", plant, duration)
     every = 1 if control_step is None else round(checks.number("closed_loop(control_step=...)", control_step) / h)
     if every < 1 or (control_step is not None and abs(every * h - control_step) > 1e-9):
         raise ValueError(
@@ -173,6 +175,14 @@ def closed_loop(
         run.survived, run.message = False, MESSAGES[Status.INTERRUPTED]
         raise Interrupted(_closed_loop(run, controller, plant, reference)) from None
     return _closed_loop(run, controller, plant, reference)
+
+
+def steps_of(call: str, plant: Plant, duration: float) -> int:
+    """Steps of the plant in a duration [s], whose record fits the memory."""
+    steps = round(checks.number(call, duration, above=0.0) / plant.sim.time_step)
+    numbers = plant.sim.nx + plant.sim.nu + 11 * plant.sim.ncontact
+    check_room(call, steps, _RECORD + 8.0 * numbers, "run it in parts")
+    return steps
 
 
 def _closed_loop(run: _LoopRecord, controller: Controller, plant: Plant, reference: Any) -> ClosedLoop:

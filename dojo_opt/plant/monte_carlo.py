@@ -13,17 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.planning.executors import check_executor, results_in_order
-from dojo_opt.plant.loop import closed_loop
+from dojo_opt.plant.loop import closed_loop, steps_of
 from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import Tick, milliseconds
-from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr, brief_table
 from sim.mechanism.checks import whole_number
+from sim.mechanism.memory import room_for
 from sim.simulator.results import Interrupted
 
 Vector = NDArray[np.float64]
 Sampler = Callable[[np.random.Generator], Perturbation]
+
+_RUN = 2000.0  # bytes of the objects that keep a run
 
 __all__ = ["MonteCarloRun", "MonteCarlo", "monte_carlo", "wilson_interval"]
 
@@ -152,7 +154,6 @@ def monte_carlo(
         ValueError: for a number out of range.
         Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the MonteCarlo of the finished runs.
     """
-    count = whole_number("monte_carlo(runs=...)", runs)
     if not isinstance(plant, Plant):
         raise TypeError(f"monte_carlo(plant): expected a Plant, such as Plant(simulator), got {plant!r}")
     for name, function in (("controller", controller), ("sampler", sampler)):
@@ -160,7 +161,8 @@ def monte_carlo(
             raise TypeError(f"monte_carlo({name}): expected a function, got {function!r}")
     check_executor("monte_carlo", executor)
     whole_number("monte_carlo(seed=...)", seed, 0)
-    checks.number("monte_carlo(duration)", duration, above=0.0)
+    steps_of("monte_carlo(duration)", plant, duration)
+    count = room_for("monte_carlo(runs=...)", runs, _RUN + 8.0 * plant.sim.nx)
     children = np.random.SeedSequence(seed).spawn(count)
     tasks = [(controller, plant, sampler, float(duration), (control_step, components), child) for child in children]
     outcomes: list[MonteCarloRun] = []

@@ -16,7 +16,7 @@ from dojo_opt.viewer import drawing, overlays
 from dojo_opt.viewer.frames import FRAMES, sparse
 from dojo_opt.viewer.motion import Motion, motion
 from dojo_opt.viewer.page import group_of, label, page, spacing
-from sim.mechanism import shapes
+from sim.mechanism import checks, shapes
 from sim.mechanism.pack import contact_frame
 from sim.mechanism.parts import WORLD, Body, Contact
 from sim.mechanism.shapes import PLATE
@@ -63,7 +63,7 @@ def save_html(
         SimulationError: a step of a plan cannot be solved again, for its forces.
         OSError: the file cannot be written.
     """
-    target = Path(path)
+    target = checks.path("save_html(path)", path)
     results = list(result) if isinstance(result, list | tuple) else [result]
     if not results:
         raise ValueError("save_html(result): expected one result or more, got an empty list")

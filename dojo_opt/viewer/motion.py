@@ -11,6 +11,7 @@ import numpy as np
 from dojo_opt.constraint import Goal
 from dojo_opt.planning.names import chosen_components
 from dojo_opt.viewer.drawing import Piece, extent, pieces
+from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.poses import poses
@@ -107,10 +108,12 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
     """
     if isinstance(result, Mechanism):
         return _standing(result)
+    if not hasattr(result, "x") or not hasattr(result, "u"):
+        raise TypeError(f"expected a Trajectory, a Plan or a ClosedLoop to show, got a {type(result).__name__}")
     sim = simulator or getattr(result, "simulator", None) or getattr(getattr(result, "problem", None), "sim", None)
+    if not (sim is None or isinstance(sim, Simulator)):
+        raise TypeError(f"expected a Simulator to show a {type(result).__name__} with, got {checks.shown(sim)}")
     if sim is None:
-        if not hasattr(result, "x") or not hasattr(result, "u"):
-            raise TypeError(f"expected a Trajectory, a Plan or a ClosedLoop to show, got a {type(result).__name__}")
         raise ValueError(f"this {type(result).__name__} does not know its simulator; give simulator=...")
     x, u = np.asarray(result.x, dtype=np.float64), np.asarray(result.u, dtype=np.float64)
     known = getattr(result, "contacts", None)  # a plan has none

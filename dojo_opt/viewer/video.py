@@ -18,6 +18,7 @@ from dojo_opt.viewer.animation import html_of
 from dojo_opt.viewer.motion import Motion, motion
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
+from sim.mechanism.memory import check_room
 from sim.simulator.simulator import Simulator
 
 Pixels = NDArray[np.uint8]
@@ -29,6 +30,7 @@ _ARGUMENTS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignor
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 _DRAWN = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
 _LOADED = 1500  # [ms] until meshes are on the page
+_LARGEST = 16384  # pixels along an edge
 _COLORS = 128  # of a GIF
 
 
@@ -63,7 +65,7 @@ def save_video(
         ValueError: another kind of file, a motion without a duration, or an argument out of range.
         OSError: the file cannot be written.
     """
-    target = Path(path)
+    target = checks.path("save_video(path)", path)
     checks.one_of("save_video(path): ending", target.suffix, (".mp4", ".gif"))
     checks.number("save_video(rate=...)", rate, above=0.0)
     checks.number("save_video(speed=...)", speed, above=0.0)
@@ -73,6 +75,8 @@ def save_video(
     m = motion(result, simulator)
     if not m.time[-1] > 0.0:
         raise ValueError("save_video(result): a motion of no duration; save_picture draws it")
+    count = float(m.time[-1]) * rate / speed
+    check_room("save_video(rate=..., speed=...): pictures", int(min(count, 1e300)), 3.0 * width * height)
     times = np.arange(0.0, m.time[-1] + 0.5 * speed / rate, speed / rate)
     write = _write_gif if target.suffix == ".gif" else _write_mp4
 
@@ -111,7 +115,7 @@ def save_picture(
     """
     from matplotlib.image import imsave
 
-    target = Path(path)
+    target = checks.path("save_picture(path)", path)
     checks.one_of("save_picture(path): ending", target.suffix, (".png",))
     m = motion(result, simulator)
     checks.number("save_picture(time=...)", time, at_least=0.0)
@@ -135,7 +139,10 @@ def _sizes(call: str, given: Any) -> tuple[int, int]:
     """Width and height in pixels."""
     if not hasattr(given, "__len__") or len(given) != 2:
         raise ValueError(f"{call}: expected (width, height), got {given!r}")
-    return whole_number(call, given[0]), whole_number(call, given[1])
+    width, height = whole_number(call, given[0]), whole_number(call, given[1])
+    if max(width, height) > _LARGEST:
+        raise ValueError(f"{call}: expected at most {_LARGEST} pixels, as browsers draw, got {given!r}")
+    return width, height
 
 
 def _frames(m: Motion, times: Any, size: tuple[int, int]) -> Iterator[Pixels]:

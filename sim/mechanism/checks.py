@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from math import isfinite
+from os import PathLike, fspath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -138,6 +140,16 @@ def name(call: str, value: Any) -> str:
     if not isinstance(value, str) or not value:
         raise ValueError(f"{call}: expected a name, got {shown(value)}")
     return value
+
+
+def path(call: str, value: Any) -> Path:
+    """`value` as the path of a file."""
+    text = fspath(value) if isinstance(value, str | PathLike) else value
+    if not isinstance(text, str):
+        raise TypeError(f"{call}: expected the path of a file, got {shown(value)}")
+    if not text or "\0" in text:
+        raise ValueError(f"{call}: expected the path of a file, got {shown(value)}")
+    return Path(text)
 
 
 def one_of(call: str, value: Any, known: Iterable[str]) -> str:

@@ -61,7 +61,7 @@ def start_pace(data: Data, settings: Vector) -> None:
 @kernel
 def is_due(data: Data, effort: float) -> bool:
     """Whether it is time to go back to Python, after a step of that effort: its iterations, and columns solved for."""
-    data.pace[Pace.EFFORT] += effort
+    data.pace[Pace.EFFORT] += effort + 1.0  # robots at rest take no iterations
     if data.pace[Pace.EFFORT] < _LOOK:
         return False
     data.pace[Pace.EFFORT] = 0.0

@@ -47,6 +47,7 @@ _LEAST_PRESSING = 1e-6  # [m/s, rad/s] accuracy: shorter impacts would round vel
 _LEAST_KAPPA = 1e-13  # [N s m]
 _CONVERGED = 1e-6  # tolerance of steps with loops or gears, in accuracies
 _ROWS = 256  # sub-steps between two pauses
+_MOST = 1_000_000  # sub-steps of a step: an input is not held for ever
 
 Held = tuple[Vector, Cube]  # input (nu,) and external wrenches (1 or 0, nbody, 6) of a step
 
@@ -126,12 +127,16 @@ class AdaptiveEngine(KnotEngine):
         line.clock[[Clock.SHORT_RATIO, Clock.LONG_RATIO]] = 1.0
         line.clock[[Clock.LEAST, Clock.CUT, Clock.IMPACT]] = inf
         line.slips[:], line.contacts[:] = BEGINS, 0.0
-        works, rows, status = self._scratch.tables(2), [], int(Status.SOLVED)
+        works, rows, status, taken = self._scratch.tables(2), [], int(Status.SOLVED), 0
         for _ in pieces(settings, 2):
             status = int(go_on(models, works, settings, goal, errors, line))
             n = int(line.taken[0])
             rows.append((line.starts[:n].copy(), line.lengths[:n].copy(), line.orders[:n].copy()))
             if status != Status.SOLVED or line.clock[Clock.TIME] >= end:
+                break
+            taken += n
+            if taken > _MOST:
+                status = int(Status.MAX_ITERATIONS)
                 break
         line.report[0], line.report[4] = status, -1.0
         contacts = self._kept.contacts = line.contacts.copy()

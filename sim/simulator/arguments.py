@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,14 @@ from sim.integrators.feedback import FeedbackLaw
 from sim.integrators.rollout import UNIT
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
-from sim.simulator.engine import Engine
+from sim.mechanism.memory import check_room
+from sim.simulator.engine import CONTACT, REPORT, Engine
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
 
 _FLOAT = np.dtype(np.float64)
+_MANY = 10_000  # rows whose memory is looked at
 
 
 def is_plain(value: Any, shape: tuple[int, ...]) -> bool:
@@ -78,8 +81,23 @@ class Arguments:
         return rows[0], rows[1], lead
 
     def inputs(self, method: str, name: str, u: ArrayLike, shape: tuple[int | str | None, ...]) -> Floats:
-        """Inputs of the given shape."""
+        """Inputs of the given shape; refused where the results of so many rows do not fit the memory."""
+        rows = checks.shape(f"Simulator.{method}({name})", u)[:-1]
+        if prod(rows) > _MANY:
+            slopes = self._engine.ndx * (self._engine.ndx + self.nu) if method.startswith("linearize") else 0
+            self.check_room(method, name, prod(rows), slopes)
         return checks.array(f"Simulator.{method}({name})", u, shape)
+
+    def steps(self, method: str, steps: int | None) -> int:
+        """A number of steps whose results fit the memory."""
+        number = checks.whole_number(f"Simulator.{method}(steps=...)", steps)
+        self.check_room(method, "steps=...", number, 0)
+        return number
+
+    def check_room(self, method: str, name: str, rows: int, slopes: int) -> None:
+        """Refuse more steps than the memory holds: states, inputs, reports, contacts and derivatives."""
+        each = self.nx + self.nu + REPORT + CONTACT * self._engine.sizes.ncontact + slopes
+        check_room(f"Simulator.{method}({name})", rows, 8.0 * each, "go on from the last state of shorter parts")
 
     def kappa(self, method: str, kappa: float | None) -> float | None:
         """A positive kappa, or None for that of the simulator."""

@@ -129,7 +129,8 @@ class DividingEngine(Engine):
         end = self.intervals.from_part(last, part)
         if end is not None:
             return Divided(engine, rolled, end, 1.0)
-        return None if derivatives else Divided(engine, rolled, *self.intervals.slowed(last, part))
+        slowed = None if derivatives else self.intervals.slowed(last, part)
+        return None if slowed is None else Divided(engine, rolled, *slowed)
 
     def interval(self, x: Vector) -> float:
         """That of the velocity of the state x [s]."""

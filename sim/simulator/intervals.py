@@ -93,29 +93,30 @@ class Intervals:
         found = self.state(self._h, P, x)
         return None if found is None or self.of_one(found) < self._h else found
 
-    def slowed(self, x: Vector, part: float) -> tuple[Vector, float]:
+    def slowed(self, x: Vector, part: float) -> tuple[Vector, float] | None:
         """(state, share s) nearest to x, a state of parts, where no state has its momentum p:
 
             P_s = P_0 + M v_r + s (P - P_0 - M v_r)
 
         P_0: of the forces at rest, v_r: the motion of the floating bodies with all other joints locked that has their
         momentum. So the momentum of everything is that of x, and the energy of the bodies against each other is
-        s^2 of theirs: as in an impact that is not elastic.
+        s^2 of theirs: as in an impact that is not elastic. None where even v_r has no state: it turns by half a turn.
         """
         q = x.copy()
         q[-self._engine.sizes.nv :] = 0.0
         rest, P = self.momentum(self._h, q), self.momentum(part, x)
         locked = self._locked(x, P - rest)
         state = self.state(self._h, rest + locked[0], np.concatenate([x[: -len(P)], locked[1]]))
-        share, step = 0.0, 0.25
-        found = q if state is None else state
+        if state is None:
+            return None
+        found, share, step = state, 0.0, 0.25
         while step > _FINEST:
             ahead = self.state(self._h, rest + locked[0] + (share + step) * (P - rest - locked[0]), found)
             if ahead is None or self.of_one(ahead) < self._h or share + step > 1.0:
                 step *= 0.5
             else:
                 found, share = ahead, share + step
-        return found, share if state is not None else 0.0
+        return found, share
 
     def _locked(self, x: Vector, p: Vector) -> tuple[Vector, Vector]:
         """(M v_r, v_r): the roots that float move with the momentum p, everything else with them."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Mapping
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.archive import VERSION, Arrays, packed_part, part_of
+from sim.simulator.npz_file import check_head, check_shapes, read_npz, reading
 
 Floats = NDArray[np.float64]
 
-__all__ = ["archived", "export", "joint_trajectory", "opened", "restored"]
+__all__ = ["archived", "contact_rows", "export", "joint_trajectory", "opened", "restored"]
 
 _SETTINGS = (
     "time_step",
@@ -63,18 +64,13 @@ def opened(call: str, path: str | PathLike[str], kind: str) -> tuple[dict[str, A
         OSError: the file cannot be read.
         ValueError: it is another file, or of a later version.
     """
-    added = Path(f"{path}.npz")
-    file = added if not Path(path).exists() and added.exists() else path
-    try:
-        with np.load(file, allow_pickle=False) as data:
-            arrays = {name: data[name] for name in data.files}
-        head = json.loads(str(arrays.pop("meta")))
-    except (KeyError, ValueError) as error:
-        raise ValueError(f"{call}: {path} is no {kind} of dojo-opt") from error
+    with reading(call, path, kind):
+        head, arrays = read_npz(call, path)
+        version = int(head.pop("version", 0))
     form = head.pop("format", f"dojo-opt {kind}")
     if form != f"dojo-opt {kind}":
         raise ValueError(f"{call}: {path} is a {form!r}, expected a {kind}")
-    if head.pop("version", 0) > VERSION:
+    if version > VERSION:
         raise ValueError(f"{call}: {path} was written by a later version of dojo-opt")
     return head, arrays
 
@@ -101,6 +97,31 @@ def restored(head: dict[str, Any], arrays: dict[str, Any]) -> Any:
     return sim
 
 
+def contact_rows(sim: Any, head: Mapping[str, Any], arrays: Arrays) -> Arrays:
+    """Check the archive of a trajectory.
+
+    Args:
+        sim: its simulator.
+        head: the rest of its head.
+        arrays: its arrays by name; those of contacts are taken out.
+
+    Returns:
+        The arrays of contacts by name.
+
+    Raises:
+        ValueError: an entry or an array is missing, or does not fit.
+    """
+    check_head(head, {"status": int, "knot": int, "residual": float, "detail": str})
+    steps, row = head["knot"], (head["knot"], sim.ncontact)
+    shapes: dict[str, tuple[int | None, ...]] = {"x": (steps + 1, sim.nx), "u": (steps, sim.nu), "time": (steps + 1,)}
+    shapes |= dict.fromkeys(("iterations", "substeps", "shares", "errors"), (steps,))
+    shapes |= {"contact_gap": row, "contact_slip": row}
+    shapes |= dict.fromkeys(("contact_impulse", "contact_point", "contact_normals"), (*row, 3))
+    shapes |= {"wrenches": (steps, sim.nbody, 6)} if "wrenches" in arrays else {}
+    check_shapes(arrays, shapes)
+    return {name.removeprefix("contact_"): arrays.pop(name) for name in list(arrays) if name.startswith("contact_")}
+
+
 def export(call: str, path: str | PathLike[str], sim: Any, time: Floats, x: Floats, u: Floats) -> None:
     """Write a motion for other tools: .csv, .npz, or .json, a joint trajectory.
 
@@ -116,7 +137,7 @@ def export(call: str, path: str | PathLike[str], sim: Any, time: Floats, x: Floa
         OSError: the file cannot be written.
         ValueError: for another suffix.
     """
-    target = Path(path)
+    target = checks.path(call, path)
     kind = checks.one_of(f"{call}: suffix of the path", target.suffix, (".csv", ".npz", ".json"))
     if kind == ".json":
         target.write_text(json.dumps(joint_trajectory(sim, time, x, u)) + "\n", encoding="utf-8")

@@ -6,7 +6,6 @@ an unsolved step are zero; taking them out of their result, by unpacking or by n
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -23,7 +22,8 @@ from sim.integrators.feedback import Path
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr, drawn
 from sim.mechanism.mechanism import Mechanism
-from sim.simulator.motion_file import archived, export, opened, restored
+from sim.simulator.motion_file import archived, contact_rows, export, opened, restored
+from sim.simulator.npz_file import reading, write_npz
 from solvers.status import MESSAGES, Status
 from solvers.types import Integers
 
@@ -260,13 +260,12 @@ class Trajectory(Result):
         """
         head, arrays = archived(self.simulator, "trajectory")
         plain = {"status": int(self.status), "knot": self.knot, "residual": self.residual, "detail": self.detail}
-        arrays |= {
-            name: getattr(self, name) for name in ("x", "u", "time", "iterations", "substeps", "shares", "errors")
-        }
+        names = ("x", "u", "time", "iterations", "substeps", "shares", "errors")
+        arrays |= {name: getattr(self, name) for name in names}
         rows = {name: getattr(self.contacts, name) for name in ("impulse", "point", "gap", "slip", "normals")}
         arrays |= {f"contact_{name}": array for name, array in rows.items()}
         arrays |= {} if self.wrenches is None else {"wrenches": self.wrenches}
-        np.savez(path, allow_pickle=False, meta=json.dumps(head | plain), **arrays)
+        write_npz("Trajectory.save(path)", path, head | plain, arrays)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Trajectory:
@@ -282,12 +281,13 @@ class Trajectory(Result):
             OSError: the file cannot be read.
             ValueError: it is another file, or of a later version.
         """
-        head, arrays = opened("Trajectory.load", path, "trajectory")
-        sim = restored(head, arrays)
-        rows = {name.removeprefix("contact_"): arrays.pop(name) for name in list(arrays) if name.startswith("contact_")}
-        contacts = Contacts(sim.mechanism.contact_names, time_step=sim.time_step, **rows)
-        status = Status(head.pop("status"))
-        return cls(simulator=sim, status=status, contacts=contacts, **head, **arrays)
+        call = "Trajectory.load"
+        head, arrays = opened(call, path, "trajectory")
+        with reading(call, path, "trajectory"):
+            sim = restored(head, arrays)
+            rows = contact_rows(sim, head, arrays)
+            contacts = Contacts(sim.mechanism.contact_names, time_step=sim.time_step, **rows)
+            return cls(simulator=sim, status=Status(head.pop("status")), contacts=contacts, **head, **arrays)
 
     def export(self, path: str | PathLike[str]) -> None:
         """Write the motion for other tools.

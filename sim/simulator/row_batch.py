@@ -17,6 +17,7 @@ from sim.integrators.batch import BatchBuffers, RowTables, linearize_rows, roll_
 from sim.integrators.rollout import Linearized, MotionBuffers
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
+from sim.mechanism.memory import room_for
 from sim.model.pace import DEADLINE, pieces
 from sim.simulator.engine import DIVISIBLE, REPORT, Division, Engine, finite_rows, refuse
 from sim.simulator.results import Result, ended
@@ -325,7 +326,7 @@ class RowStepping(StateSpace):
         count = len(inputs)
         given: Any = X if quick else checks.array(f"{call}(X)", X, (count, self.nx))
         states = self._arguments.states(f"{call}(X)", given)
-        steps = checks.whole_number(f"{call}(substeps=...)", substeps)
+        steps = room_for(f"{call}(substeps=...)", substeps, 8.0 * (self.nx + self.nu) * max(count, 1))
         if count == 1 and kappa is None and not parameters and not derivatives and self.has_single_rows:
             return ended(self.single_row(steps).step(states, inputs), throw)
         kappas = np.full(count, np.nan)

@@ -13,6 +13,7 @@ from sim.integrators.rollout import REFUSED
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.memory import room_for
 from sim.simulator.arguments import is_plain
 from sim.simulator.contact_settings import with_contacts
 from sim.simulator.engine import REPORT, Rolled
@@ -203,7 +204,7 @@ class Simulator(RowStepping):
             return sim.rollout(x, us, steps=steps, throw=throw, wrenches=wrenches)
         state = self._arguments.state("rollout", x)
         if callable(us):
-            count = whole_number("Simulator.rollout(steps=...)", steps)
+            count = self._arguments.steps("rollout", steps)
             external = self._arguments.wrenches("rollout", wrenches, count)
             policy = us
             asked = carried(
@@ -212,7 +213,7 @@ class Simulator(RowStepping):
             )
             return ended(asked, throw)
         if us is None:
-            inputs = np.zeros((whole_number("Simulator.rollout(steps=...)", steps), self.nu))
+            inputs = np.zeros((self._arguments.steps("rollout", steps), self.nu))
         else:
             inputs = self._arguments.inputs("rollout", "us", us, ("T" if steps is None else steps, self.nu))
         external = self._arguments.wrenches("rollout", wrenches, len(inputs))
@@ -375,13 +376,9 @@ class Simulator(RowStepping):
             Horizon with its buffers.
         """
         call = "Simulator.horizon"
-        return Horizon(
-            self._engine.whole(),
-            self._arguments,
-            whole_number(f"{call}(knots=...)", knots),
-            whole_number(f"{call}(substeps=...)", substeps),
-            self._arguments.limits(call, limits),
-        )
+        size = room_for(f"{call}(knots)", knots, 8.0 * self.ndx * (self.ndx + 2 * self.nu + 1))
+        steps, bounds = whole_number(f"{call}(substeps=...)", substeps), self._arguments.limits(call, limits)
+        return Horizon(self._engine.whole(), self._arguments, size, steps, bounds)
 
     # -- derivatives ---------------------------------------------------------------------------------------------------
 

@@ -181,3 +181,23 @@ def test_pieces_change_no_bit(sim: Any, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(pace, "_ROWS", 1)
     for found, expected in zip(results(), whole, strict=True):
         np.testing.assert_array_equal(found, expected)
+
+
+RESTS = {
+    "rollout": lambda sim: sim.rollout(sim.neutral(), steps=1000),
+    "closed loop with many substeps": lambda sim: sim.closed_loop(sim.neutral(), inputs(sim, 1), substeps=1000),
+    "batch": lambda sim: sim.rollout_batch(rows(sim, 1), np.zeros((1, 1000, sim.nu))),
+}
+
+
+@pytest.mark.parametrize("name", RESTS)
+def test_a_robot_at_rest_whose_steps_take_no_iterations_goes_back_to_python(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sim = dojo.Simulator(dojo.models.pendulum(), 0.01)
+    assert sim.step(sim.neutral()).iterations == 0
+    begun, real = [], pace._pieces
+    monkeypatch.setattr(pace, "PAUSE", 0.0)
+    monkeypatch.setattr(pace, "_pieces", lambda settings: (begun.append(1) for _ in real(settings)))
+    assert RESTS[name](sim).success
+    assert len(begun) > 10

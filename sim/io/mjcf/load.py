@@ -154,7 +154,7 @@ def _compile(source: str | Path) -> tuple[Any, str]:
     except ImportError as error:
         raise ImportError('load_mjcf needs MuJoCo: pip install "dojo-opt[mjcf]"') from error
     text = isinstance(source, str) and source.lstrip().startswith("<")
-    if not text and not Path(source).is_file():
+    if not text and not checks.path("load_mjcf(source)", source).is_file():
         raise FileNotFoundError(f"load_mjcf: no file {str(source)!r}")
     try:
         if text:

@@ -96,7 +96,7 @@ def load_urdf(
             and joints if the robot cannot be simulated.
         OSError: the file does not exist.
     """
-    file, notes = Path(path), Notes()
+    file, notes = checks.path("load_urdf(path)", path), Notes()
     root = parse(file)
     robot = read_robot(root, notes)
     folders = [Path(folder) for folder in ([mesh_dirs] if isinstance(mesh_dirs, str | Path) else mesh_dirs)]
