@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.identification.normal_equations import NormalEquations
 from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.identification.windows import Predictor, Window, WindowErrors, cut_windows
 from dojo_opt.planning.executors import check_executor, results_in_order
@@ -174,10 +175,10 @@ class _Fit:
             sim = self.space.simulator(theta).replace(kappa=kappa)
         except ValueError:
             return None
-        predict = self.predictor.predict
-        return [
-            predict(sim, theta, w, s, kappa, slopes) for w, s in zip(self.windows, starts, strict=True)
-        ]  # fmt: skip
+        if not slopes:
+            return self.predictor.errors(sim, self.windows, starts)
+        predict, chain = self.predictor.predict, self.space.slopes(theta)
+        return [predict(sim, chain, w, s, kappa) for w, s in zip(self.windows, starts, strict=True)]
 
     def weigh(self, found: list[WindowErrors], usable: list[bool]) -> tuple[float, list[Floats], float]:
         """(cost, weights of the states of each window, share of outliers)."""
@@ -202,30 +203,11 @@ class _Fit:
         self.share = max(1.0, cost / max(values, 1))
         return cost + self.pull(self.theta)
 
-    def system(
-        self, found: list[WindowErrors], weights: list[Floats], damping: float
-    ) -> tuple[Floats, Floats, list[Any]]:
-        """(matrix, right side) of the parameters over their units, and the terms from which the starts follow."""
-        n, kept = len(self.theta), []
-        H, g = np.zeros((n, n)), np.zeros(n)
-        for w, weight in zip(found, weights, strict=True):
-            rows = np.repeat(np.sqrt(weight), w.errors.shape[1])
-            r = rows * w.errors.ravel()
-            S = rows[:, None] * w.by_start.reshape(len(r), -1)
-            P = rows[:, None] * w.by_theta.reshape(len(r), -1) * self.unit
-            Hss = S.T @ S
-            Hss += np.diag(damping * np.diag(Hss) + 1e-12 * max(np.trace(Hss), 1e-12))
-            back = np.linalg.solve(Hss, np.column_stack([S.T @ P, S.T @ r]))
-            H += P.T @ P - (P.T @ S) @ back[:, :-1]
-            g += P.T @ r - (P.T @ S) @ back[:, -1]
-            kept.append(back)
-        return H, g, kept
-
-    def step(self, found: list[WindowErrors], weights: list[Floats], damping: float) -> tuple[Floats, list[Floats]]:
-        """New parameters, within their bounds, and starts."""
-        H, g, kept = self.system(found, weights, damping)
-        H = H + np.diag(self.share * self.prior.precision * self.unit**2)
-        g = g + self.share * self.prior.precision * (self.theta - self.prior.mean) * self.unit
+    def step(self, equations: NormalEquations, damping: float) -> tuple[Floats, list[Floats], float]:
+        """New parameters, within their bounds, new starts, and the decrease of the cost in the linear model."""
+        H, g, back = equations.reduced(damping)
+        H += self.share * np.diag(self.prior.precision * self.unit**2)
+        g += self.share * self.prior.precision * (self.theta - self.prior.mean) * self.unit
         low, high = (self.space.low - self.theta) / self.unit, (self.space.high - self.theta) / self.unit
         H = H + np.diag(damping * np.diag(H) + 1e-14 * max(np.trace(H), 1e-14))
         free = np.ones(len(g), dtype=np.bool_)
@@ -239,8 +221,9 @@ class _Fit:
             d = np.where(out, np.clip(d, low, high), d)
             free &= ~out
         theta = np.clip(self.theta + self.unit * d, self.space.low, self.space.high)
-        moves = np.array([-(back[:, -1] + back[:, :-1] @ d) for back in kept])
-        return theta, list(self.base.integrate(np.array(self.starts), moves))
+        moves = -(back[:, :, -1] + back[:, :, :-1] @ d)
+        promised = self.pull(self.theta) - self.pull(theta) - equations.change(d, moves)
+        return theta, list(self.base.integrate(np.array(self.starts), moves)), promised
 
 
 @dataclass(frozen=True)
@@ -372,9 +355,11 @@ def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history:
     for _ in range(o.max_iterations):
         if data <= _EXACT * sum(w.errors.size for w in found):
             return Status.SOLVED
-        accepted, gain = False, 0.0
+        accepted, gain, equations = False, 0.0, NormalEquations(found, weights, fit.unit)
         while damping < _LARGEST and not accepted:
-            theta, starts = fit.step(found, weights, damping)
+            theta, starts, promised = fit.step(equations, damping)
+            if promised <= o.tolerance * cost:  # no step that is short enough brings more
+                return Status.SOLVED
             trial = fit.errors(theta, starts, kappa, slopes=False)
             if trial is not None and all(t.solved or not use for t, use in zip(trial, usable, strict=True)):
                 ahead = fit.weigh(trial, usable)[0] + fit.pull(theta)
@@ -414,7 +399,7 @@ def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str,
     found = fit.errors(fit.theta, fit.starts, kappa, slopes=True) or []
     usable = [w.solved for w in found]
     cost, weights, far = fit.weigh(found, usable)
-    H, _, _ = fit.system(found, weights, 0.0)
+    H = NormalEquations(found, weights, fit.unit).reduced(0.0)[0]
     count = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
     free = count - n - sum(usable) * fit.base.ndx
     variance = max(cost / max(free, 1), 1e-30)

@@ -136,6 +136,27 @@ class ParameterSpace:
             parts.append(block @ group.chart(at[group.columns])[1])
         return np.concatenate(parts, axis=-1)
 
+    def slopes(self, theta: ArrayLike) -> Floats:
+        """Derivatives of the parameters `wrt`, with all their components in this order, by theta.
+
+        Args:
+            theta: (n,) the vector.
+
+        Returns:
+            (m, n) derivatives.
+
+        Raises:
+            ValueError: for a wrong shape.
+        """
+        at = checks.array("ParameterSpace.slopes(theta)", theta, self.values.shape)
+        blocks = [group.chart(at[group.columns])[1] for group in self._groups]
+        out = np.zeros((sum(len(block) for block in blocks), len(at)))
+        first = 0
+        for group, block in zip(self._groups, blocks, strict=True):
+            out[first : first + len(block), group.columns] = block
+            first += len(block)
+        return out
+
     def _append(self, names: Sequence[str], chart: Chart, rows: Mapping[str, tuple[float, float, float]]) -> None:
         """Coordinates (value, low, high) by their labels."""
         first = len(self._rows)

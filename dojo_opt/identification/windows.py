@@ -111,32 +111,37 @@ class Predictor:
         last = len(window.u)
         return np.unique(np.r_[0 : last + 1 : self._every, last])
 
-    def predict(
-        self, sim: Simulator, theta: Floats, window: Window, start: Floats, kappa: float, slopes: bool
-    ) -> WindowErrors:
-        """Errors of a window from a start (nx,), and with `slopes` their derivatives."""
-        rows, ndx, n = self.steps(window), sim.ndx, len(theta)
-        if slopes:
-            xs, line = sim.linearize_rollout(start, window.u, kappa, self._space.wrt)
-            solved = not np.any(line.status)
-        else:
-            found = sim.rollout_batch(start[None], window.u[None])
-            xs, solved = found.x[0], found.status[0] == Status.SOLVED
-        errors = sim.difference(xs[rows], window.x[rows])
-        scaled = errors[:, self.measured] * self._scale
-        if not slopes:
-            return WindowErrors(scaled, np.zeros((0, 0, ndx)), np.zeros((0, 0, n)), solved)
-        moved = self._moved(line, rows, theta)
-        slope = difference_slopes(self._layout(sim), errors) @ moved
-        slope = slope[:, self.measured] * self._scale[:, None]
-        return WindowErrors(scaled, slope[..., :ndx], slope[..., ndx:], solved)
+    def errors(self, sim: Simulator, windows: Sequence[Window], starts: Sequence[Floats]) -> list[WindowErrors]:
+        """Errors of windows from their starts (nx,), without derivatives; windows of one length are one batch."""
+        ndx, n = sim.ndx, len(self._space.values)
+        lengths = [len(window.u) for window in windows]
+        out: dict[int, WindowErrors] = {}
+        for length in sorted(set(lengths)):
+            some = [i for i, one in enumerate(lengths) if one == length]
+            found = sim.rollout_batch(np.array([starts[i] for i in some]), np.array([windows[i].u for i in some]))
+            rows = self.steps(windows[some[0]])
+            gaps = sim.difference(found.x[:, rows], np.array([windows[i].x[rows] for i in some]))
+            for i, gap, status in zip(some, gaps, found.status, strict=True):
+                scaled, solved = gap[:, self.measured] * self._scale, bool(status == Status.SOLVED)
+                out[i] = WindowErrors(scaled, np.zeros((0, 0, ndx)), np.zeros((0, 0, n)), solved)
+        return [out[i] for i in range(len(windows))]
 
-    def _moved(self, line: Linearization, rows: Integers, theta: Floats) -> Floats:
+    def predict(self, sim: Simulator, chain: Floats, window: Window, start: Floats, kappa: float) -> WindowErrors:
+        """Errors of a window from a start (nx,), with their derivatives; chain: slopes of the space at theta."""
+        rows, ndx = self.steps(window), sim.ndx
+        xs, line = sim.linearize_rollout(start, window.u, kappa, self._space.wrt)
+        solved = not np.any(line.status)
+        errors = sim.difference(xs[rows], window.x[rows])
+        slope = difference_slopes(self._layout(sim), errors) @ self._moved(line, rows, chain)
+        slope = slope[:, self.measured] * self._scale[:, None]
+        return WindowErrors(errors[:, self.measured] * self._scale, slope[..., :ndx], slope[..., ndx:], solved)
+
+    def _moved(self, line: Linearization, rows: Integers, chain: Floats) -> Floats:
         """(len(rows), ndx, ndx + n) derivatives of the states at some steps by the start and by theta."""
         ndx = line.A.shape[1]
-        blocks = {name: np.asarray(block) for name, block in line.parameters.items()}
-        by_parameters = np.concatenate([*blocks.values(), np.zeros((len(line.A), ndx, 0))], axis=2)
-        width = ndx + by_parameters.shape[2]
+        blocks = [np.asarray(line.parameters[name]) for name in self._space.wrt]
+        by_theta = np.concatenate(blocks, axis=2) @ chain
+        width = ndx + by_theta.shape[2]
         slope, moved = np.eye(ndx, width), np.empty((len(rows), ndx, width))
         k = 0
         for t in range(len(line.A) + 1):
@@ -144,7 +149,5 @@ class Predictor:
                 moved[k], k = slope, k + 1
             if t < len(line.A):
                 slope = line.A[t] @ slope
-                slope[:, ndx:] += by_parameters[t]
-        ends = np.cumsum([ndx, *(block.shape[2] for block in blocks.values())])
-        compared = {name: moved[..., i:j] for name, i, j in zip(blocks, ends[:-1], ends[1:], strict=True)}
-        return np.concatenate([moved[..., :ndx], self._space.chain(theta, compared)], axis=2)
+                slope[:, ndx:] += by_theta[t]
+        return moved

@@ -6,9 +6,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
 import dojo_opt as dojo
-from dojo_opt.identification.windows import difference_slopes
+from dojo_opt.identification.normal_equations import NormalEquations
+from dojo_opt.identification.windows import Predictor, WindowErrors, cut_windows, difference_slopes
 
 
 def _arm(damper=0.3, mass=1.0):
@@ -140,3 +142,38 @@ def test_a_quadruped_finds_payload_friction_and_damping_in_its_own_log():
     assert np.all(np.abs(found.start - values) > 0.1 * values)
     np.testing.assert_array_less(np.abs(found.values - values), 4.0 * found.deviation)
     np.testing.assert_array_less(found.deviation, 0.1 * values)
+
+
+def test_starts_are_eliminated_from_the_normal_equations():
+    """The reduced step is that of least squares over parameters and starts together, and its change of the squares."""
+    rng, n, ndx = np.random.default_rng(3), 3, 2
+    found = [WindowErrors(*(rng.standard_normal((m, 2, *k)) for k in ((), (ndx,), (n,))), True) for m in (4, 6)]
+    weights = [rng.uniform(0.5, 1.0, len(w.errors)) for w in found]
+    unit = np.array([0.1, 1.0, 20.0])
+    equations = NormalEquations(found, weights, unit)
+    H, g, back = equations.reduced(0.0)
+    d = -np.linalg.solve(H, g)
+    moves = -(back[:, :, -1] + back[:, :, :-1] @ d)
+
+    rows = [np.repeat(np.sqrt(weight), 2) for weight in weights]
+    r = np.concatenate([row * w.errors.ravel() for row, w in zip(rows, found, strict=True)])
+    P = np.vstack([row[:, None] * w.by_theta.reshape(-1, n) * unit for row, w in zip(rows, found, strict=True)])
+    S = block_diag(*(row[:, None] * w.by_start.reshape(-1, ndx) for row, w in zip(rows, found, strict=True)))
+    wanted = np.linalg.lstsq(np.hstack([P, S]), -r, rcond=None)[0]
+    np.testing.assert_allclose(np.r_[d, moves.ravel()], wanted, atol=1e-9)
+    after = np.sum((r + P @ d + S @ moves.ravel()) ** 2)
+    assert equations.change(d, moves) == pytest.approx(after - r @ r)
+
+
+def test_windows_of_all_lengths_are_predicted_in_batches():
+    """As one by one; the errors come back in the order of the windows."""
+    sim = _arm()
+    space = dojo.ParameterSpace(sim, ("damper", "mass"))
+    windows = cut_windows(sim, _motions(sim, np.random.default_rng(4), np.array([0.01, 0.05])), 15)
+    assert {len(window.u) for window in windows} == {15, 10}
+    predictor, starts = Predictor(space, np.array([0.01, 0.05]), 2), [window.x[0] for window in windows]
+    chain = space.slopes(space.values)
+    for window, start, one in zip(windows, starts, predictor.errors(sim, windows, starts), strict=True):
+        slow = predictor.predict(sim, chain, window, start, sim.kappa)
+        np.testing.assert_allclose(one.errors, slow.errors, atol=1e-9)
+        assert one.solved and slow.solved

@@ -86,6 +86,8 @@ def test_derivatives_by_coordinates() -> None:
     check_jacobian(stepped, J @ directions.T, np.zeros(4), np.add)
     xs, line = sim.linearize_rollout(x, np.zeros((3, sim.nu)), wrt=space.wrt)
     np.testing.assert_allclose(space.chain(theta, line.parameters)[0], J, atol=1e-9 * np.abs(J).max())
+    blocks = np.concatenate([line.parameters[name] for name in space.wrt], axis=2)
+    np.testing.assert_allclose((blocks @ space.slopes(theta))[0], J, atol=1e-9 * np.abs(J).max())
     loss = np.zeros((4, sim.ndx))
     loss[1] = np.random.default_rng(2).normal(size=sim.ndx)
     gradient = space.chain(theta, sim.vjp((xs, np.zeros((3, sim.nu))), loss, wrt=space.wrt))
