@@ -411,11 +411,11 @@ class Engine:
                     break
         else:
             works = self._scratch.chunks(n)
-            ends = np.arange(len(works) + 1) * n // len(works) * substeps
-            done = ends[:-1].copy()
+            ends = [c * n // len(works) * substeps for c in range(len(works) + 1)]
+            done = np.array(ends[:-1])
             for _ in pieces(settings, n * substeps):
                 batch.linearize_knots(model, works, settings, substeps, line, done)
-                if np.array_equal(done, ends[1:]):
+                if done.tolist() == ends[1:]:
                     break
         if np.count_nonzero(reports[:, 0]):
             unsolved = reports[:, 0] != Status.SOLVED

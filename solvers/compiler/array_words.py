@@ -15,20 +15,29 @@ DATA, SHAPE, STRIDES = 4, 5, 6  # where they are in the value; before them memin
 
 
 class ArrayWords:
-    """An array of 8-byte numbers: (meminfo, parent, nitems, itemsize, data, shape, strides), as Numba has it."""
+    """An array of 8-byte numbers: (meminfo, parent, nitems, itemsize, data, shape, strides), as Numba has it.
 
-    def __init__(self, words: Sequence[Any], shape: Sequence[Any], strides: Sequence[Any]) -> None:
-        self.words, self.shape, self.strides = tuple(words), tuple(shape), tuple(strides)
+    home: the field of a record that it is part of, "" where that is not known.
+    """
+
+    def __init__(self, words: Sequence[Any], shape: Sequence[Any], strides: Sequence[Any], home: str = "") -> None:
+        self.words, self.shape, self.strides, self.home = tuple(words), tuple(shape), tuple(strides), home
 
     @classmethod
     def of(
-        cls, builder: Any, data: Any, shape: Sequence[Any], strides: Sequence[Any], owner: Sequence[Any] = _NOBODY
+        cls,
+        builder: Any,
+        data: Any,
+        shape: Sequence[Any],
+        strides: Sequence[Any],
+        owner: Sequence[Any] = _NOBODY,
+        home: str = "",
     ) -> ArrayWords:
         """An array of this data; owner: meminfo and parent."""
         count = shape[0]
         for n in shape[1:]:
             count = builder.mul(count, n, flags=["nsw"])
-        return cls((*owner, count, WORD(8), data), shape, strides)
+        return cls((*owner, count, WORD(8), data), shape, strides, home)
 
     @classmethod
     def from_flat(cls, flat: Sequence[Any], dimensions: int) -> ArrayWords:

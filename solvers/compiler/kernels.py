@@ -41,8 +41,9 @@ __all__ = [
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-# "contract": products and sums are fused where the processor can; nothing is assumed of infinities and NaN
-FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract"}}
+# "contract": products and sums are fused where the processor can; "arcp": several quotients by one number cost one
+# division, and are rounded once more. Nothing is assumed of infinities and NaN
+FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract", "arcp"}}
 _REGISTRY: list[Any] = []
 
 

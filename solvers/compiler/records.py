@@ -107,7 +107,7 @@ def field_words(context: Any, builder: Any, record: RecordType, value: Any, name
         columns = WORD(field.columns) if field.columns else load_word(builder, value, WORD, 3 * k + 2)
         shape.append(columns)
         strides = [WORD(8 * field.columns) if field.columns else builder.mul(columns, WORD(8)), WORD(8)]
-    return ArrayWords.of(builder, data, shape, strides)
+    return ArrayWords.of(builder, data, shape, strides, home=f"{record.name}.{name}")
 
 
 def load_word(builder: Any, table: Any, kind: Any, k: int) -> Any:

@@ -226,7 +226,9 @@ def test_numbers_are_finite_or_the_status_says_not(seed: int) -> None:
         assert np.isfinite(block).all()
     assert _numbers(sim.reactions(x, u))
     path = sim.rollout(x, u[None], throw=True)
-    for block in sim.vjp(path, np.ones((2, sim.ndx)), wrt=("state", "input", "mass")).values():
+    pulled = sim.vjp(path, np.ones((2, sim.ndx)), wrt=("state", "input", "mass"))
+    # it solves each step again, which may end elsewhere in the rounding of a step that took dozens of iterations
+    for block in pulled.values() if pulled.success else ():
         assert np.isfinite(block).all()
 
 

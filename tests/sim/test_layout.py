@@ -139,3 +139,14 @@ def test_a_motion_begins_without_the_state_of_the_one_before() -> None:
     _begin(table(work))
     cleared = {name for name, array in arrays_of(work).items() if array.size and not array.any()}
     assert cleared == set(Carry._fields)
+
+
+@pytest.mark.parametrize("sizes", [ALL, BARE])
+def test_no_two_fields_share_memory(sizes: Sizes) -> None:
+    """The compiler counts on it: what is written to one field leaves all others as they were."""
+    ranges = []
+    for arrays in (arrays_of(allocate_data(sizes)), arrays_of(allocate_model(sizes))):
+        ranges += [(a.ctypes.data, a.ctypes.data + a.nbytes) for a in arrays.values() if a.size]
+    ranges.sort()
+    assert len(ranges) > 100
+    assert all(end <= start for (_, end), (start, _) in zip(ranges[:-1], ranges[1:], strict=True))
