@@ -47,6 +47,7 @@ else
 fi
 measure chaos "$python" "$here/benchmarks/chaos.py" $quick --out "$out"  # on all cores: loops over them are a part
 export NUMBA_NUM_THREADS=1  # one core from here on, as the tables say
+measure cold_starts "$python" "$here/benchmarks/cold_starts.py" $quick --out "$out"
 measure robustness "$python" "$here/benchmarks/robustness.py" $quick --out "$out"
 measure attacks "$python" "$here/benchmarks/attacks.py" $quick --out "$out"
 measure division "$python" "$here/benchmarks/division.py" $quick --out "$out"

@@ -228,11 +228,16 @@ def _users() -> None:
     sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01)
     x = sim.neutral()
 
-    def angle(x: Any, u: Any, out: Any) -> None:
+    def residual(x: Any, u: Any, out: Any) -> None:
         out[0] = x[0]
 
-    (term,) = dojo.Problem(sim, x, 1, cost=dojo.cost.ResidualCost(angle, 1)).costs
+    def observation(x: Any, out: Any) -> None:
+        out[0] = x[0]
+
+    (term,) = dojo.Problem(sim, x, 1, cost=dojo.cost.ResidualCost(residual, 1)).costs
     term.expand(np.stack([x] * 2), np.zeros((1, 1)), np.zeros((2, 3)), np.zeros((2, 3, 3)))
+    task = dojo.learn.Task(sim, 1, observation, 1, lambda x, a, after: 0.0, -np.ones(1), np.ones(1), lambda rng: x)
+    task.observe(np.stack([x] * 2), slopes=True)
 
 
 def _mpc() -> None:
