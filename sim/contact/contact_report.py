@@ -10,7 +10,7 @@ from sim.model.columns import Bound
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.compiler import kernel, optional
+from solvers.compiler import inlined, optional
 from solvers.types import Matrix
 
 
@@ -35,7 +35,7 @@ def worst_contact(model: Model, data: Data, kappa: float) -> float:
     return worst
 
 
-@kernel
+@inlined
 def report_contacts(model: Model, data: Data, h: float, out: Matrix) -> None:
     """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3), after a step.
 
