@@ -34,7 +34,7 @@ from sim.integrators.landing import NEVER
 from sim.integrators.phases import leave, left_out, report_apart
 from sim.integrators.runge_kutta import advance
 from sim.integrators.runge_kutta import begin as begin_node
-from sim.integrators.stretch import Clock, Embedded, Stretch, keep, rest_contacts
+from sim.integrators.stretch import Clock, Embedded, Stretch, begin_stretch, keep, rest_contacts
 from sim.model.columns import Apart
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
@@ -199,6 +199,31 @@ def take_long(
 
 
 @kernel
+def attempt(
+    models: Table, works: Table, settings: Vector, goal: Vector, embedded: Embedded, line: Stretch
+) -> int:  # fmt: skip
+    """One attempt at the next sub-step, of order 8 or 2; the Status."""
+    clock = line.clock
+    rest = goal[2] - clock[Clock.TIME]
+    reach = 0.9 * stand(models, works, line, goal) if goal[5] > 0.0 else 0.0
+    long = min(clock[Clock.LONG], rest, reach)
+    if long < rest < 2.0 * long:
+        long = 0.5 * rest
+    short = min(clock[Clock.SHORT], clock[Clock.CUT], rest)
+    if clock[Clock.BEYOND] > 0.0:
+        short, long = min(clock[Clock.BEYOND], rest), 0.0
+    if short < rest < 2.0 * short and clock[Clock.BEYOND] == 0.0:
+        short = 0.5 * rest
+    if long >= min(0.5 * short, rest) and long > goal[3]:
+        status = take_long(models, works, goal, line, embedded, long)
+    else:
+        status = take_short(models, works, settings, goal, line, embedded, short)
+    if goal[2] - clock[Clock.TIME] < 1e-12 * goal[2]:
+        clock[Clock.TIME] = goal[2]
+    return status
+
+
+@kernel
 def go_on(
     models: Table, works: Table, settings: Vector, goal: Vector, embedded: Embedded, line: Stretch
 ) -> int:  # fmt: skip
@@ -208,26 +233,12 @@ def go_on(
     """
     data, clock = data_view(works[0]), line.clock
     start_pace(data, settings)
-    trees = goal[5] > 0.0
+    if clock[Clock.BEGUN] == 0.0:
+        begin_stretch(line, goal[2])
     line.taken[0] = 0
     while clock[Clock.TIME] < goal[2] and line.taken[0] < line.lengths.shape[0]:
-        rest = goal[2] - clock[Clock.TIME]
-        reach = 0.9 * stand(models, works, line, goal) if trees else 0.0
-        long = min(clock[Clock.LONG], rest, reach)
-        if long < rest < 2.0 * long:
-            long = 0.5 * rest
-        short = min(clock[Clock.SHORT], clock[Clock.CUT], rest)
-        if clock[Clock.BEYOND] > 0.0:
-            short, long = min(clock[Clock.BEYOND], rest), 0.0
-        if short < rest < 2.0 * short and clock[Clock.BEYOND] == 0.0:
-            short = 0.5 * rest
         effort = line.report[1]
-        if long >= min(0.5 * short, rest) and long > goal[3]:
-            status = take_long(models, works, goal, line, embedded, long)
-        else:
-            status = take_short(models, works, settings, goal, line, embedded, short)
-        if goal[2] - clock[Clock.TIME] < 1e-12 * goal[2]:
-            clock[Clock.TIME] = goal[2]
+        status = attempt(models, works, settings, goal, embedded, line)
         if status != _SOLVED:
             return status
         if is_due(data, line.report[1] - effort):

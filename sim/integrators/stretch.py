@@ -6,10 +6,12 @@ from enum import IntEnum
 from math import sqrt
 from typing import NamedTuple
 
-from sim.integrators.landing import NEVER, UNKNOWN
+from sim.integrators.landing import BEGINS, NEVER, UNKNOWN
 from solvers.compiler import kernel
-from solvers.dense import copy_vector
+from solvers.dense import clear, copy_vector
 from solvers.types import Cube, Integers, Matrix, Vector
+
+MOST = 1_000_000  # sub-steps of a stretch: an input is not held for ever
 
 
 class Clock(IntEnum):
@@ -30,6 +32,7 @@ class Clock(IntEnum):
     HIT = 12  # 1 where the step just tried has an impact
     AHEAD = 13  # time until the first contact of that step [s]
     IMPACT = 14  # longest length of a step with an impact
+    BEGUN = 15  # 0 before the first sub-step
 
 
 class Stretch(NamedTuple):
@@ -44,7 +47,7 @@ class Stretch(NamedTuple):
     half: Vector
     node: Vector  # (nx,) scratch: the node after the undivided step
     ahead: Vector  # (nx,) scratch: mean state of a step from there
-    clock: Vector  # (15,) in place
+    clock: Vector  # (16,) in place
     report: Vector  # (6,)
     parts: Cube  # (2, ncontact, 11) scratch
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the stretch
@@ -62,6 +65,23 @@ class Embedded(NamedTuple):
     third: Vector
     rate: Vector  # (nv,) scratch
     distance: Vector  # (nv,)
+
+
+@kernel
+def begin_stretch(line: Stretch, end: float) -> None:
+    """A new stretch from line.x: lengths as long as it are the first to be tried."""
+    clear(line.contacts)
+    clock = line.clock
+    for k in range(clock.shape[0]):
+        clock[k] = 0.0
+    for k in range(line.report.shape[0]):
+        line.report[k] = 0.0
+    clock[Clock.SHORT] = clock[Clock.LONG] = end
+    clock[Clock.SHORT_RATIO] = clock[Clock.LONG_RATIO] = 1.0
+    clock[Clock.LEAST] = clock[Clock.CUT] = clock[Clock.IMPACT] = NEVER
+    clock[Clock.BEGUN] = 1.0
+    for c in range(line.slips.shape[0]):
+        line.slips[c] = BEGINS
 
 
 @kernel

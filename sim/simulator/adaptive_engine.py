@@ -9,7 +9,6 @@ are rounded. Joints are not released from their limits as exactly as contacts ar
 from __future__ import annotations
 
 import threading
-from math import inf
 from typing import NamedTuple, NoReturn
 
 import numpy as np
@@ -18,12 +17,12 @@ from numpy.typing import NDArray
 from sim.derivatives.momentum_gradient import momentum_jacobian
 from sim.dynamics.joints.damper import node_dampings
 from sim.integrators.adaptive import go_on
+from sim.integrators.adaptive_rollout import Stretches, roll_stretches
 from sim.integrators.hamilton_gradient import Slopes
-from sim.integrators.landing import BEGINS
 from sim.integrators.node_slopes import node_slopes
 from sim.integrators.node_step import begin_work, mean_of_node, node_at
 from sim.integrators.rollout import Linearized, MotionBuffers, linearize, roll
-from sim.integrators.stretch import Clock, Embedded, Stretch
+from sim.integrators.stretch import MOST, Clock, Embedded, Stretch
 from sim.integrators.tableau import embedded
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.servos import limited_servos
@@ -47,7 +46,6 @@ _LEAST_PRESSING = 1e-6  # [m/s, rad/s] accuracy: shorter impacts would round vel
 _LEAST_KAPPA = 1e-13  # [N s m]
 _CONVERGED = 1e-6  # tolerance of steps with loops or gears, in accuracies
 _ROWS = 256  # sub-steps between two pauses
-_MOST = 1_000_000  # sub-steps of a step: an input is not held for ever
 
 Held = tuple[Vector, Cube]  # input (nu,) and external wrenches (1 or 0, nbody, 6) of a step
 
@@ -114,19 +112,10 @@ class AdaptiveEngine(KnotEngine):
         self, x: Vector, u: Vector, wrench: Cube, kappa: float | None = None, length: float | None = None
     ) -> Substeps:
         """The step from x (nx,) under u (nu,) and external wrenches (1 or 0, nbody, 6)."""
-        s, (models, errors, line) = self.settings, self._line()
-        end = s.time_step
-        settings = s.array(kappa)
-        pressing = settings[1] / s.time_step  # [N m]
-        settled = max(self._settling * pressing**0.5, (self._settling**2 * _LEAST_KAPPA) ** (1.0 / 3.0), SHORTEST)
-        impact = min(max(SHORTEST, _IMPACT / self._lightest), settled)
-        goal = np.array([s.accuracy, s.time_step, end, settled, _LEAST_KAPPA, float(self._is_tree), impact])
+        (models, errors, line), settings = self._line(), self.settings.array(kappa)
+        goal, end = self._goal(settings), self.settings.time_step
         line = line._replace(u=u, wrench=wrench)
-        line.x[:], line.clock[:], line.report[:] = x, 0.0, 0.0
-        line.clock[[Clock.SHORT, Clock.LONG]] = end
-        line.clock[[Clock.SHORT_RATIO, Clock.LONG_RATIO]] = 1.0
-        line.clock[[Clock.LEAST, Clock.CUT, Clock.IMPACT]] = inf
-        line.slips[:], line.contacts[:] = BEGINS, 0.0
+        line.x[:], line.clock[Clock.BEGUN] = x, 0.0
         works, rows, status, taken = self._scratch.tables(2), [], int(Status.SOLVED), 0
         for _ in pieces(settings, 2):
             status = int(go_on(models, works, settings, goal, errors, line))
@@ -135,7 +124,7 @@ class AdaptiveEngine(KnotEngine):
             if status != Status.SOLVED or line.clock[Clock.TIME] >= end:
                 break
             taken += n
-            if taken > _MOST:
+            if taken > MOST:
                 status = int(Status.MAX_ITERATIONS)
                 break
         line.report[0], line.report[4] = status, -1.0
@@ -144,6 +133,14 @@ class AdaptiveEngine(KnotEngine):
         starts, lengths, orders = parts
         error = float(line.clock[Clock.ERROR]) / end
         return Substeps(status, line.x.copy(), line.report.copy(), contacts, starts, lengths, orders, error)
+
+    def _goal(self, settings: Vector) -> Vector:
+        """(7,) what sub-steps have to reach, see sim/integrators/adaptive.py."""
+        s = self.settings
+        pressing = settings[1] / s.time_step  # [N m]
+        settled = max(self._settling * pressing**0.5, (self._settling**2 * _LEAST_KAPPA) ** (1.0 / 3.0), SHORTEST)
+        impact = min(max(SHORTEST, _IMPACT / self._lightest), settled)
+        return np.array([s.accuracy, s.time_step, s.time_step, settled, _LEAST_KAPPA, float(self._is_tree), impact])
 
     # -- sub-steps one by one ------------------------------------------------------------------------------------------
 
@@ -289,29 +286,45 @@ class AdaptiveEngine(KnotEngine):
         derivatives: bool = False,
     ) -> Rolled:
         """As Engine.roll."""
+        if derivatives:
+            return self._roll_slopes(x, us, wrenches, kappa)
+        steps, external = len(us), self.external(wrenches)
+        (models, errors, line), settings, works = self._line(), self.settings.array(kappa), self._scratch.tables(2)
+        goal, (A, B) = self._goal(settings), self.unknown[:2]
+        xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
+        contacts, division = np.zeros((steps, self.sizes.ncontact, CONTACT)), Division.none(steps)
+        xs[0], line.clock[Clock.BEGUN], knot = x, 0.0, 0
+        line = line._replace(wrench=np.zeros_like(external[:1]))
+        path = Stretches(us, external, xs, reports, contacts, division.substeps, division.errors)
+        try:
+            for _ in pieces(settings, steps + 1):
+                knot = int(roll_stretches(models, works, settings, goal, errors, line, path, knot))
+                if knot == steps or reports[knot, 0] != Status.SOLVED:
+                    break
+        except KeyboardInterrupt:
+            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, division)) from None
+        self._kept.contacts = line.contacts.copy()
+        return Rolled(knot, xs, reports, contacts, A, B, division)
+
+    def _roll_slopes(self, x: Vector, us: Floats, wrenches: Cube | None, kappa: float | None) -> Rolled:
+        """`roll` with the derivatives of its steps."""
         steps = len(us)
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
         contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
-        count = steps if derivatives else 0
-        A, B = np.zeros((count, self.ndx, self.ndx)), np.zeros((count, self.ndx, self.nu))
+        A, B = np.zeros((steps, self.ndx, self.ndx)), np.zeros((steps, self.ndx, self.nu))
         division, external = Division.none(steps), self.external(wrenches)
         xs[0], knot = x, 0
-        try:
-            for t in range(steps):
-                held = us[t], external[t : t + 1]
-                path = self.take(xs[t], *held, kappa)
-                reports[t] = path.report
-                if path.status == Status.SOLVED and derivatives:
-                    A[t], B[t], reports[t, 5] = self.slopes(path, held, kappa)
-                    refuse(reports[t : t + 1], 1, A[t : t + 1], B[t : t + 1])
-                if reports[t, 0] != Status.SOLVED:
-                    break
-                xs[t + 1], contacts[t] = path.x, path.contacts
-                division.substeps[t], division.errors[t], knot = len(path.lengths), path.error, t + 1
-        except KeyboardInterrupt:
-            if derivatives:
-                raise KeyboardInterrupt from None
-            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, division)) from None
+        for t in range(steps):
+            held = us[t], external[t : t + 1]
+            path = self.take(xs[t], *held, kappa)
+            reports[t] = path.report
+            if path.status == Status.SOLVED:
+                A[t], B[t], reports[t, 5] = self.slopes(path, held, kappa)
+                refuse(reports[t : t + 1], 1, A[t : t + 1], B[t : t + 1])
+            if reports[t, 0] != Status.SOLVED:
+                break
+            xs[t + 1], contacts[t] = path.x, path.contacts
+            division.substeps[t], division.errors[t], knot = len(path.lengths), path.error, t + 1
         return Rolled(knot, xs, reports, contacts, A, B, division)
 
     def along_loops(self, x: Vector) -> Vector:

@@ -1,0 +1,93 @@
+"""The loop over time of steps with an accuracy: each is a stretch of sub-steps (adaptive.py) under its own input.
+
+A motion that has to go back to Python within a stretch goes on there: the stretch keeps where it stands (Clock).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sim.integrators.adaptive import attempt
+from sim.integrators.stretch import Clock, Embedded, Stretch, begin_stretch
+from sim.model.layout import data_view
+from sim.model.pace import is_due, start_pace
+from solvers.compiler import Table, kernel
+from solvers.dense import copy, copy_vector
+from solvers.status import Status
+from solvers.types import Cube, Integers, Matrix, Vector
+
+_SOLVED = int(Status.SOLVED)
+
+
+class Stretches(NamedTuple):
+    """A motion, step by step."""
+
+    us: Matrix  # (T, nu) in
+    wrenches: Cube  # (T, nbody, 6) in, or (0, nbody, 6)
+    xs: Matrix  # (T + 1, nx) nodes, of which xs[0] is given
+    reports: Matrix  # (T, 6)
+    contacts: Cube  # (T, ncontact, 11)
+    substeps: Integers  # (T,)
+    errors: Vector  # (T,) estimated, over those allowed
+
+
+@kernel
+def _begin(line: Stretch, path: Stretches, end: float, t: int) -> None:
+    """The stretch of step t."""
+    copy_vector(path.xs[t], line.x)
+    copy_vector(path.us[t], line.u)
+    if t < path.wrenches.shape[0]:
+        copy(path.wrenches[t], line.wrench[0])
+    begin_stretch(line, end)
+    path.substeps[t] = 0
+
+
+@kernel
+def _end(line: Stretch, path: Stretches, end: float, t: int, status: int) -> None:
+    """The results of step t."""
+    copy_vector(line.report, path.reports[t])
+    path.reports[t, 0], path.reports[t, 4] = status, -1.0
+    if status == _SOLVED:
+        copy_vector(line.x, path.xs[t + 1])
+        copy(line.contacts, path.contacts[t])
+        path.errors[t] = line.clock[Clock.ERROR] / end
+    line.clock[Clock.BEGUN] = 0.0
+
+
+@kernel
+def roll_stretches(
+    models: Table,
+    works: Table,
+    settings: Vector,
+    goal: Vector,
+    embedded: Embedded,
+    line: Stretch,
+    path: Stretches,
+    first: int,
+) -> int:
+    """Steps from `first` on, of which that one may have begun; the number of steps taken at the end, or the deadline.
+
+    Where a step is not solved, its report has the Status.
+    """
+    data, end = data_view(works[0]), goal[2]
+    start_pace(data, settings)
+    for t in range(first, path.us.shape[0]):
+        if line.clock[Clock.BEGUN] == 0.0:
+            _begin(line, path, end, t)
+        due = False
+        while line.clock[Clock.TIME] < end:
+            effort, line.taken[0] = line.report[1], 0
+            status = attempt(models, works, settings, goal, embedded, line)
+            path.substeps[t] += line.taken[0]
+            if status != _SOLVED:
+                _end(line, path, end, t, status)
+                return t
+            due = is_due(data, line.report[1] - effort)
+            if due:
+                break
+        if line.clock[Clock.TIME] < end:
+            return t
+        _end(line, path, end, t, _SOLVED)
+        if due:
+            return t + 1
+    return path.us.shape[0]
