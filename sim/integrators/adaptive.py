@@ -118,6 +118,12 @@ def next_length(h: float, ratio: float, before: float, order: float) -> float:
 
 
 @kernel
+def shorter(h: float, ratio: float, order: float) -> float:
+    """h times .9 r^-1/k, at least h/10: the length at which a step that was refused has the error allowed."""
+    return h * max(0.1, 0.9 * ratio ** (-1.0 / order))
+
+
+@kernel
 def _allows(clock: Vector, h: float, shortest: float, ratio: float) -> bool:
     """Whether a solved step of order 2 is kept. A step on a kink has a larger allowance, and so has one across lengths
     that have no solution; after a rebound there is no kink, for the velocity stays wrong.
@@ -179,8 +185,8 @@ def take_long(
     clock = line.clock
     status, ratio = try_long(models, works, goal, line, embedded, h)
     if status == _SOLVED:
-        length = next_length(h, ratio, clock[Clock.LONG_RATIO], 7.0)
         if ratio <= 1.0:
+            length = next_length(h, ratio, clock[Clock.LONG_RATIO], 7.0)
             if line.contacts.shape[0] > 0:
                 report_apart(model_view(models[0]), data_view(works[1]), h, line.parts[0])
                 rest_contacts(line)
@@ -190,7 +196,7 @@ def take_long(
             clock[Clock.ERROR] += ratio * h
             clock[Clock.READY] = 1.0
             return _SOLVED
-        clock[Clock.LONG] = min(length, 0.9 * h)
+        clock[Clock.LONG] = shorter(h, ratio, 7.0)
     elif status == _NOT_FINITE and h <= goal[3]:
         return status
     else:

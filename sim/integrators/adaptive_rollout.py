@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.integrators.adaptive import attempt
-from sim.integrators.stretch import Clock, Embedded, Stretch, begin_stretch
+from sim.integrators.stretch import MOST, Clock, Embedded, Stretch, begin_stretch
 from sim.model.layout import data_view
 from sim.model.pace import is_due, start_pace
 from solvers.compiler import Table, kernel
@@ -17,6 +17,7 @@ from solvers.status import Status
 from solvers.types import Cube, Integers, Matrix, Vector
 
 _SOLVED = int(Status.SOLVED)
+_MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
 
 
 class Stretches(NamedTuple):
@@ -79,6 +80,8 @@ def roll_stretches(
             effort, line.taken[0] = line.report[1], 0
             status = attempt(models, works, settings, goal, embedded, line)
             path.substeps[t] += line.taken[0]
+            if path.substeps[t] > MOST:
+                status = _MAX_ITERATIONS
             if status != _SOLVED:
                 _end(line, path, end, t, status)
                 return t
