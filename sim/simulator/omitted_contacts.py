@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.contact.pairs.inactive_pairs import COUPLED, STEEPEST
 from sim.mechanism.pack_clusters import STIFFNESS
+from sim.model.columns import PairBound
 from sim.model.model import Model
 
 
 def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDArray[np.float64]:
     """Gap beyond which each contact of a body at rest is inactive, (ncontact,) [m].
 
-    Twice the positive root a of the bound in inactive.py:
+    Twice the positive root a of the bound in inactive.py, and of that in pairs/inactive_pairs.py for collisions:
 
     1000 tolerance a^2 = n kappa ((mu^2 + h (1 + mu)) M + h (1 + mu) T a)
     """
@@ -22,4 +24,12 @@ def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDA
         share = len(out) * kappa / (STIFFNESS * tolerance)
         b, c = share * time_step * (1.0 + mu) * turn, share * (mu * mu + time_step * (1.0 + mu)) * mobility
         out[first : model.cluster_end[first]] = b + np.sqrt(b * b + 4.0 * c)
+    ground = len(model.contact_height)
+    for j in np.flatnonzero(model.pair_feature == 0):
+        bound = model.pair_far[j]
+        points, limit = int(bound[PairBound.POINTS]), bound[PairBound.REACH]
+        mu, share = model.contact_friction[ground + j], points * bound[PairBound.COLLISIONS] * kappa / COUPLED
+        b = share * time_step * (1.0 + mu) * (bound[PairBound.TURNING] + bound[PairBound.MOBILITY] * STEEPEST / limit)
+        c = share * (mu * mu + time_step * (1.0 + mu)) * bound[PairBound.MOBILITY]
+        out[ground + j : ground + j + points] = min(b + np.sqrt(b * b + 4.0 * c), limit)
     return out

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 import dojo_opt as dojo
@@ -34,3 +36,17 @@ def test_a_body_that_turns_too_far_is_named() -> None:
     x = sim.neutral()
     x[2], x[-1] = 3.0, 100.0
     assert "The fastest is 'block', with 100 rad/s before the step." in sim.rollout(x, np.zeros((3, 3))).message
+
+
+def test_the_gap_of_inactive_collisions_is_that_of_a_step() -> None:
+    """Two balls at rest: beyond the gap of the description their collision is omitted, below it is not."""
+    balls = [dojo.Body(name, 1.0, shape=dojo.Sphere(0.1)) for name in "ab"]
+    joints = [dojo.Joint("floating", None, name) for name in "ab"]
+    mech = dojo.Mechanism(balls, joints, collisions=[dojo.Collision("a", "b")], gravity=(0.0, 0.0, 0.0))
+    sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-6)
+    found = re.search(r"beyond a gap of (\S+) m", sim.describe())
+    assert found is not None and float(found[1]) > 1e-3
+    for share, omitted in ((1.05, ("a-b",)), (0.95, ())):
+        x = sim.neutral()
+        x[:3], x[7:10] = (0.2 + share * float(found[1]), 0.0, 0.0), 0.0
+        assert sim.left_out(x) == omitted

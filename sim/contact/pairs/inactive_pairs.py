@@ -44,7 +44,7 @@ from sim.model.options import StepOptions
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 
-_STEEPEST = 3.75  # reaches times the largest rate of the part that acts (limited_reach.py)
+STEEPEST = 3.75  # reaches times the largest rate of the part that acts (limited_reach.py)
 COUPLED = 1e-2  # largest sum of e over the inactive collisions of a body
 
 
@@ -126,7 +126,7 @@ def _far_enough(model: Model, options: StepOptions, j: int, a: float) -> float:
     if not a > 0.0:
         return 0.0
     e = (mu * mu + h * (1.0 + mu)) * f[PairBound.MOBILITY] / a + h * (1.0 + mu) * f[PairBound.TURNING]
-    e += h * (1.0 + mu) * f[PairBound.MOBILITY] * _STEEPEST / f[PairBound.REACH]
+    e += h * (1.0 + mu) * f[PairBound.MOBILITY] * STEEPEST / f[PairBound.REACH]
     return a if f[PairBound.POINTS] * f[PairBound.COLLISIONS] * options.kappa * e <= COUPLED * a else 0.0
 
 
@@ -143,7 +143,7 @@ def _change(model: Model, data: Data, options: StepOptions, j: int, a: float) ->
             for k in range(3):
                 lever += abs(data.pos2[i, k] - data.origin[k])
     push = f[PairBound.POINTS] * options.kappa / a
-    return 2.0 * lever * push * (1.0 + (1.0 + mu + 2.0 * mu * mu / options.h) / a + _STEEPEST / f[PairBound.REACH])
+    return 2.0 * lever * push * (1.0 + (1.0 + mu + 2.0 * mu * mu / options.h) / a + STEEPEST / f[PairBound.REACH])
 
 
 @optional(Slot.FAR_PAIR_IMPULSES)
