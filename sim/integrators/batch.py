@@ -52,13 +52,14 @@ class BatchBuffers(NamedTuple):
 
 @kernel
 def _roll_rows(model_at: Table, data_at: Table, settings: Vector, rows: tuple[int, int], motions: BatchBuffers) -> None:
-    """Motions rows[0] up to rows[1], as far as they are not done, until the deadline."""
-    steps = motions.us.shape[1]
+    """Motions rows[0] up to rows[1], as far as they are not done, until the deadline; at least a part of one."""
+    steps, begun = motions.us.shape[1], False
     for i in range(rows[0], rows[1]):
         report = motions.reports[i]
         if report[0, 0] == _SOLVED and motions.knots[i] < steps:
-            if seconds() > settings[DEADLINE]:
+            if begun and seconds() > settings[DEADLINE]:
                 return
+            begun = True
             x, u = motions.xs[i], motions.us[i]
             one = MotionBuffers(x, u, motions.wrenches, report, motions.contacts, motions.A, motions.B)
             motions.knots[i] = roll(model_at, data_at, settings, one, motions.knots[i], None, None)
@@ -86,11 +87,13 @@ class RowTables(NamedTuple):
 
 @kernel
 def _linearize_some(rows: RowTables, part: tuple[int, int], substeps: int, line: Linearized, done: Integers) -> None:
-    """Derivatives of the rows part[0] up to part[1], as far as they are not done, until the deadline."""
+    """Derivatives of the rows part[0] up to part[1] that are not done, until the deadline; at least a part of one."""
+    begun = False
     for i in range(part[0], part[1]):
         if done[i] < substeps:
-            if seconds() > rows.settings[i, DEADLINE]:
+            if begun and seconds() > rows.settings[i, DEADLINE]:
                 return
+            begun = True
             knots = (i, i * substeps + done[i], i + 1)
             end = linearize(rows.models[i], rows.scratch[i], rows.settings[i], knots, substeps, line)
             done[i] = end - i * substeps
