@@ -25,7 +25,8 @@ __all__ = ["jaco_ball"]
 _KNOT, _HORIZON, _RATE = 0.05, 20, 100.0  # [s], knots, [Hz]
 _NEAR, _HELD = 0.02, 0.5  # [m], [s]
 _KAPPA = 2e-5  # [N s m] at 1e-3 friction is viscous and hardly rolls the ball, at 1e-6 the arm does not find it
-_FRICTION = 0.3  # that plans count on: with all of .5 the arm slips off the ball, and leaves it behind
+_KAPPA_GRAD = 5e-5  # [N s m] with derivatives at _KAPPA, plans lose the ball as the arm touches it
+_FRICTION = 0.4  # that plans count on: with all of .5 the arm slips off the ball, and leaves it behind
 _SPIN = 0.03  # [1/(rad/s)^2] of the ball, .1 in the publication
 _TOUCH = 10.0  # [1/m^2] of the distance of stub and ball
 _KP = np.array([500.0, 500.0, 250.0, 500.0, 250.0, 250.0, 250.0])  # [N m/rad]
@@ -171,7 +172,8 @@ def jaco_ball(**settings: Any) -> SuiteTask:
     ]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=_KP * start[:7])
     given = timed(_RATE) | {"iterations": 2, "servo": own, "gain_scale": 0.0}
-    given |= {"kappa": _KAPPA, "friction": _FRICTION, "first": Options(stages=(Stage(_KAPPA, _KAPPA),))}
+    given |= {"kappa": _KAPPA, "kappa_grad": _KAPPA_GRAD, "friction": _FRICTION}
+    given |= {"first": Options(stages=(Stage(_KAPPA, _KAPPA),))}
     mpc = MPC(problem, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)
     spread = np.concatenate([np.full(7, 0.02), [0.01, 0.01, 0.0], np.full(3, 0.1), np.full(7, 0.02), np.zeros(6)])
