@@ -6,6 +6,7 @@ from sim.contact.contact_report import worst_contact
 from sim.dynamics.loops.closure import start_loops
 from sim.dynamics.loops.loop_work import loops_gained
 from sim.dynamics.momentum_balance import begin_step, ends_below_half
+from sim.model.columns import StepReport
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import Guess, Outcome, StepOptions
@@ -40,13 +41,13 @@ def step(
             r = solve_step(model, data, options, q, v, u, guess)
         r = _checked(model, data, options, (q, v, u), r)
     status = _write(data, r, out)
-    report[0] = status
-    report[1] = r.iterations
-    report[2] = r.residual
-    report[3] = r.violation
-    report[4] = -1.0
+    report[StepReport.STATUS] = status
+    report[StepReport.ITERATIONS] = r.iterations
+    report[StepReport.RESIDUAL] = r.residual
+    report[StepReport.VIOLATION] = r.violation
+    report[StepReport.WORST] = -1.0
     if status != Status.SOLVED and r.iterations > 0:
-        report[4] = worst_contact(model, data, options.kappa)
+        report[StepReport.WORST] = worst_contact(model, data, options.kappa)
     data.carry.steps[0] = data.carry.steps[0] + 1 if status == Status.SOLVED else 0
     return status
 

@@ -85,3 +85,25 @@ def test_no_column_with_a_name_is_a_number() -> None:
             if name not in FRAMES and (name in named or not plain):
                 wrong.append(f"{file.name}: {text}")
     assert seen > 1000 and wrong == []
+
+
+def loop_numbers_of(source: str) -> list[str]:
+    """Subscripts by a number of the arrays of loops over time: settings, goals, and columns of reports."""
+    found = []
+    for node in (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Subscript)):
+        name, last = ast.unparse(node.value).split(".")[-1], node.slice
+        in_row = isinstance(last, ast.Tuple)
+        last = last.elts[-1] if isinstance(last, ast.Tuple) else last
+        if name in ("settings", "goal") or (name in ("report", "reports") and in_row):
+            found += [ast.unparse(node)] * isinstance(getattr(last, "value", None), int)
+    return found
+
+
+def test_no_setting_and_no_column_of_a_report_is_a_number() -> None:
+    """Their names: StepSetting, AccuracyGoal, StepReport."""
+    assert loop_numbers_of("settings[1] + line.reports[t, 0] + reports[0] + goal[Goal.END]") == [
+        *("settings[1]", "line.reports[t, 0]")
+    ]
+    rooms = ("integrators", "simulator", "solve", "model")
+    files = [SIM / "step.py", *(file for room in rooms for file in (SIM / room).rglob("*.py"))]
+    assert [text for file in files for text in loop_numbers_of(file.read_text())] == []

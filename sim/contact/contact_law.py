@@ -20,7 +20,7 @@ from sim.contact.pyramid import (
     start_pyramid,
 )
 from sim.contact.softening import soften
-from sim.model.columns import Bounce, Cone, Kin
+from sim.model.columns import Bounce, Cone, ContactRow, Kin
 from sim.model.data import Data
 from sim.model.model import Law, Model
 from sim.model.options import LawForm, NewtonTarget
@@ -246,8 +246,8 @@ def report_contact(model: Model, data: Data, c: int, F: Vector, out: Vector) -> 
     k = data.contact_kin[c]
     fn, f1, f2 = contact_impulse(model, data, c)
     for e in range(3):
-        out[e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
-        out[3 + e] = data.pos3[i, e] + k[Kin.ARM + e]
-        out[8 + e] = F[e]
-    out[6] = k[Kin.GAP] + data.bounce[c, Bounce.FLOOR]
-    out[7] = (k[Kin.SLIP1] * k[Kin.SLIP1] + k[Kin.SLIP2] * k[Kin.SLIP2]) ** 0.5
+        out[ContactRow.IMPULSE + e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
+        out[ContactRow.POINT + e] = data.pos3[i, e] + k[Kin.ARM + e]
+        out[ContactRow.NORMAL + e] = F[e]
+    out[ContactRow.GAP] = k[Kin.GAP] + data.bounce[c, Bounce.FLOOR]
+    out[ContactRow.SLIP] = (k[Kin.SLIP1] * k[Kin.SLIP1] + k[Kin.SLIP2] * k[Kin.SLIP2]) ** 0.5

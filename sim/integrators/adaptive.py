@@ -34,8 +34,8 @@ from sim.integrators.landing import NEVER
 from sim.integrators.phases import leave, left_out, report_apart
 from sim.integrators.runge_kutta import advance
 from sim.integrators.runge_kutta import begin as begin_node
-from sim.integrators.stretch import Clock, Embedded, Stretch, begin_stretch, keep, rest_contacts
-from sim.model.columns import Apart
+from sim.integrators.stretch import AccuracyGoal, Clock, Embedded, Stretch, begin_stretch, keep, rest_contacts
+from sim.model.columns import Apart, StepReport
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
@@ -79,7 +79,7 @@ def stand(models: Table, works: Table, line: Stretch, goal: Vector) -> float:
         begin_node(model, data, line.x)
         set_external(data, line.wrench, 0)
         line.clock[Clock.READY] = 1.0
-    if left_out(model, data, 1.0, line.x[nq:], -1.0) > 10.0 / goal[0]:
+    if left_out(model, data, 1.0, line.x[nq:], -1.0) > 10.0 / goal[AccuracyGoal.ACCURACY]:
         return 0.0
     time = FAILED
     for c in range(model.contact_height.shape[0]):
@@ -102,12 +102,12 @@ def try_long(
     line.clock[Clock.READY] = 0.0
     leave(data)
     status = advance(model, data, h, line.u, line.trial, None)
-    line.report[1] += model.stage_b.shape[0]
+    line.report[StepReport.ITERATIONS] += model.stage_b.shape[0]
     if status != _SOLVED:
         return status, FAILED
-    if left_out(model, data, 1.0, line.trial[nq:], h) > 10.0 / goal[0]:
+    if left_out(model, data, 1.0, line.trial[nq:], h) > 10.0 / goal[AccuracyGoal.ACCURACY]:
         return NEAR, FAILED
-    return _SOLVED, _embedded_error(model, data, embedded, h) / (goal[0] * h)
+    return _SOLVED, _embedded_error(model, data, embedded, h) / (goal[AccuracyGoal.ACCURACY] * h)
 
 
 @kernel
@@ -142,10 +142,10 @@ def take_short(
 
     Where the shortest step cannot be solved, ever longer ones are tried, with errors up to the accuracy times 1 s.
     """
-    clock, rest = line.clock, goal[2] - line.clock[Clock.TIME]
+    clock, rest = line.clock, goal[AccuracyGoal.END] - line.clock[Clock.TIME]
     status, ratio = try_short(models, works, settings, goal, line, embedded, h)
     rebounds = clock[Clock.HIT] > 0.0 or clock[Clock.LEAST] == 0.0
-    shortest = min(goal[3], goal[6] if rebounds else NEVER)
+    shortest = min(goal[AccuracyGoal.SETTLED], goal[AccuracyGoal.IMPACT] if rebounds else NEVER)
     if status == _SOLVED and _allows(clock, h, shortest, ratio):
         beyond, kink = clock[Clock.BEYOND] > 0.0, ratio > 1.0
         keep(line, h, 2)
@@ -197,7 +197,7 @@ def take_long(
             clock[Clock.READY] = 1.0
             return _SOLVED
         clock[Clock.LONG] = shorter(h, ratio, 7.0)
-    elif status == _NOT_FINITE and h <= goal[3]:
+    elif status == _NOT_FINITE and h <= goal[AccuracyGoal.SETTLED]:
         return status
     else:
         clock[Clock.LONG] = 0.25 * h if status != NEAR else 0.5 * h
@@ -210,8 +210,8 @@ def attempt(
 ) -> int:  # fmt: skip
     """One attempt at the next sub-step, of order 8 or 2; the Status."""
     clock = line.clock
-    rest = goal[2] - clock[Clock.TIME]
-    reach = 0.9 * stand(models, works, line, goal) if goal[5] > 0.0 else 0.0
+    rest = goal[AccuracyGoal.END] - clock[Clock.TIME]
+    reach = 0.9 * stand(models, works, line, goal) if goal[AccuracyGoal.TREE] > 0.0 else 0.0
     long = min(clock[Clock.LONG], rest, reach)
     if long < rest < 2.0 * long:
         long = 0.5 * rest
@@ -220,12 +220,12 @@ def attempt(
         short, long = min(clock[Clock.BEYOND], rest), 0.0
     if short < rest < 2.0 * short and clock[Clock.BEYOND] == 0.0:
         short = 0.5 * rest
-    if long >= min(0.5 * short, rest) and long > goal[3]:
+    if long >= min(0.5 * short, rest) and long > goal[AccuracyGoal.SETTLED]:
         status = take_long(models, works, goal, line, embedded, long)
     else:
         status = take_short(models, works, settings, goal, line, embedded, short)
-    if goal[2] - clock[Clock.TIME] < 1e-12 * goal[2]:
-        clock[Clock.TIME] = goal[2]
+    if goal[AccuracyGoal.END] - clock[Clock.TIME] < 1e-12 * goal[AccuracyGoal.END]:
+        clock[Clock.TIME] = goal[AccuracyGoal.END]
     return status
 
 
@@ -240,13 +240,13 @@ def go_on(
     data, clock = data_view(works[0]), line.clock
     start_pace(data, settings)
     if clock[Clock.BEGUN] == 0.0:
-        begin_stretch(line, goal[2])
+        begin_stretch(line, goal[AccuracyGoal.END])
     line.taken[0] = 0
-    while clock[Clock.TIME] < goal[2] and line.taken[0] < line.lengths.shape[0]:
-        effort = line.report[1]
+    while clock[Clock.TIME] < goal[AccuracyGoal.END] and line.taken[0] < line.lengths.shape[0]:
+        effort = line.report[StepReport.ITERATIONS]
         status = attempt(models, works, settings, goal, embedded, line)
         if status != _SOLVED:
             return status
-        if is_due(data, line.report[1] - effort):
+        if is_due(data, line.report[StepReport.ITERATIONS] - effort):
             break
     return _SOLVED

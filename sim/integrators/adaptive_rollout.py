@@ -8,7 +8,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.integrators.adaptive import attempt
-from sim.integrators.stretch import MOST, Clock, Embedded, Stretch, begin_stretch
+from sim.integrators.stretch import MOST, AccuracyGoal, Clock, Embedded, Stretch, begin_stretch
+from sim.model.columns import StepReport
 from sim.model.layout import data_view
 from sim.model.pace import is_due, start_pace
 from solvers.compiler import Table, kernel
@@ -47,7 +48,7 @@ def _begin(line: Stretch, path: Stretches, end: float, t: int) -> None:
 def _end(line: Stretch, path: Stretches, end: float, t: int, status: int) -> None:
     """The results of step t."""
     copy_vector(line.report, path.reports[t])
-    path.reports[t, 0], path.reports[t, 4] = status, -1.0
+    path.reports[t, StepReport.STATUS], path.reports[t, StepReport.WORST] = status, -1.0
     if status == _SOLVED:
         copy_vector(line.x, path.xs[t + 1])
         copy(line.contacts, path.contacts[t])
@@ -70,14 +71,14 @@ def roll_stretches(
 
     Where a step is not solved, its report has the Status.
     """
-    data, end = data_view(works[0]), goal[2]
+    data, end = data_view(works[0]), goal[AccuracyGoal.END]
     start_pace(data, settings)
     for t in range(first, path.us.shape[0]):
         if line.clock[Clock.BEGUN] == 0.0:
             _begin(line, path, end, t)
         due = False
         while line.clock[Clock.TIME] < end:
-            effort, line.taken[0] = line.report[1], 0
+            effort, line.taken[0] = line.report[StepReport.ITERATIONS], 0
             status = attempt(models, works, settings, goal, embedded, line)
             path.substeps[t] += line.taken[0]
             if path.substeps[t] > MOST:
@@ -85,7 +86,7 @@ def roll_stretches(
             if status != _SOLVED:
                 _end(line, path, end, t, status)
                 return t
-            due = is_due(data, line.report[1] - effort)
+            due = is_due(data, line.report[StepReport.ITERATIONS] - effort)
             if due:
                 break
         if line.clock[Clock.TIME] < end:

@@ -17,10 +17,10 @@ from sim.derivatives.parameters.height_columns import add_height_gradient
 from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
 from sim.integrators.rollout import Linearized, linearize
+from sim.model.columns import StepReport, StepSetting
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
-from sim.model.pace import DEADLINE
 from solvers.compiler import Table, kernel, seconds
 from solvers.rotation import left_jacobian
 from solvers.status import Status
@@ -77,10 +77,11 @@ def sweep(
         wrenches = line.wrenches[t : t + 1]
         one = Linearized(line.xs[t : t + 1], line.us[t : t + 1], wrenches, line.A, line.B, line.x_next, line.report)
         linearize(model_at, data_at, settings, (0, 0, 1), 1, one)
-        if line.report[0, 0] != _SOLVED:
+        if line.report[0, StepReport.STATUS] != _SOLVED:
             return t + 1
         if line.parameters.shape[0] > 0 or line.heights.shape[1] > 0:
-            at = At(settings[0], line.xs[t, :nq], line.xs[t, nq:], line.us[t], line.twists, line.below)
+            h = settings[StepSetting.TIME_STEP]
+            at = At(h, line.xs[t, :nq], line.xs[t, nq:], line.us[t], line.twists, line.below)
             _add_parameters(model, data, at, line, terms, weights)
         for j in range(line.us.shape[1]):
             s = 0.0
@@ -94,7 +95,7 @@ def sweep(
                 before[j] += line.A[0, i, j] * costate[i]
         for j in range(n):
             costate[j] = before[j]
-        if seconds() > settings[DEADLINE]:
+        if seconds() > settings[StepSetting.DEADLINE]:
             return t
     return 0
 

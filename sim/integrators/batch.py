@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.integrators.rollout import Linearized, MotionBuffers, linearize, roll
-from sim.model.pace import DEADLINE
+from sim.model.columns import StepReport, StepSetting
 from solvers.compiler import Table, kernel, parallel_kernel, prange, seconds
 from solvers.status import Status
 from solvers.types import Cube, Integers, Matrix, Vector
@@ -32,7 +32,7 @@ def linearize_knots(
     n = line.us.shape[0]
     chunks = data_ats.shape[0]
     for c in prange(chunks):
-        if seconds() < settings[DEADLINE]:
+        if seconds() < settings[StepSetting.DEADLINE]:
             knots = (c * n // chunks, done[c], (c + 1) * n // chunks)
             done[c] = linearize(model_at, data_ats[c], settings, knots, substeps, line)
 
@@ -56,14 +56,14 @@ def _roll_rows(model_at: Table, data_at: Table, settings: Vector, rows: tuple[in
     steps, begun = motions.us.shape[1], False
     for i in range(rows[0], rows[1]):
         report = motions.reports[i]
-        if report[0, 0] == _SOLVED and motions.knots[i] < steps:
-            if begun and seconds() > settings[DEADLINE]:
+        if report[0, StepReport.STATUS] == _SOLVED and motions.knots[i] < steps:
+            if begun and seconds() > settings[StepSetting.DEADLINE]:
                 return
             begun = True
             x, u = motions.xs[i], motions.us[i]
             one = MotionBuffers(x, u, motions.wrenches, report, motions.contacts, motions.A, motions.B)
             motions.knots[i] = roll(model_at, data_at, settings, one, motions.knots[i], None, None)
-            if report[0, 0] == _SOLVED and motions.knots[i] < steps:
+            if report[0, StepReport.STATUS] == _SOLVED and motions.knots[i] < steps:
                 return
 
 
@@ -91,7 +91,7 @@ def _linearize_some(rows: RowTables, part: tuple[int, int], substeps: int, line:
     begun = False
     for i in range(part[0], part[1]):
         if done[i] < substeps:
-            if begun and seconds() > rows.settings[i, DEADLINE]:
+            if begun and seconds() > rows.settings[i, StepSetting.DEADLINE]:
                 return
             begun = True
             knots = (i, i * substeps + done[i], i + 1)
@@ -116,14 +116,14 @@ def _roll_some(rows: RowTables, part: tuple[int, int], motions: BatchBuffers) ->
     steps = motions.us.shape[1]
     for i in range(part[0], part[1]):
         report = motions.reports[i]
-        if report[0, 0] == _SOLVED and motions.knots[i] < steps:
-            if seconds() > rows.settings[i, DEADLINE]:
+        if report[0, StepReport.STATUS] == _SOLVED and motions.knots[i] < steps:
+            if seconds() > rows.settings[i, StepSetting.DEADLINE]:
                 return
             x, u = motions.xs[i], motions.us[i]
             one = MotionBuffers(x, u, motions.wrenches, report, motions.contacts, motions.A, motions.B)
             knot = motions.knots[i]
             motions.knots[i] = roll(rows.models[i], rows.scratch[i], rows.settings[i], one, knot, None, None)
-            if report[0, 0] == _SOLVED and motions.knots[i] < steps:
+            if report[0, StepReport.STATUS] == _SOLVED and motions.knots[i] < steps:
                 return
 
 

@@ -7,7 +7,7 @@ from sim.dynamics.state import configuration_difference
 from sim.integrators.landing import landing
 from sim.integrators.node_step import begin_part, mean_of_node, node_of_mean, part_of, step_mean
 from sim.integrators.slip_stop import stopping_error
-from sim.integrators.stretch import Clock, Embedded, Stretch
+from sim.integrators.stretch import AccuracyGoal, Clock, Embedded, Stretch
 from sim.model.layout import data_view, model_view
 from sim.model.options import StepOptions
 from solvers.compiler import Table, kernel
@@ -83,7 +83,7 @@ def _difference(
             one, other = line.ahead, line.node
     configuration_difference(model, line.whole[:nq], line.mean[:nq], embedded.distance)
     noise = _NOISE if model.contact_body.shape[0] + model.limit_dof.shape[0] > 0 else _CLOSED
-    error, time = 0.0, max(goal[2] - line.clock[Clock.TIME], 0.5) if hits else 0.0
+    error, time = 0.0, max(goal[AccuracyGoal.END] - line.clock[Clock.TIME], 0.5) if hits else 0.0
     for d in range(embedded.distance.shape[0]):
         moved, turned = 0.5 * abs(embedded.distance[d]), abs(one[nq + d] - other[nq + d])
         error = max(error, max(moved - noise, 0.0) + time * turned)
@@ -105,7 +105,7 @@ def try_short(
         status = step_mean(model, data, options, line.u, line.mean, line.whole, line.report)
     if status != _SOLVED:
         return status, FAILED
-    found = landing(model, data, options, goal[0], line.mean, line.slips)
+    found = landing(model, data, options, goal[AccuracyGoal.ACCURACY], line.mean, line.slips)
     line.clock[Clock.HIT], line.clock[Clock.AHEAD] = 1.0 if found.hits else 0.0, found.ahead
     status = node_of_mean(model, data, h, line.u, line.whole, line.node)
     if found.longest < h:
@@ -114,7 +114,7 @@ def try_short(
     if found.hits and h > line.clock[Clock.IMPACT] and line.clock[Clock.BEYOND] == 0.0:
         shorten_impact(line.clock, h, line.clock[Clock.IMPACT])
         return LANDS, FAILED
-    if found.error > 2.0 * _TOUCHING * goal[0]:
+    if found.error > 2.0 * _TOUCHING * goal[AccuracyGoal.ACCURACY]:
         line.clock[Clock.CUT] = max(min(0.9 * found.ahead, 0.5 * h), 0.02 * h)
         return LANDS, FAILED
     if status == _SOLVED:
@@ -126,4 +126,4 @@ def try_short(
     error = stopping_error(model, line.parts, line.slips, h)
     behind = part_of(goal, settings, max(0.5 * h, _AHEAD), 1)
     error = max(error, _difference(models[1], works[0], behind, goal, line, embedded))
-    return _SOLVED, error / (goal[0] * h)
+    return _SOLVED, error / (goal[AccuracyGoal.ACCURACY] * h)

@@ -23,6 +23,8 @@ from sim.dynamics.external_forces import input_wrench, set_external
 from sim.dynamics.loops.loop_velocity import close_velocity
 from sim.integrators.closed_interval import close_interval
 from sim.integrators.rollout import begin
+from sim.integrators.stretch import AccuracyGoal
+from sim.model.columns import StepReport, StepSetting
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import InputKind, Model
@@ -114,8 +116,15 @@ def part_of(goal: Vector, settings: Vector, h: float, parts: int) -> StepOptions
 
     goal: as in adaptive.py.
     """
-    kappa = max(settings[1] * h / goal[1], parts * goal[4])
-    return StepOptions(h, kappa, settings[2], int(settings[3]), settings[5], settings[6])
+    kappa = max(settings[StepSetting.KAPPA] * h / goal[AccuracyGoal.TIME_STEP], parts * goal[AccuracyGoal.LEAST_KAPPA])
+    return StepOptions(
+        h,
+        kappa,
+        settings[StepSetting.TOLERANCE],
+        int(settings[StepSetting.MAX_ITERATIONS]),
+        settings[StepSetting.GAIN],
+        settings[StepSetting.LOSS],
+    )
 
 
 @kernel
@@ -124,11 +133,13 @@ def step_mean(
 ) -> int:
     """out = (q, v25) one step after mean = (q, v15); the Status. Iterations are added up, the rest is the largest."""
     nq = data.theta1.shape[0]
-    iterations, residual, violation = report[1], report[2], report[3]
+    iterations = report[StepReport.ITERATIONS]
+    residual, violation = report[StepReport.RESIDUAL], report[StepReport.VIOLATION]
     follows = data.carry.steps[0] > 0
     status = step(model, data, options, mean, u, Guess(mean[nq:], follows), out, report)
-    report[1] += iterations
-    report[2], report[3] = max(report[2], residual), max(report[3], violation)
+    report[StepReport.ITERATIONS] += iterations
+    report[StepReport.RESIDUAL] = max(report[StepReport.RESIDUAL], residual)
+    report[StepReport.VIOLATION] = max(report[StepReport.VIOLATION], violation)
     return status
 
 

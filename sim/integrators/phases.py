@@ -22,7 +22,7 @@ from sim.contact.pairs.clearance import least_gap, measure_pairs, omitted_pairs
 from sim.dynamics.external_forces import set_external
 from sim.integrators.runge_kutta import advance, begin
 from sim.mechanism.confined import IDLE
-from sim.model.columns import Apart, Bounce, Cluster
+from sim.model.columns import Apart, Bounce, Cluster, StepReport, StepSetting
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
@@ -104,7 +104,9 @@ def first_far(model_at: Table, data_at: Table, settings: Vector, xs: Matrix) -> 
     nq = data.theta1.shape[0]
     for t in range(xs.shape[0]):
         begin(model, data, xs[t])
-        if left_out(model, data, settings[1], xs[t, nq:], -1.0) <= _allowed(data, settings[2]):
+        if left_out(model, data, settings[StepSetting.KAPPA], xs[t, nq:], -1.0) <= _allowed(
+            data, settings[StepSetting.TOLERANCE]
+        ):
             return t
     return xs.shape[0]
 
@@ -166,7 +168,7 @@ def roll_far(model_at: Table, data_at: Table, settings: Vector, flight: Flight, 
     model = model_view(model_at)
     data = data_view(data_at)
     nq = data.theta1.shape[0]
-    h, kappa = settings[0], settings[1]
+    h, kappa = settings[StepSetting.TIME_STEP], settings[StepSetting.KAPPA]
     us, xs, reports = flight.us, flight.xs, flight.reports
     start_pace(data, settings)
     if first == 0:
@@ -175,18 +177,20 @@ def roll_far(model_at: Table, data_at: Table, settings: Vector, flight: Flight, 
     for t in range(first, us.shape[0]):
         x = xs[t + 1]
         copy_vector(xs[t], x)
-        allowed = _allowed(data, settings[2])
+        allowed = _allowed(data, settings[StepSetting.TOLERANCE])
         if left_out(model, data, kappa, x[nq:], -1.0) > allowed:
             return t, NEAR
         leave(data)
         set_external(data, flight.wrenches, t)
         status = advance(model, data, h, us[t], x, None)
-        reports[t, 0], reports[t, 1], reports[t, 4] = status, model.stage_b.shape[0], -1.0
+        reports[t, StepReport.STATUS] = status
+        reports[t, StepReport.ITERATIONS] = model.stage_b.shape[0]
+        reports[t, StepReport.WORST] = -1.0
         if status != _SOLVED:
             return t, status
         if left_out(model, data, kappa, x[nq:], h) > allowed:
             return t, NEAR
         report_apart(model, data, h, flight.contacts[t])
-        if is_due(data, reports[t, 1]):
+        if is_due(data, reports[t, StepReport.ITERATIONS]):
             return t + 1, _SOLVED
     return us.shape[0], _SOLVED

@@ -22,6 +22,7 @@ from sim.derivatives.step_gradient import gradient
 from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import normalise_state
 from sim.integrators.feedback import Following, begin_knot, end_knot
+from sim.model.columns import StepReport, StepSetting
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
@@ -82,7 +83,14 @@ def options_of(data: Data, settings: Vector, begins: bool) -> StepOptions:
     start_pace(data, settings)
     if begins:
         begin(data)
-    return StepOptions(settings[0], settings[1], settings[2], int(settings[3]), settings[5], settings[6])
+    return StepOptions(
+        settings[StepSetting.TIME_STEP],
+        settings[StepSetting.KAPPA],
+        settings[StepSetting.TOLERANCE],
+        int(settings[StepSetting.MAX_ITERATIONS]),
+        settings[StepSetting.GAIN],
+        settings[StepSetting.LOSS],
+    )
 
 
 @kernel
@@ -153,7 +161,7 @@ def roll(
     if following is not None:
         n = following.substeps
     elif first == 0 and not accept(model, motion):
-        motion.reports[0, 0] = REFUSED
+        motion.reports[0, StepReport.STATUS] = REFUSED
         return 0
     options = options_of(data, settings, first == 0)
     nq = data.theta1.shape[0]
@@ -173,8 +181,8 @@ def roll(
             if step(model, data, options, x, motion.us[t], Guess(velocity, known), motion.xs[t + 1], report) != _SOLVED:
                 return t * n + s
             if following is not None:
-                report[6] += report[1]
-            if s + 1 < n and is_due(data, report[1]):
+                report[StepReport.EARLIER] += report[StepReport.ITERATIONS]
+            if s + 1 < n and is_due(data, report[StepReport.ITERATIONS]):
                 return t * n + s + 1
         if not _report(model, data, options, motion, t, report):
             return t
@@ -183,7 +191,7 @@ def roll(
             parameter_jacobian(model_at, data_at, at, motion.A[t], columns.terms, columns.weights, columns.J[t])
         if following is not None:
             end_knot(model, data, following, motion.xs[t + 1], t)
-        if is_due(data, report[1] + (motion.A.shape[1] if motion.A.shape[0] > 0 else 0)):
+        if is_due(data, report[StepReport.ITERATIONS] + (motion.A.shape[1] if motion.A.shape[0] > 0 else 0)):
             return (t + 1) * n
     return motion.us.shape[0] * n
 
@@ -196,19 +204,19 @@ def _report(model: Model, data: Data, options: StepOptions, motion: MotionBuffer
         report_contacts(model, data, options.h, motion.contacts[t])
         for c in range(model.contact_height.shape[0]):
             if not is_finite(motion.contacts[t, c]):
-                report[0] = _NOT_FINITE
+                report[StepReport.STATUS] = _NOT_FINITE
                 return False
         if not pairs_finite(model, data, motion.contacts[t]):
-            report[0] = _NOT_FINITE
+            report[StepReport.STATUS] = _NOT_FINITE
             return False
     if motion.A.shape[0] > 0:
         if not gradient(model, data, options.h, options.kappa, x[:nq], x[nq:], motion.A[t], motion.B[t]):
-            report[0] = _SINGULAR
+            report[StepReport.STATUS] = _SINGULAR
             return False
         if not (is_finite_matrix(motion.A[t]) and is_finite_matrix(motion.B[t])):
-            report[0] = _NOT_FINITE
+            report[StepReport.STATUS] = _NOT_FINITE
             return False
-        report[5] = ACCURACY * data.contact_hard[0]
+        report[StepReport.ACCURACY] = ACCURACY * data.contact_hard[0]
     return True
 
 
@@ -277,14 +285,14 @@ def linearize(
             Js = A if s == 0 else data.step_A
             Ju = B if s == 0 else data.step_B
             if not gradient(model, data, options.h, options.kappa, x[:nq], x[nq:], Js, Ju):
-                report[0] = _SINGULAR
+                report[StepReport.STATUS] = _SINGULAR
                 break
-            report[5] = max(report[5], ACCURACY * data.contact_hard[0])
+            report[StepReport.ACCURACY] = max(report[StepReport.ACCURACY], ACCURACY * data.contact_hard[0])
             if s > 0:
                 _chain(data, A, B)
             if not (is_finite_matrix(A) and is_finite_matrix(B)):
-                report[0] = _NOT_FINITE
+                report[StepReport.STATUS] = _NOT_FINITE
                 break
-            if is_due(data, report[1] + A.shape[0]):
+            if is_due(data, report[StepReport.ITERATIONS] + A.shape[0]):
                 return t * substeps + s + 1
     return knots[2] * substeps

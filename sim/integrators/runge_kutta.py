@@ -35,6 +35,7 @@ from sim.integrators.tangents import (
     tangent_rates,
     tangents_of,
 )
+from sim.model.columns import StepReport
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import Guess, StepOptions
@@ -175,7 +176,10 @@ def step_by_stages(
     copy_vector(data.momenta, data.held_momenta)
     copy_vector(x, out)
     status = advance(model, data, options.h, u, out, None)
-    report[0], report[1], report[2], report[3], report[4] = status, model.stage_b.shape[0], 0.0, 0.0, -1.0
+    report[StepReport.STATUS] = status
+    report[StepReport.ITERATIONS] = model.stage_b.shape[0]
+    report[StepReport.RESIDUAL] = report[StepReport.VIOLATION] = 0.0
+    report[StepReport.WORST] = -1.0
     data.carry.steps[0] = data.carry.steps[0] + 1 if status == _SOLVED else 0
     return status
 

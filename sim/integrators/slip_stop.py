@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.integrators.landing import BEGINS
+from sim.model.columns import ContactRow
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.types import Cube, Vector
@@ -42,7 +43,7 @@ def stopping_error(model: Model, parts: Cube, slips: Vector, h: float) -> float:
     """
     error = 0.0
     for c in range(slips.shape[0]):
-        one, other, before = parts[0, c, 7], parts[1, c, 7], slips[c]
+        one, other, before = parts[0, c, ContactRow.SLIP], parts[1, c, ContactRow.SLIP], slips[c]
         slip = 1.5 * other - 0.5 * one
         if slip < 0.0:
             error = max(error, 0.25 * h * slip * slip / (one - other))

@@ -7,6 +7,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from sim.integrators.landing import BEGINS, NEVER, UNKNOWN
+from sim.model.columns import ContactRow
 from solvers.compiler import kernel
 from solvers.dense import clear, copy_vector
 from solvers.types import Cube, Integers, Matrix, Vector
@@ -33,6 +34,18 @@ class Clock(IntEnum):
     AHEAD = 13  # time until the first contact of that step [s]
     IMPACT = 14  # longest length of a step with an impact
     BEGUN = 15  # 0 before the first sub-step
+
+
+class AccuracyGoal(IntEnum):
+    """goal of the sub-steps of a step."""
+
+    ACCURACY = 0  # [m/s, rad/s]
+    TIME_STEP = 1  # that kappa is for [s]
+    END = 2  # of the stretch [s]
+    SETTLED = 3  # length of step in which contacts settle [s]
+    LEAST_KAPPA = 4  # [N s m]
+    TREE = 5  # 1 where nothing couples the trees of joints
+    IMPACT = 6  # shortest length of an impact [s]
 
 
 class Stretch(NamedTuple):
@@ -116,10 +129,10 @@ def add_contacts(line: Stretch) -> None:
             share = other / (one + other) if one + other > 0.0 else 1.0
             for k in range(3):
                 out[k] += row[k]
-                out[3 + k] += share * (row[3 + k] - out[3 + k])
-            for k in range(6, out.shape[0]):
+                out[ContactRow.POINT + k] += share * (row[ContactRow.POINT + k] - out[ContactRow.POINT + k])
+            for k in range(ContactRow.GAP, out.shape[0]):
                 out[k] = row[k]
-        one, other = line.parts[0, c, 7], line.parts[1, c, 7]
+        one, other = line.parts[0, c, ContactRow.SLIP], line.parts[1, c, ContactRow.SLIP]
         line.slips[c] = max(0.0, 1.5 * other - 0.5 * one)
 
 

@@ -268,3 +268,37 @@ class BoundRow(IntEnum):
 
     TORQUE = 0  # (3,) per unit of impulse
     RATE = 3  # (3,) d(gap)/d(v25)
+
+
+class StepSetting(IntEnum):
+    """The settings of a step in an array, as loops over time read them (integrators/rollout.py)."""
+
+    TIME_STEP = 0  # [s]
+    KAPPA = 1  # central-path parameter [N s m]
+    TOLERANCE = 2
+    MAX_ITERATIONS = 3
+    DEADLINE = 4  # when to go back to Python [s] (model/pace.py)
+    GAIN = 5  # largest gain of energy (solve/energy_balance.py)
+    LOSS = 6
+
+
+class StepReport(IntEnum):
+    """The report of a step."""
+
+    STATUS = 0  # Status
+    ITERATIONS = 1
+    RESIDUAL = 2
+    VIOLATION = 3  # largest |product - kappa| of complementary pairs
+    WORST = 4  # contact with the largest error, -1 for none
+    ACCURACY = 5  # estimated error of the derivatives
+    EARLIER = 6  # iterations of the steps before, in closed loops
+
+
+class ContactRow(IntEnum):
+    """The report of a contact after a step, in world axes (contact/contact_report.py)."""
+
+    IMPULSE = 0  # (3,) [N s]
+    POINT = 3  # (3,) [m]
+    GAP = 6  # [m]
+    SLIP = 7  # speed [m/s]
+    NORMAL = 8  # (3,)

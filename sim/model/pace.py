@@ -14,14 +14,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from time import perf_counter
 
-from sim.model.columns import Pace
+from sim.model.columns import Pace, StepSetting
 from sim.model.data import Data
 from solvers.compiler import PAUSE, kernel, seconds
 from solvers.types import Vector
 
-__all__ = ["DEADLINE", "is_due", "pieces", "rows", "start_pace"]
+__all__ = ["is_due", "pieces", "rows", "start_pace"]
 
-DEADLINE = 4  # where the settings of a kernel have the moment to go back to Python [s], by solvers/compiler
 _LOOK = 64.0  # work between two looks at the clock, which cost as much as a tenth of the smallest step
 _ROWS = 64  # of the first piece
 _ONE = (None,)
@@ -34,7 +33,7 @@ def pieces(settings: Vector, steps: int) -> Iterable[None]:
 
 def _pieces(settings: Vector) -> Iterator[None]:
     while True:
-        settings[DEADLINE] = seconds() + PAUSE
+        settings[StepSetting.DEADLINE] = seconds() + PAUSE
         yield
 
 
@@ -55,7 +54,7 @@ def _rows(count: int) -> Iterator[slice]:
 @kernel
 def start_pace(data: Data, settings: Vector) -> None:
     """Note the deadline."""
-    data.pace[Pace.DEADLINE] = settings[DEADLINE]
+    data.pace[Pace.DEADLINE] = settings[StepSetting.DEADLINE]
 
 
 @kernel

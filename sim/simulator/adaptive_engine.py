@@ -26,6 +26,7 @@ from sim.integrators.stretch import MOST, Clock, Embedded, Stretch
 from sim.integrators.tableau import embedded
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.servos import limited_servos
+from sim.model.columns import StepReport, StepSetting
 from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, refuse
@@ -127,7 +128,7 @@ class AdaptiveEngine(KnotEngine):
             if taken > MOST:
                 status = int(Status.MAX_ITERATIONS)
                 break
-        line.report[0], line.report[4] = status, -1.0
+        line.report[StepReport.STATUS], line.report[StepReport.WORST] = status, -1.0
         contacts = self._kept.contacts = line.contacts.copy()
         parts = rows[0] if len(rows) == 1 else [np.concatenate(column) for column in zip(*rows, strict=True)]
         starts, lengths, orders = parts
@@ -137,7 +138,7 @@ class AdaptiveEngine(KnotEngine):
     def _goal(self, settings: Vector) -> Vector:
         """(7,) what sub-steps have to reach, see sim/integrators/adaptive.py."""
         s = self.settings
-        pressing = settings[1] / s.time_step  # [N m]
+        pressing = settings[StepSetting.KAPPA] / s.time_step  # [N m]
         settled = max(self._settling * pressing**0.5, (self._settling**2 * _LEAST_KAPPA) ** (1.0 / 3.0), SHORTEST)
         impact = min(max(SHORTEST, _IMPACT / self._lightest), settled)
         return np.array([s.accuracy, s.time_step, s.time_step, settled, _LEAST_KAPPA, float(self._is_tree), impact])
@@ -147,7 +148,8 @@ class AdaptiveEngine(KnotEngine):
     def _part_settings(self, h: float, kappa: float | None) -> Vector:
         """Settings of a step of order 2 of length h, as in `part_of` of node_step.py."""
         settings = self._second.settings.array(kappa)
-        settings[0], settings[1] = h, max(settings[1] * h / self.settings.time_step, _LEAST_KAPPA)
+        settings[StepSetting.TIME_STEP] = h
+        settings[StepSetting.KAPPA] = max(settings[StepSetting.KAPPA] * h / self.settings.time_step, _LEAST_KAPPA)
         return settings
 
     def part(self, x: Vector, held: Held, h: float, order: int, kappa: float | None = None) -> Vector:
@@ -195,7 +197,7 @@ class AdaptiveEngine(KnotEngine):
     def _long(self, x: Vector, held: Held, h: float, derivatives: bool) -> tuple[Vector, Floats, Floats, Vector]:
         """As part_slopes, of order 8; without derivatives these are empty."""
         (u, wrench), settings = held, self.settings.array()
-        settings[0] = h
+        settings[StepSetting.TIME_STEP] = h
         data, reports, (contacts, A, B) = self._scratch.table(), np.zeros((1, REPORT)), self.unkept
         if derivatives:
             A, B, ends = np.zeros((1, self.ndx, self.ndx)), np.zeros((1, self.ndx, self.nu)), np.zeros((1, self.nx))
@@ -269,8 +271,8 @@ class AdaptiveEngine(KnotEngine):
         A, B, accuracy = np.eye(self.ndx), np.zeros((self.ndx, self.nu)), 0.0
         for x, h, order in zip(path.starts, path.lengths, path.orders, strict=True):
             _, dx, du, report = self.part_slopes(x, held, h, int(order), kappa)
-            A, B, accuracy = dx @ A, dx @ B + du, max(accuracy, report[5])
-            if report[0] != Status.SOLVED:
+            A, B, accuracy = dx @ A, dx @ B + du, max(accuracy, report[StepReport.ACCURACY])
+            if report[StepReport.STATUS] != Status.SOLVED:
                 return np.full_like(A, np.nan), np.full_like(B, np.nan), accuracy
         return A, B, accuracy
 
@@ -299,7 +301,7 @@ class AdaptiveEngine(KnotEngine):
         try:
             for _ in pieces(settings, steps + 1):
                 knot = int(roll_stretches(models, works, settings, goal, errors, line, path, knot))
-                if knot == steps or reports[knot, 0] != Status.SOLVED:
+                if knot == steps or reports[knot, StepReport.STATUS] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
             raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, division)) from None
@@ -319,9 +321,9 @@ class AdaptiveEngine(KnotEngine):
             path = self.take(xs[t], *held, kappa)
             reports[t] = path.report
             if path.status == Status.SOLVED:
-                A[t], B[t], reports[t, 5] = self.slopes(path, held, kappa)
+                A[t], B[t], reports[t, StepReport.ACCURACY] = self.slopes(path, held, kappa)
                 refuse(reports[t : t + 1], 1, A[t : t + 1], B[t : t + 1])
-            if reports[t, 0] != Status.SOLVED:
+            if reports[t, StepReport.STATUS] != Status.SOLVED:
                 break
             xs[t + 1], contacts[t] = path.x, path.contacts
             division.substeps[t], division.errors[t], knot = len(path.lengths), path.error, t + 1

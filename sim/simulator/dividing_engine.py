@@ -18,6 +18,7 @@ import numpy as np
 
 from sim.integrators.feedback import Following
 from sim.integrators.rollout import MotionBuffers
+from sim.model.columns import StepReport
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, chained, knot_inputs, refuse
@@ -198,7 +199,7 @@ class DividingEngine(Engine):
     def _divide_row(self, motion: MotionBuffers, knot: int, kappa: float | None, division: Division) -> bool:
         """Divide the step `knot` of a motion, which was not solved; False where that does not solve it."""
         report = motion.reports[min(knot, len(motion.reports) - 1)]
-        if int(report[0]) not in DIVISIBLE:
+        if int(report[StepReport.STATUS]) not in DIVISIBLE:
             return False
         derivatives = len(motion.A) > 0
         x, wrench = motion.xs[knot], motion.wrenches[knot : knot + 1]
@@ -219,17 +220,17 @@ class DividingEngine(Engine):
     def _divide_followed(self, motion: MotionBuffers, kappa: float | None, following: Following, done: int) -> bool:
         """Divide the unsolved step after `done` solved ones of a motion that follows a law; False as in _divide_row."""
         law, alpha, report = following.law, following.alpha, motion.reports[0]
-        if int(report[0]) not in DIVISIBLE:
+        if int(report[StepReport.STATUS]) not in DIVISIBLE:
             return False
         t, s = divmod(done, following.substeps)
         data = super().last()
-        x, total = (data.step_x[0].copy() if s else motion.xs[t]), report[REPORT]
+        x, total = (data.step_x[0].copy() if s else motion.xs[t]), report[StepReport.EARLIER]
         divided = self.divide(x, motion.us[t], motion.wrenches[t : t + 1], kappa)
         if divided is None:
             return False
         motion.xs[t + 1] = divided.x
         report[:REPORT] = divided.report()
-        report[REPORT] = total + report[1]
+        report[StepReport.EARLIER] = total + report[StepReport.ITERATIONS]
         for array in data.carry:  # the next step does not continue the attempt that failed
             array[...] = 0
         if s + 1 == following.substeps:
@@ -247,14 +248,14 @@ class DividingEngine(Engine):
         model = self.linked(link_step)
         for i in _divisible(status):
             report = np.zeros((1, REPORT))
-            report[0, 0] = status[i]
+            report[0, StepReport.STATUS] = status[i]
             motion = MotionBuffers(xs[i], us[i], self.no_wrenches, report, self._no_contacts, *self.unknown[:2])
             try:
                 knots[i] = self._go_on(model, motion, None, Division.none(len(us[i])), int(knots[i]))
             except Interrupted as stop:
                 knots[i], status[i] = stop.result, Status.INTERRUPTED
                 raise Interrupted((xs, status, knots)) from None
-            status[i] = int(report[0, 0])
+            status[i] = int(report[0, StepReport.STATUS])
         return xs, status, knots
 
     def linearize(
@@ -269,7 +270,7 @@ class DividingEngine(Engine):
         """As Engine.linearize, with division."""
         A, B, x_next, reports = super().linearize(xs, us, substeps, kappa, guess, wrenches)
         external = self.external(wrenches)
-        for t in _divisible(reports[:, 0]):
+        for t in _divisible(reports[:, StepReport.STATUS]):
             A[t], B[t], x_next[t], reports[t] = self.linearize_knot(
                 xs[t], knot_inputs(us, external, t, substeps), kappa
             )

@@ -22,7 +22,7 @@ from sim.dynamics import coordinates, coordinates_jacobian, energy, state, veloc
 from sim.integrators import batch, rollout
 from sim.integrators.feedback import FeedbackLaw, Following, Path
 from sim.integrators.rollout import MotionBuffers
-from sim.model.columns import Inactive
+from sim.model.columns import Inactive, StepReport
 from sim.model.data import Data
 from sim.model.layout import data_view, sizes_of, table
 from sim.model.model import Model
@@ -74,7 +74,7 @@ class Divided(NamedTuple):
     def report(self) -> Vector:
         """(6,) that of the whole: all iterations, the largest of the other numbers."""
         out = self.rolled.reports.max(axis=0)
-        out[1], out[4] = self.rolled.reports[:, 1].sum(), -1.0
+        out[StepReport.ITERATIONS], out[StepReport.WORST] = self.rolled.reports[:, StepReport.ITERATIONS].sum(), -1.0
         return np.asarray(out)
 
     def contacts(self) -> Floats:
@@ -143,7 +143,7 @@ def refuse(reports: Floats, count: int, *arrays: Floats) -> int:
     if good.all():
         return count
     first = int(good.argmin())
-    reports[first, 0] = Status.NOT_FINITE
+    reports[first, StepReport.STATUS] = Status.NOT_FINITE
     return first
 
 
@@ -311,7 +311,9 @@ class Engine:
         try:
             for _ in pieces(settings, steps):
                 knot = int(rollout.roll(model, data, settings, motion, knot, None, following))
-                if knot == steps or motion.reports[min(knot, len(motion.reports) - 1), 0] != Status.SOLVED:
+                if knot == steps:
+                    break
+                if motion.reports[min(knot, len(motion.reports) - 1), StepReport.STATUS] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
             raise Interrupted(knot) from None
@@ -348,7 +350,7 @@ class Engine:
             np.zeros((knots, self.nu)),
             np.zeros((kept, ncontact, CONE)),
             np.zeros((kept, nlimit, BOUND)),
-            np.zeros(REPORT + 1),
+            np.zeros(len(StepReport)),
         )
 
     def closed_loop(
@@ -376,7 +378,7 @@ class Engine:
         if done < steps:
             np.nan_to_num(path.report, copy=False, nan=np.inf, posinf=np.inf)
         else:
-            path.report[1] = path.report[REPORT]
+            path.report[StepReport.ITERATIONS] = path.report[StepReport.EARLIER]
         return done // substeps, path
 
     def linearize(
@@ -417,8 +419,8 @@ class Engine:
                 batch.linearize_knots(model, works, settings, substeps, line, done)
                 if done.tolist() == ends[1:]:
                     break
-        if np.count_nonzero(reports[:, 0]):
-            unsolved = reports[:, 0] != Status.SOLVED
+        if np.count_nonzero(reports[:, StepReport.STATUS]):
+            unsolved = reports[:, StepReport.STATUS] != Status.SOLVED
             for array in (A, B, x_next):
                 array[unsolved] = 0.0
         return A, B, x_next, reports
@@ -435,7 +437,7 @@ class Engine:
         report = rolled.reports[min(rolled.knot, len(us) - 1)]
         if rolled.knot < len(us):
             return np.zeros((self.ndx, self.ndx)), np.zeros((self.ndx, self.nu)), np.zeros(self.nx), report
-        report[5] = rolled.reports[:, 5].max()
+        report[StepReport.ACCURACY] = rolled.reports[:, StepReport.ACCURACY].max()
         return *chained(np.eye(self.ndx), rolled), rolled.xs[-1], report
 
     def linearize_one(
@@ -451,7 +453,7 @@ class Engine:
         xs, reports, knots = np.zeros((n, steps + 1, self.nx)), np.zeros((n, 1, REPORT)), np.zeros(n, dtype=np.int64)
         motions = batch.BatchBuffers(xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.unknown[:2])
         model, works, settings = self.step_table(), self._scratch.chunks(n), self.settings.array()
-        status = reports[:, 0, 0]
+        status = reports[:, 0, StepReport.STATUS]
         try:
             xs[:, 0] = x0s  # the first touch of much memory takes its time
             for _ in pieces(settings, n * steps):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.integrators.feedback import FeedbackLaw
+from sim.model.columns import StepReport
 from sim.simulator.arguments import Arguments
 from sim.simulator.engine import Engine
 from sim.simulator.results import Linearization
@@ -102,7 +103,7 @@ class Horizon:
         keep = self._substeps == 1
         knot, path = self._engine.closed_loop(x0, policy, alpha, self._limits, self._substeps, kappa, keep=keep)
         kept = Steps(path.cones, path.bounds) if keep else None
-        return Rollout(path.xs, path.us, Status(int(path.report[0])), knot, kept)
+        return Rollout(path.xs, path.us, Status(int(path.report[StepReport.STATUS])), knot, kept)
 
     def linearize(self, xs: Floats, us: Floats, kappa: float, guess: Floats | None = None) -> Linearization:
         """Derivatives of all knots, as `Simulator.linearize_trajectory`.
@@ -110,7 +111,8 @@ class Horizon:
         guess: (T, nx) where the velocities after each knot are looked for first; by default in the later rows of xs.
         """
         A, B, x_next, reports = self._engine.linearize(xs, us, self._substeps, kappa, guess)
-        return Linearization(A, B, x_next, reports[:, 0].astype(np.int64), accuracy=reports[:, 5])
+        statuses = reports[:, StepReport.STATUS].astype(np.int64)
+        return Linearization(A, B, x_next, statuses, accuracy=reports[:, StepReport.ACCURACY])
 
     def gaps(self, linear: Linearization, xs: Floats) -> Floats:
         """(T + 1, ndx) f(x_t, u_t) (-) x_t+1, in the rows of the later knots; zero in the first."""

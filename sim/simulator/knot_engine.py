@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.integrators.feedback import FeedbackLaw, Path
+from sim.model.columns import StepReport
 from sim.simulator.engine import REPORT, Floats, interrupted, knot_inputs
 from sim.simulator.high_order_engine import HighOrderEngine
 from sim.simulator.results import Interrupted
@@ -32,7 +33,7 @@ class KnotEngine(HighOrderEngine):
                 if isinstance(stop, Interrupted):
                     knots[i], xs[i] = stop.result.knot, stop.result.xs
                 raise Interrupted((xs, status, knots)) from None
-            status[i] = rolled.reports[min(rolled.knot, steps - 1), 0] if steps else Status.SOLVED
+            status[i] = rolled.reports[min(rolled.knot, steps - 1), StepReport.STATUS] if steps else Status.SOLVED
         return xs, status, knots
 
     def closed_loop(
@@ -61,11 +62,11 @@ class KnotEngine(HighOrderEngine):
             path.report[:REPORT] = rolled.reports[min(rolled.knot, substeps - 1)]
             if rolled.knot < substeps:
                 return t, path
-            total += rolled.reports[:, 1].sum()
+            total += rolled.reports[:, StepReport.ITERATIONS].sum()
             path.xs[t + 1] = rolled.xs[-1]
             if alpha < 1.0:
                 path.xs[t + 1] = self.integrate(rolled.xs[-1:], (alpha - 1.0) * policy.gaps[t + 1 : t + 2])[0]
-        path.report[1] = total
+        path.report[StepReport.ITERATIONS] = total
         return knots, path
 
     def linearize(

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from sim.dynamics.joints.damper import node_dampings
 from sim.integrators import legendre, phases, rollout
 from sim.integrators.hamilton_gradient import Slopes
+from sim.model.columns import StepReport
 from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.dividing_engine import DividingEngine
@@ -193,9 +194,9 @@ class PhasedEngine(KnotEngine):
         for s in range(len(us) if m.knot == len(us) else 0):
             dx, du, found = self._step_slopes(m, s, (us[s], external[s : s + 1]), kappa)
             A, B = dx @ A, dx @ B + du
-            if found[0] != Status.SOLVED:
+            if found[StepReport.STATUS] != Status.SOLVED:
                 report = found
-        if report[0] != Status.SOLVED:
+        if report[StepReport.STATUS] != Status.SOLVED:
             return np.zeros_like(A), np.zeros_like(B), np.zeros(self.nx), report
         return A, B, m.xs[-1], report
 

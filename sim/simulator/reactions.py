@@ -28,6 +28,7 @@ from sim.mechanism.closing import is_weld
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import WORLD, Joint
 from sim.mechanism.shapes import rotation_matrix
+from sim.model.columns import StepReport
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.simulator.engine import Divided, Engine
@@ -131,7 +132,8 @@ def reactions(
         rolled = engine.roll(state, control[None], None if wrenches is None else wrenches[k : k + 1])
         if rolled.knot == 0:
             if status == Status.SOLVED:
-                status, detail = Status(int(rolled.reports[0, 0])), explain(call, rolled.reports[0], state)
+                report = rolled.reports[0]
+                status, detail = Status(int(report[StepReport.STATUS])), explain(call, report, state)
             continue
         if rolled.division.substeps[0] == 1:
             out[:, k] = _rows(mech, engine, loops, frame)

@@ -22,6 +22,7 @@ from sim.integrators.feedback import Path
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr, drawn
 from sim.mechanism.mechanism import Mechanism
+from sim.model.columns import ContactRow, StepReport
 from sim.simulator.motion_file import archived, contact_rows, export, opened, restored
 from sim.simulator.npz_file import reading, write_npz
 from solvers.status import MESSAGES, Status
@@ -356,7 +357,8 @@ class Shot(Result):
             The result.
         """
         knot, path = found
-        return cls(path.xs[: knot + 1], path.us[:knot], Status(int(path.report[0])), knot, float(path.report[2]))
+        status, residual = Status(int(path.report[StepReport.STATUS])), float(path.report[StepReport.RESIDUAL])
+        return cls(path.xs[: knot + 1], path.us[:knot], status, knot, residual)
 
 
 @dataclass(frozen=True)
@@ -545,7 +547,8 @@ def carried(call: Callable[[], Any], made: Callable[[Any], Any]) -> Any:
 
 def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
     """Contacts from the rows (..., ncontact, 11) of a kernel."""
-    parts = (rows[..., 8:11], time_step, rows[..., :3], rows[..., 3:6], rows[..., 6], rows[..., 7])
+    impulse, point, normal = (rows[..., k : k + 3] for k in (ContactRow.IMPULSE, ContactRow.POINT, ContactRow.NORMAL))
+    parts = (normal, time_step, impulse, point, rows[..., ContactRow.GAP], rows[..., ContactRow.SLIP])
     contacts = Contacts(mech.contact_names, *parts)
     if any(c.reach is not None for c in mech.collisions):  # to look through thousands takes longer than a step
         vars(contacts)["rows"] = len(mech.contacts), vars(contacts).pop("gap")
@@ -564,10 +567,7 @@ def path_of(call: str, trajectory: Any) -> tuple[Any, Any]:
 def sentence(
     mech: Mechanism, where: str, report: Floats, tolerance: float, loop: tuple[float, str] | None = None
 ) -> str:
-    """The sentence of a status, with the numbers of the report of a kernel.
-
-    loop: by how much the one that is furthest open is, and which it is.
-    """
+    """The sentence of a status, with the numbers of a StepReport; loop: (gap, name) of the one with the largest gap."""
     status, iterations, residual, violation, contact = report[:5]
     reason = Status(int(status))
     text = f"{where}: {MESSAGES[reason]}"

@@ -18,7 +18,8 @@ from sim.integrators.rollout import Linearized, MotionBuffers
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.memory import room_for
-from sim.model.pace import DEADLINE, pieces
+from sim.model.columns import StepReport, StepSetting
+from sim.model.pace import pieces
 from sim.simulator.engine import DIVISIBLE, REPORT, Division, Engine, finite_rows, refuse
 from sim.simulator.results import Result, ended
 from sim.simulator.state_space import StateSpace
@@ -142,15 +143,17 @@ class RowBatch:
             self._linearize(A, B, x_next, reports)
         elif n:
             self._roll(x_next, reports)
-        for i in np.flatnonzero(reports[:, 0]):
-            if int(reports[i, 0]) in DIVISIBLE:
+        for i in np.flatnonzero(reports[:, StepReport.STATUS]):
+            if int(reports[i, StepReport.STATUS]) in DIVISIBLE:
                 self._divide(int(i), derivatives, A, B, x_next, reports)
-        if derivatives and (refuse(reports, n, A, B) < n or reports[:, 0].any()):
-            reports[~(finite_rows(A) & finite_rows(B)) & (reports[:, 0] == Status.SOLVED), 0] = Status.NOT_FINITE
-        for i in np.flatnonzero(reports[:, 0]):
+        if derivatives and (refuse(reports, n, A, B) < n or reports[:, StepReport.STATUS].any()):
+            solved = reports[:, StepReport.STATUS] == Status.SOLVED
+            reports[solved & ~(finite_rows(A) & finite_rows(B)), StepReport.STATUS] = Status.NOT_FINITE
+        for i in np.flatnonzero(reports[:, StepReport.STATUS]):
             x_next[i] = self.xs[i]
             A[i : i + 1], B[i : i + 1] = 0.0, 0.0
-        return BatchStep(x_next, reports[:, 0].astype(np.int64), reports[:, 1].astype(np.int64), A, B)
+        statuses, iterations = (reports[:, k].astype(np.int64) for k in (StepReport.STATUS, StepReport.ITERATIONS))
+        return BatchStep(x_next, statuses, iterations, A, B)
 
     def _kappa(self, row: int) -> float | None:
         """That of a row, or None for its engine's."""
@@ -170,7 +173,7 @@ class RowBatch:
                 scratch[self.index == k] = engine.chunks(n)[chunk[self.index == k]]
         settings = np.array([engine.settings.array() for engine in self.engines])[self.index]
         given = ~np.isnan(self.kappas)
-        settings[given, 1] = self.kappas[given]
+        settings[given, StepSetting.KAPPA] = self.kappas[given]
         return RowTables(np.array(models)[self.index], scratch, settings), count
 
     def _linearize(self, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
@@ -178,9 +181,9 @@ class RowBatch:
         rows, chunks = self._tables(derivatives=True)
         line = Linearized(self.xs, self.us, self.engines[0].no_wrenches, A, B, x_next, reports)
         done = np.zeros(len(self.us), dtype=np.int64)
-        pace = np.zeros(DEADLINE + 1)
+        pace = np.zeros(len(StepSetting))
         for _ in pieces(pace, 2):
-            rows.settings[:, DEADLINE] = pace[DEADLINE]
+            rows.settings[:, StepSetting.DEADLINE] = pace[StepSetting.DEADLINE]
             linearize_rows(rows, self.substeps, line, done, chunks)
             if np.all(done == self.substeps):
                 break
@@ -194,11 +197,11 @@ class RowBatch:
         us = np.repeat(self.us[:, None], self.substeps, axis=1)
         knots = np.zeros(n, dtype=np.int64)
         motions = BatchBuffers(xs, us, reports[:, None], knots, first.no_wrenches, *first.unkept)
-        pace = np.zeros(DEADLINE + 1)
+        pace = np.zeros(len(StepSetting))
         for _ in pieces(pace, 2):
-            rows.settings[:, DEADLINE] = pace[DEADLINE]
+            rows.settings[:, StepSetting.DEADLINE] = pace[StepSetting.DEADLINE]
             roll_rows(rows, motions, chunks)
-            if np.all((knots == self.substeps) | (reports[:, 0] != Status.SOLVED)):
+            if np.all((knots == self.substeps) | (reports[:, StepReport.STATUS] != Status.SOLVED)):
                 break
         x_next[:] = xs[:, -1]
 
@@ -224,7 +227,8 @@ class RowBatch:
             if derivatives:
                 A[rows], B[rows], x_next[rows], reports[rows] = engine.linearize(xs, us, self.substeps, None)
             else:
-                found, reports[rows, 0], _ = engine.roll_batch(xs, np.repeat(us[:, None], self.substeps, axis=1))
+                found, status, _ = engine.roll_batch(xs, np.repeat(us[:, None], self.substeps, axis=1))
+                reports[rows, StepReport.STATUS] = status
                 x_next[rows] = found[:, -1]
 
 

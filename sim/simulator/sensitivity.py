@@ -16,6 +16,7 @@ from sim.derivatives.parameters.terrain_parameters import height_gradients
 from sim.integrators.adjoint import Sweep, sweep
 from sim.integrators.rollout import MotionBuffers, ParameterColumns, roll
 from sim.mechanism.mechanism import Mechanism
+from sim.model.columns import StepReport
 from sim.model.pace import pieces
 from sim.simulator.engine import CONTACT, DIVISIBLE, REPORT, Divided, Division, Engine, Rolled, refuse
 from sim.simulator.link import link_heights, link_parameters
@@ -59,7 +60,7 @@ def adjoint_products(engine: Engine, line: Sweep, kappa: float | None) -> int:
         )
         for t in range(last - 1, first - 1, -1):
             line.report[0] = reports[t - first]
-            if reports[t - first, 0] != Status.SOLVED:
+            if reports[t - first, StepReport.STATUS] != Status.SOLVED:
                 return t
             line.inputs[t] = B[t - first].T @ costate
             costate = A[t - first].T @ costate + line.loss[t]
@@ -98,7 +99,7 @@ def step_slopes(
     """Derivatives of the step (state, input, external wrenches (1 or 0, nbody, 6)), divided where necessary."""
     x, u, external = step
     A, B, x_next, reports = Engine.linearize(engine, x[None], u[None], 1, kappa, None, external)
-    if reports[0, 0] != Status.SOLVED:
+    if reports[0, StepReport.STATUS] != Status.SOLVED:
         return divided_slopes(engine, request, step, reports[0], kappa)
     J = parameter_columns(engine, request.mechanism, (x, u), A[0], request.plan)
     return StepSlopes(A[0], B[0], x_next[0], reports[0], J)
@@ -117,7 +118,7 @@ def divided_slopes(
     """
     x, u, external = step
     divided = None
-    if int(report[0]) in DIVISIBLE:
+    if int(report[StepReport.STATUS]) in DIVISIBLE:
         divided = engine.divide(x, u, external, kappa, derivatives=True)
     if divided is not None:
         return _products(engine, request, step, divided, kappa)
@@ -171,9 +172,9 @@ def roll_parameters(
         else:
             found = step_slopes(engine, request, step, kappa)
         A[knot], B[knot], xs[knot + 1], reports[knot], J[knot] = found
-        if reports[knot, 0] == Status.SOLVED and not np.isfinite(J[knot]).all():
-            reports[knot, 0] = Status.NOT_FINITE
-        if reports[knot, 0] != Status.SOLVED:
+        if reports[knot, StepReport.STATUS] == Status.SOLVED and not np.isfinite(J[knot]).all():
+            reports[knot, StepReport.STATUS] = Status.NOT_FINITE
+        if reports[knot, StepReport.STATUS] != Status.SOLVED:
             break
         knot += 1
     contacts = np.zeros((0, engine.sizes.ncontact, CONTACT))
@@ -189,7 +190,7 @@ def _whole_steps(engine: Engine, plan: ParameterPlan, motion: MotionBuffers, J: 
     settings = engine.settings.array(kappa)
     for _ in pieces(settings, steps):
         done = int(roll(model, data, settings, motion, done, columns, None))
-        if done == steps or motion.reports[done, 0] != Status.SOLVED:
+        if done == steps or motion.reports[done, StepReport.STATUS] != Status.SOLVED:
             break
     return refuse(motion.reports, done, motion.A[:done], motion.B[:done], J[:done])
 
@@ -242,7 +243,7 @@ def adjoint_sweep(
     while left:
         for _ in pieces(settings, left):
             left = int(sweep(model, data, settings, line, plan.terms, plan.weights, left))
-            if left == 0 or line.report[0, 0] != Status.SOLVED:
+            if left == 0 or line.report[0, StepReport.STATUS] != Status.SOLVED:
                 break
         if left == 0 or not _sweep_divided(engine, request, line, kappa, left - 1):
             break
@@ -256,7 +257,7 @@ def _sweep_divided(engine: Engine, request: Request, line: Sweep, kappa: float |
     """The sweep over step t, which could not be solved as a whole; False where division does not solve it."""
     step = line.xs[t], line.us[t], line.wrenches[t : t + 1]
     slopes = divided_slopes(engine, request, step, line.report[0], kappa)
-    if slopes.report[0] != Status.SOLVED:
+    if slopes.report[StepReport.STATUS] != Status.SOLVED:
         return False
     line.report[0] = 0.0
     costate = line.costate[0].copy()

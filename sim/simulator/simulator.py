@@ -14,6 +14,7 @@ from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory import room_for
+from sim.model.columns import StepReport
 from sim.simulator.arguments import is_plain
 from sim.simulator.contact_settings import with_contacts
 from sim.simulator.engine import REPORT, Rolled
@@ -227,7 +228,7 @@ class Simulator(RowStepping):
         """A rollout under the inputs (T, nu)."""
         knot, xs, reports = rolled.knot, rolled.xs, rolled.reports
         last = reports[min(knot, len(reports) - 1)] if len(reports) else np.zeros(REPORT)
-        status, where = STATUSES[int(last[0])], f"Simulator.rollout: step {knot}"
+        status, where = STATUSES[int(last[StepReport.STATUS])], f"Simulator.rollout: step {knot}"
         errors = rolled.division.errors[:knot]
         return Trajectory(
             simulator=self,
@@ -236,8 +237,8 @@ class Simulator(RowStepping):
             time=self.time_step * np.arange(knot + 1.0),
             status=status,
             knot=knot,
-            residual=float(last[2]),
-            iterations=reports[:knot, 1].astype(np.int64),
+            residual=float(last[StepReport.RESIDUAL]),
+            iterations=reports[:knot, StepReport.ITERATIONS].astype(np.int64),
             contacts=contacts_of(self.mechanism, self.time_step, rolled.contacts[:knot]),
             substeps=rolled.division.substeps[:knot],
             shares=rolled.division.shares[:knot],
@@ -419,11 +420,11 @@ class Simulator(RowStepping):
             rolled, J = self._by_parameters.roll(state, us[None], selected[1:], level, external)
             (A,), (B,), x_next, report = rolled.A, rolled.B, rolled.xs[1], rolled.reports[0]
             blocks = {"state": A, "input": B} | {name: J[0][:, rows] for name, rows in selected[1].rows.items()}
-        status = STATUSES[int(report[0])]
+        status, accuracy = STATUSES[int(report[StepReport.STATUS])], float(report[StepReport.ACCURACY])
         detail = "" if status == Status.SOLVED else sentence(self.mechanism, call, report, self.tolerance)
         if selected is not None and status == Status.SOLVED:
             blocks = {name: blocks[name] for name in selected[0]}
-        return ended(Jacobian(blocks, x_next, status, float(report[5]), detail, wrt is not None), throw)
+        return ended(Jacobian(blocks, x_next, status, accuracy, detail, wrt is not None), throw)
 
     def linearize_rollout(
         self,
@@ -460,12 +461,12 @@ class Simulator(RowStepping):
         knot, reports, detail = rolled.knot, rolled.reports, ""
         if knot < len(inputs):
             detail = sentence(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)
-            reports[knot:, 0] = reports[knot, 0]
+            reports[knot:, StepReport.STATUS] = reports[knot, StepReport.STATUS]
             rolled.xs[knot + 1 :] = rolled.xs[knot]
             for array in (rolled.A, rolled.B, *blocks.values()):
                 array[knot:] = 0.0
-        statuses = reports[:, 0].astype(np.int64)
-        linear = Linearization(rolled.A, rolled.B, rolled.xs[1:], statuses, blocks, reports[:, 5], detail)
+        statuses, accuracy = reports[:, StepReport.STATUS].astype(np.int64), reports[:, StepReport.ACCURACY]
+        linear = Linearization(rolled.A, rolled.B, rolled.xs[1:], statuses, blocks, accuracy, detail)
         return rolled.xs, ended(linear, throw)
 
     def linearize_trajectory(
@@ -498,18 +499,17 @@ class Simulator(RowStepping):
         inputs = self._arguments.inputs("linearize_trajectory", "us", us, ("T", self.nu))
         states = self._arguments.states(f"{call}(xs)", checks.array(f"{call}(xs)", xs, ("T", self.nx)))
         if len(states) - len(inputs) not in (0, 1):
-            raise ValueError(
-                f"{call}(xs): expected {len(inputs)} or {len(inputs) + 1} states, as us, got {len(states)}"
-            )
+            raise ValueError(f"{call}(xs): expected {len(inputs)} or {len(inputs) + 1} states, got {len(states)}")
         steps = whole_number(f"{call}(substeps=...)", substeps)
         level = self._arguments.kappa("linearize_trajectory", kappa)
         external = self._arguments.wrenches("linearize_trajectory", wrenches, len(inputs))
         A, B, x_next, reports = self._engine.linearize(states, inputs, steps, level, None, external)
-        statuses, detail = reports[:, 0].astype(np.int64), ""
+        statuses, detail = reports[:, StepReport.STATUS].astype(np.int64), ""
         if statuses.any():
             t = int(np.flatnonzero(statuses)[0])
             detail = sentence(self.mechanism, f"{call}: knot {t}", reports[t], self.tolerance)
-        return ended(Linearization(A, B, x_next, statuses, accuracy=reports[:, 5], detail=detail), throw)
+        linear = Linearization(A, B, x_next, statuses, accuracy=reports[:, StepReport.ACCURACY], detail=detail)
+        return ended(linear, throw)
 
     def linearize_maximal(
         self, z: ArrayLike, u: ArrayLike | None = None, kappa: float | None = None, *, throw: bool = False
@@ -577,7 +577,7 @@ class Simulator(RowStepping):
         blocks = {name: blocks[name] if name in blocks else line.parameters[found.rows[name]] for name in asked}
         if knot >= 0:
             detail = sentence(self.mechanism, f"{call}: step {knot}", line.report[0], self.tolerance)
-            return ended(Gradient(blocks, Status(int(line.report[0, 0])), detail), throw)
+            return ended(Gradient(blocks, Status(int(line.report[0, StepReport.STATUS])), detail), throw)
         finite = all(np.isfinite(block).all() for block in blocks.values())
         return ended(Gradient(blocks, Status.SOLVED if finite else Status.NOT_FINITE), throw)
 

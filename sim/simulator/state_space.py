@@ -14,6 +14,7 @@ from sim.mechanism import checks
 from sim.mechanism.axes import contact_frame
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes, pack
+from sim.model.columns import StepReport
 from sim.model.model import Model
 from sim.simulator.arguments import Arguments, shaped
 from sim.simulator.describe import describe
@@ -103,7 +104,7 @@ class StateSpace:
         names = [f"Loop joint {j.name!r}" for j in mech.loops] + [f"Gear {g.name!r}" for g in mech.gears]
         gaps = zip(self._engine.open_loops(), names, strict=True) if names else ()
         text = sentence(mech, where, report, self.tolerance, max(gaps, default=None))
-        if report[0] == Status.ANGULAR_STEP and x is not None:  # over a step that short no turn is one too far
+        if report[StepReport.STATUS] == Status.ANGULAR_STEP and x is not None:  # in so short a step no turn is too far
             short = StateSpace(mech, self._engine.settings._replace(time_step=1e-6, order=2, accuracy=0.0))
             text += f" {fastest(mech, short.maximal(x))}"
         return text

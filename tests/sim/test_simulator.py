@@ -158,7 +158,7 @@ ERRORS: list[tuple[Callable[[], object], str]] = [
     (lambda: SIM.rollout(X, np.full((4, 3), np.nan)), r"Simulator.rollout\(us\): .* got nan at index \(0, 0\)"),
     (lambda: SIM.rollout_batch(X, np.zeros((2, 4, 3))), r"rollout_batch\(x0s\): expected shape \(2, 15\), got \(15,\)"),
     (lambda: SIM.linearize(X, kappa=0), r"Simulator.linearize\(kappa=\.\.\.\): expected a number > 0"),
-    (lambda: SIM.linearize_trajectory([X] * 3, np.zeros((5, 3))), r"\(xs\): expected 5 or 6 states, as us, got 3"),
+    (lambda: SIM.linearize_trajectory([X] * 3, np.zeros((5, 3))), r"\(xs\): expected 5 or 6 states, got 3"),
     (lambda: SIM.linearize_trajectory([X, state(_3=2)], np.zeros((2, 3))), r"joint 'body' in row 1: expected a unit"),
     (
         lambda: SIM.linearize_trajectory([X], np.zeros((1, 3)), substeps=0),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.contact.contact_law import report_contact
 from sim.contact.pairs.limited_reach import BEYOND, end_of
 from sim.contact.pairs.pair_contact import is_absent
-from sim.model.columns import PairShare, Witness
+from sim.model.columns import ContactRow, PairShare, Witness
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -37,7 +37,7 @@ def report_pairs(model: Model, data: Data, out: Matrix) -> None:
         first = data.near_first[m]
         _report(model, data, first, end_of(model, first), out)
     if data.near_count[0] == 0 or data.near_first[0] > 0:
-        out[ground, 6] = BEYOND
+        out[ground, ContactRow.GAP] = BEYOND
 
 
 @kernel
@@ -50,6 +50,6 @@ def _report(model: Model, data: Data, first: int, end: int, out: Matrix) -> None
         for e in range(3):
             out[c, e] *= w
         if is_absent(data, j):
-            out[c, 6] = data.pair_out[j, Witness.GAP]
+            out[c, ContactRow.GAP] = data.pair_out[j, Witness.GAP]
             for e in range(3):
                 out[c, e] = 0.0

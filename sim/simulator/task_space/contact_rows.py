@@ -18,7 +18,7 @@ from sim.dynamics.displacements import tree_moves, turn_bodies
 from sim.dynamics.joints.motion import Increment
 from sim.dynamics.kinematics import displace, tree_poses, velocity_columns
 from sim.integrators.rollout import options_of
-from sim.model.columns import Kin
+from sim.model.columns import Kin, StepSetting
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
@@ -189,7 +189,7 @@ def contact_forces(
     """
     model = model_view(model_at)
     data = data_view(data_at)
-    nq, h = data.theta1.shape[0], settings[0]
+    nq, h = data.theta1.shape[0], settings[StepSetting.TIME_STEP]
     out = data.step_x[1]
     for row in range(rows.knots.shape[0]):
         t = rows.knots[row]
