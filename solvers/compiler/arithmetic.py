@@ -12,8 +12,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from numba import types
-from numba.core.typing import Context
 from numba.core.typing.templates import Signature, signature
+
+from solvers.compiler.index_typing import IndexTyping
 
 __all__ = ["ARITHMETIC", "OPERATORS", "KernelTyping", "choice"]
 
@@ -58,26 +59,13 @@ def choice(function: Any, kinds: Sequence[types.Type]) -> Callable[..., Any] | N
 _CALLS: dict[tuple[types.Type, tuple[types.Type, ...]], Signature] = {}
 
 
-class KernelTyping(Context):
-    """Numba's typing context, with a short cut to the types of these operators and of calls that it has met.
+class KernelTyping(IndexTyping):
+    """Numba's typing context, with a short cut to the types of these operators and of calls that it has met."""
 
-    It shares all that the other knows, and equals it: implementations of functions are kept by context.
-    """
-
-    __slots__ = ("_shared",)  # not in the shared dictionary
-
-    def __init__(self, context: Any) -> None:
-        self._shared = context
-        object.__setattr__(self, "__dict__", context.__dict__)
+    __slots__ = ()
 
     def refresh(self) -> None:
         """Do nothing: `cache.prepare` and `cache.renew` did. Numba asks for it before each function."""
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Context) and self.__dict__ is other.__dict__
-
-    def __hash__(self) -> int:
-        return hash(self._shared)
 
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
         """The signature of a call."""

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numba
 from numba.core.compiler import Compiler, CompileResult
 
+from solvers.compiler.index_typing import OLD, IndexTyping
 from solvers.compiler.notice import compiling
 
 __all__ = [
@@ -35,6 +36,9 @@ class PlainCompiler(Compiler):
     """Numba's own pipeline."""
 
     own = True
+
+    def __init__(self, typingctx: Any, *others: Any) -> None:
+        super().__init__(IndexTyping(typingctx) if OLD else typingctx, *others)
 
     def compile_extra(self, func: Any) -> Any:
         """Compile one function."""

@@ -91,6 +91,34 @@ def test_numba_compiles_others_functions_as_it_does_without_us():
         assert python(GUEST.format(first=first)) == alone, first
 
 
+INDEXED = """
+import solvers.compiler.index_typing as index_typing
+index_typing.OLD = True  # before the pipeline is chosen
+from enum import IntEnum
+import numpy as np
+from solvers.compiler import local_kernel
+
+class Column(IntEnum):
+    FIRST = 0
+    THIRD = 2
+
+def move(a, i):
+    row = a[i]
+    row[Column.FIRST] = a[i, Column.THIRD]
+    a[i, Column.THIRD] += row[Column.FIRST]
+
+a = np.arange(6.0).reshape(2, 3)
+local_kernel(move)(a, 1)
+print(*a.ravel())
+"""
+
+
+def test_names_of_columns_are_indices_for_old_numbas_too():
+    """Numba 0.66 and 0.67 refuse members of an IntEnum; this one takes them, and has to with our signatures, too."""
+    for plain in "01":
+        assert python(INDEXED, DOJO_OPT_PLAIN_NUMBA=plain).split() == ["0.0", "1.0", "2.0", "5.0", "4.0", "10.0"]
+
+
 PRUNED = """
 import os, time
 from pathlib import Path
