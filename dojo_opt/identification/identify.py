@@ -140,7 +140,7 @@ class Prior:
 
     def __init__(self, space: ParameterSpace, given: Mapping[str, Any]) -> None:
         self.mean, self.precision = space.values.copy(), np.zeros(len(space.values))
-        for name, value in given.items():
+        for name, value in checks.mapping("identify(prior=...)", given).items():
             call = f"identify(prior=...): {name!r}"
             rows = [
                 k for k, label in enumerate(space.labels) if label == name or label.startswith((f"{name}:", f"{name}["))
@@ -254,7 +254,7 @@ class IdentifyOptions:
             checks.whole_number(f"identify({name}=...)", getattr(self, name))
         for name in ("outlier", "tolerance"):
             checks.number(f"identify({name}=...)", getattr(self, name), above=0.0)
-        for kappa in self.kappas or ():
+        for kappa in () if self.kappas is None else checks.floats("identify(kappas=...)", self.kappas).ravel().tolist():
             checks.number("identify(kappas=...)", kappa, above=0.0)
 
 
@@ -302,8 +302,9 @@ def identify(
         raise TypeError(f"{call}(sim): expected a Simulator, got {sim!r}")
     checks.keywords(f"{call}(...)", options, [f.name for f in fields(IdentifyOptions)])
     o = IdentifyOptions(**options)
-    space = ParameterSpace(sim, tuple(parameters), tuple(bodies), bounds)
-    deviations = np.broadcast_to(checks.floats(f"{call}(noise=...)", noise), (sim.ndx,))
+    parameters, bodies = checks.names(f"{call}(parameters)", parameters), checks.names(f"{call}(bodies=...)", bodies)
+    space = ParameterSpace(sim, parameters, bodies, bounds)
+    deviations = checks.spread(f"{call}(noise=...)", noise, sim.ndx)
     if not np.all(deviations > 0.0) or not np.isfinite(deviations).any():
         raise ValueError(f"{call}(noise=...): expected numbers above 0, not all infinite, got {noise!r}")
     check_executor(call, executor)

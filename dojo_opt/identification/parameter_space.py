@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,6 +61,9 @@ class ParameterSpace:
         bounds: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         call = "ParameterSpace"
+        if not isinstance(sim, Simulator):
+            raise TypeError(f"{call}(sim): expected a Simulator, got {sim!r}")
+        names, bodies = checks.names(f"{call}(names)", names), checks.names(f"{call}(bodies=...)", bodies)
         self._sim = sim
         self._groups: list[_ParameterGroup] = []
         self._rows: dict[str, tuple[float, float, float]] = {}  # value, low, high
@@ -80,7 +83,7 @@ class ParameterSpace:
                 raise ValueError(f"{call}(names, bodies=...): {common!r} covers all parts, {clash[0]!r} included")
         self.labels = tuple(self._rows)
         self.values, self.low, self.high = (np.array(column) for column in zip(*self._rows.values(), strict=True))
-        self._narrow(f"{call}(bounds=...)", bounds or {})
+        self._narrow(f"{call}(bounds=...)", bounds)
 
     def __repr__(self) -> str:
         return f"ParameterSpace({self._sim.mechanism.name}, {len(self.labels)} values: {', '.join(self.labels)})"
@@ -194,11 +197,14 @@ class ParameterSpace:
         free = {label: (float(x), -np.inf, np.inf) for label, x in zip(labels, start, strict=True)}
         self._append(names, inertia_coordinates.body_of, free)
 
-    def _narrow(self, call: str, bounds: Mapping[str, tuple[float, float]]) -> None:
+    def _narrow(self, call: str, bounds: Any) -> None:
         """Bounds of single coordinates."""
-        for label, pair in bounds.items():
+        for label, pair in checks.mapping(call, bounds).items():
             k = self.labels.index(checks.one_of(call, label, self.labels))
-            low, high = max(float(pair[0]), self.low[k]), min(float(pair[1]), self.high[k])
+            given = checks.floats(f"{call}: {label!r}", pair)
+            if given.shape != (2,):
+                raise ValueError(f"{call}: {label!r}: expected (low, high), got {checks.shown(pair)}")
+            low, high = max(float(given[0]), self.low[k]), min(float(given[1]), self.high[k])
             if not low <= self.values[k] <= high or not low < high:
                 raise ValueError(f"{call}: {label!r} is {self.values[k]:g}, outside of {low:g} to {high:g}")
             self.low[k], self.high[k] = low, high

@@ -5,7 +5,7 @@ r_0 = s (-) m_0,    r_t = x_t(s, theta) (-) m_t,    both over the noise of the m
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,6 +41,8 @@ class Window:
 def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None) -> list[Window]:
     """Windows of `length` steps that follow one another, the last one shorter; whole motions for None."""
     call, out = "identify(trajectories)", []
+    if isinstance(trajectories, Trajectory) or not isinstance(trajectories, Iterable):
+        raise TypeError(f"{call}: expected a list of motions, got {checks.shown(trajectories)}")
     for number, given in enumerate(trajectories):
         raw = (given.x, given.u) if isinstance(given, Trajectory) else path_of(call, given)
         us = checks.array(call, raw[1], ("T", sim.nu))

@@ -32,6 +32,8 @@ def learn(
         raise TypeError(f"{name}(task): expected a Task, got {task!r}")
     checks.keywords(f"{name}(...)", given, [f.name for f in fields(settings)])
     check_executor(name, executor)
+    if not (resume is None or isinstance(resume, Learned)):
+        raise TypeError(f"{name}(resume=...): expected a Learned, got {resume!r}")
     run = search(task, settings(**given), checks.whole_number(f"{name}(seed=...)", seed, 0))
     run.executor = executor
     return _run_epochs(run, resume)
@@ -75,6 +77,8 @@ def _run_epochs(search: Any, resume: Learned | None) -> Learned:
     if not np.isfinite(search.best):
         search.assess()
     status = Status.SOLVED if success else status
+    if not np.isfinite(search.best):  # a reward that is no number is none to learn from
+        success, status = False, Status.NOT_FINITE
     return Learned(
         search.chosen, success, status, progress.message(status), name, search.seed, search.best, search.steps,
         search.unsolved, search.infinite, progress.seconds, progress.records, state,

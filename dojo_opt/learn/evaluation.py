@@ -63,9 +63,9 @@ def evaluate(
     Raises:
         ValueError: the policy has no task, or a number is out of range.
     """
-    task = policy.task
+    task = getattr(policy, "task", None)
     if task is None:
-        raise ValueError("evaluate(policy): expected a policy with a task")
+        raise ValueError(f"evaluate(policy): expected a policy with a task, got {policy!r}")
     count = room_for("evaluate(episodes)", episodes, 8.0 * (task.nx + task.observations) + _EPISODE)
     model = Drawn.of(task)
     if substeps is not None:

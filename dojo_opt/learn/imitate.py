@@ -10,17 +10,18 @@ are limited to [-1, 1], as inputs are. `shac(..., start=policy)` goes on from th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.learn.common_options import check_common
 from dojo_opt.learn.epochs import learn
 from dojo_opt.learn.evaluation import Evaluation
 from dojo_opt.learn.learned import Learned
-from dojo_opt.learn.network import ACTIVATIONS, Adam, Network, clipped
+from dojo_opt.learn.network import Adam, Network, clipped
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.task import Task
@@ -73,13 +74,12 @@ class ImitationOptions:
     __repr__ = brief_repr
 
     def __post_init__(self) -> None:
-        for name in ("epochs", "batches", "episodes"):
-            checks.whole_number(f"imitate({name}=...)", getattr(self, name))
-        for name in ("copies", "evaluations"):
-            checks.whole_number(f"imitate({name}=...)", getattr(self, name), 0)
-        for name in ("rate", "norm"):
-            checks.number(f"imitate({name}=...)", getattr(self, name), above=0.0)
-        checks.one_of("imitate(activation=...)", self.activation, ACTIVATIONS)
+        check_common("imitate", self)
+        checks.whole_number("imitate(batches=...)", self.batches)
+        checks.whole_number("imitate(copies=...)", self.copies, 0)
+        checks.number("imitate(norm=...)", self.norm, above=0.0)
+        if checks.floats("imitate(spread=...)", self.spread).min(initial=0.0) < 0.0:
+            raise ValueError(f"imitate(spread=...): expected numbers >= 0, got {self.spread!r}")
 
 
 class _Knots:
@@ -89,6 +89,8 @@ class _Knots:
         call, sim = "imitate(plans)", task.sim
         half = 0.5 * (task.high - task.low)
         parts: list[tuple[Floats, Floats, Floats]] = []
+        if isinstance(plans, str) or not isinstance(plans, Iterable):
+            raise TypeError(f"{call}: expected plans, or (states, inputs, gains), got {checks.shown(plans)}")
         for given in plans:
             raw = (given.x, given.u, given.K) if isinstance(given, Plan) else given
             if not isinstance(raw, tuple | list) or len(raw) != 3:
@@ -122,7 +124,7 @@ class _Imitation(Training):
         scale = statistics.sums[0].copy(), statistics.deviation()
         self.policy = LearnedPolicy(network, network.start(np.random.default_rng((seed, 0)), 0.1), *scale, task)
         self.adam = Adam(network.count, (0.9, 0.99))
-        self.spread = np.broadcast_to(checks.floats("imitate(spread=...)", options.spread), (task.sim.ndx,))
+        self.spread = checks.spread("imitate(spread=...)", options.spread, task.sim.ndx)
         self.chosen = self.policy
 
     def targets(self) -> tuple[Floats, Floats]:

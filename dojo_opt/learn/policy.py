@@ -146,7 +146,9 @@ class LearnedPolicy:
         """
 
         def controller(time: float, x: Floats) -> Floats:
-            return self(np.concatenate([x, np.asarray(command(time) if callable(command) else command)]))
+            given = command(time) if callable(command) else command
+            size = self.task.commands if self.task is not None else None
+            return self(np.concatenate([x, checks.array("LearnedPolicy.commanded(command)", given, (size,))]))
 
         return controller
 

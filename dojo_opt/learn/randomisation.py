@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -52,20 +52,28 @@ class Randomisation:
     __repr__ = brief_repr
 
     def __post_init__(self) -> None:
-        for name, (low, high) in {**self.values, **self.factors}.items():
-            if not low <= high:
-                raise ValueError(f"Randomisation: {name!r}: expected low <= high, got {low} and {high}")
+        for field_ in ("values", "factors"):
+            for name, pair in checks.mapping(f"Randomisation({field_}=...)", getattr(self, field_)).items():
+                low, high = checks.vector(f"Randomisation({field_}=...): {name!r}", pair, 2)
+                if not low <= high:
+                    raise ValueError(f"Randomisation: {name!r}: expected low <= high, got {low} and {high}")
         if set(self.values) & set(self.factors):
             raise ValueError("Randomisation(values=..., factors=...): a parameter is in both")
-        for count in self.substeps:
-            checks.whole_number("Randomisation(substeps=...)", count)
-        for count in self.delays:
-            checks.whole_number("Randomisation(delays=...)", count, 0)
-        if self.kappa is not None and not 0.0 < self.kappa[0] <= self.kappa[1]:
-            raise ValueError(f"Randomisation(kappa=...): expected 0 < low <= high, got {self.kappa}")
+        for field_, least in (("substeps", 1), ("delays", 0)):
+            counts = getattr(self, field_)
+            if isinstance(counts, str) or not isinstance(counts, Sequence):
+                raise TypeError(f"Randomisation({field_}=...): expected whole numbers, got {checks.shown(counts)}")
+            for count in counts:
+                checks.whole_number(f"Randomisation({field_}=...)", count, least)
+        if self.kappa is not None:
+            low, high = checks.vector("Randomisation(kappa=...)", self.kappa, 2)
+            if not 0.0 < low <= high:
+                raise ValueError(f"Randomisation(kappa=...): expected 0 < low <= high, got {self.kappa}")
         checks.number("Randomisation(noise=...)", self.noise, at_least=0.0)
         room_for("Randomisation(models=...)", self.models, 8.0 * (1 + len(self.values) + len(self.factors)))
         if self.pushes is not None:
+            if not isinstance(self.pushes, tuple | list) or len(self.pushes) != 2:
+                raise TypeError(f"Randomisation(pushes=...): expected (time, deviations), got {self.pushes!r}")
             checks.number("Randomisation(pushes=...)", self.pushes[0], above=0.0)
             checks.floats("Randomisation(pushes=...)", self.pushes[1])
 
@@ -77,6 +85,11 @@ class Models:
         self._task, self._given = task, randomisation
         self._choices = randomisation.substeps or (task.substeps,)
         sim, count = task.sim, randomisation.models
+        if randomisation.pushes is not None and np.size(randomisation.pushes[1]) > sim.nv:
+            raise ValueError(
+                f"Randomisation(pushes=...): expected at most {sim.nv} deviations, as velocities, got "
+                f"{np.size(randomisation.pushes[1])}"
+            )
         self._sims: dict[int, Simulator] = {}
         self._tables: dict[int, dict[str, Floats]] = {}
         for substeps in dict.fromkeys(self._choices):

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.common_options import check_common
 from dojo_opt.learn.epochs import learn
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import Network
@@ -80,8 +81,11 @@ class RandomSearchOptions:
     stream: Any = None
 
     def __post_init__(self) -> None:
-        for name in ("epochs", "directions", "best", "episodes"):
+        check_common("ars", self)
+        for name in ("directions", "best"):
             checks.whole_number(f"ars({name}=...)", getattr(self, name))
+        checks.number("ars(noise=...)", self.noise, above=0.0)
+        checks.number("ars(shift=...)", self.shift)
         if self.best > self.directions:
             raise ValueError(f"ars(best=...): expected at most {self.directions}, as directions, got {self.best}")
 
@@ -125,9 +129,10 @@ class GradientSearchOptions:
     stream: Any = None
 
     def __post_init__(self) -> None:
-        for name in ("epochs", "environments", "episodes"):
-            checks.whole_number(f"gradient_search({name}=...)", getattr(self, name))
-        checks.number("gradient_search(costate=...)", self.costate, above=0.0)
+        check_common("gradient_search", self)
+        checks.whole_number("gradient_search(environments=...)", self.environments)
+        for name in ("costate",) if self.kappa_grad is None else ("costate", "kappa_grad"):
+            checks.number(f"gradient_search({name}=...)", getattr(self, name), above=0.0)
 
 
 class WeightSearch(Training):

@@ -47,6 +47,8 @@ def seeds(
     if not callable(algorithm):
         raise TypeError(f"seeds(algorithm): expected a function such as dojo.learn.shac, got {algorithm!r}")
     check_executor("seeds", executor)
+    if not isinstance(numbers, Iterable):
+        raise TypeError(f"seeds(numbers): expected whole numbers, got {numbers!r}")
     chosen = [checks.whole_number("seeds(numbers)", number, 0) for number in numbers]
     out: list[Learned] = []
     with suppress(KeyboardInterrupt):

@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.learn.action_delay import ActionDelay
+from dojo_opt.learn.common_options import check_common
 from dojo_opt.learn.discounted_sum import DiscountedSum
 from dojo_opt.learn.epochs import learn
 from dojo_opt.learn.learned import Learned
-from dojo_opt.learn.network import ACTIVATIONS, Adam, Network, clipped
+from dojo_opt.learn.network import Adam, Network, clipped
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import Noise, PolicyRollout, roll_policy_batch, value_network
@@ -106,19 +107,23 @@ class ShacOptions:
 
     def __post_init__(self) -> None:
         lengths = () if self.episode is None else ("episode",)
-        for name in ("epochs", "environments", "horizon", "passes", "batches", "episodes", *lengths):
+        check_common("shac", self)
+        for name in ("environments", "passes", "batches", *lengths):
             checks.whole_number(f"shac({name}=...)", getattr(self, name))
-        checks.whole_number("shac(evaluations=...)", self.evaluations, 0)
-        checks.one_of("shac(activation=...)", self.activation, ACTIVATIONS)
         for name in ("gamma", "trace", "blend"):
             checks.share(f"shac({name}=...)", getattr(self, name))
-        for name in ("rate", "critic_rate", "norm", "costate"):
+        kappa = () if self.kappa_grad is None else ("kappa_grad",)
+        for name in ("critic_rate", "norm", "costate", *kappa):
             checks.number(f"shac({name}=...)", getattr(self, name), above=0.0)
+        for name, most in (("deviation", float("inf")), ("betas", 1.0)):
+            first, last = checks.vector(f"shac({name}=...)", getattr(self, name), 2)
+            if min(first, last) < 0.0 or max(first, last) >= most:
+                raise ValueError(
+                    f"shac({name}=...): expected two numbers from 0 to below {most:g}, got {first}, {last}"
+                )
         checks.number("shac(saturation=...)", self.saturation, at_least=0.0)
         if not (self.start is None or isinstance(self.start, LearnedPolicy)):
             raise TypeError(f"shac(start=...): expected a LearnedPolicy, got {self.start!r}")
-        if not isinstance(self.randomisation, Randomisation):
-            raise TypeError(f"shac(randomisation=...): expected a Randomisation, got {self.randomisation!r}")
 
 
 class _Shac(Training):

@@ -117,6 +117,30 @@ def vector(call: str, value: Any, length: int) -> tuple[float, ...]:
     return tuple(float(x) for x in array(call, value, (length,)))
 
 
+def spread(call: str, value: Any, length: int) -> Floats:
+    """(length,) numbers, NaN excepted: as many, or one for all."""
+    out = floats(call, value)
+    if out.shape not in ((), (length,)) or np.isnan(out).any():
+        raise ValueError(f"{call}: expected one number or {length}, got {shown(value)}")
+    return np.array(np.broadcast_to(out, (length,)))
+
+
+def names(call: str, value: Any) -> tuple[str, ...]:
+    """`value` as a tuple of names."""
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise TypeError(f"{call}: expected a list of names, got {shown(value)}")
+    return tuple(name(call, one) for one in value)
+
+
+def mapping(call: str, value: Any) -> Mapping[Any, Any]:
+    """`value` as a table; None is an empty one."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{call}: expected a table, {{name: value}}, got {shown(value)}")
+    return value
+
+
 def direction(call: str, value: Any) -> tuple[float, ...]:
     """`value` scaled to a unit vector."""
     out = array(call, value, (3,))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -70,40 +72,41 @@ def load_mjcf(
     if not isinstance(collisions, bool):
         checks.one_of("load_mjcf(collisions=...)", collisions, ("self",))
     model, file = _compile(source)
-    touching = contact_choices("load_mjcf", friction, law, rim_points)
-    notes = Notes()
-    groups, where = find_groups(model)
-    bodies, joints, homes = _tree(model, groups, merge, notes)
-    if not joints:
-        raise ValueError(f"load_mjcf: {file}: no joint is free to move")
-    inputs, gear, low, high = find_inputs(model, homes, where, notes)
-    joints = with_friction(model, joints, homes, joint_friction, notes)
-    left_out(model, bool(collisions), notes)
-    mech = MjcfMechanism(
-        bodies,
-        [*joints, *find_loops(model, where, notes)],
-        find_contacts(model, where, touching, collisions is True, notes) if ground else [],
-        inputs,
-        gravity=model.opt.gravity if gravity is None else gravity,
-        name=Path(file).stem,
-        neutral=_neutral(model, keyframe, notes),
-        collisions=[
-            *(find_on_planes(model, where, touching) if ground else []),
-            *(find_collisions(model, where, touching, notes) if collisions is True else []),
-        ],
-        gears=find_gears(model, homes, notes),
-    )
-    mech = _without_constant_gaps(mech, notes)
-    mech = _clear(mech) if keyframe is None else mech
-    if collisions == "self":
-        pairs, overlapping = mech.self_collisions()
-        mech = replace(mech, collisions=[*mech.collisions, *pairs])
-        if overlapping:
-            notes.add(OVERLAPPING, overlapping)
-    known = {model.joint(j).name or f"joint_{j}": home for j, home in homes.items()}
-    report = MjcfReport(file, notes.close(), _frames(model, where), known, gear, low, high)
-    _warn(report)
-    return replace(mech, report=report)
+    with _named(file):
+        touching = contact_choices("load_mjcf", friction, law, rim_points)
+        notes = Notes()
+        groups, where = find_groups(model)
+        bodies, joints, homes = _tree(model, groups, merge, notes)
+        if not joints:
+            raise ValueError(f"load_mjcf: {file}: no joint is free to move")
+        inputs, gear, low, high = find_inputs(model, homes, where, notes)
+        joints = with_friction(model, joints, homes, joint_friction, notes)
+        left_out(model, bool(collisions), notes)
+        mech = MjcfMechanism(
+            bodies,
+            [*joints, *find_loops(model, where, notes)],
+            find_contacts(model, where, touching, collisions is True, notes) if ground else [],
+            inputs,
+            gravity=model.opt.gravity if gravity is None else gravity,
+            name=Path(file).stem,
+            neutral=_neutral(model, keyframe, notes),
+            collisions=[
+                *(find_on_planes(model, where, touching) if ground else []),
+                *(find_collisions(model, where, touching, notes) if collisions is True else []),
+            ],
+            gears=find_gears(model, homes, notes),
+        )
+        mech = _without_constant_gaps(mech, notes)
+        mech = _clear(mech) if keyframe is None else mech
+        if collisions == "self":
+            pairs, overlapping = mech.self_collisions()
+            mech = replace(mech, collisions=[*mech.collisions, *pairs])
+            if overlapping:
+                notes.add(OVERLAPPING, overlapping)
+        known = {model.joint(j).name or f"joint_{j}": home for j, home in homes.items()}
+        report = MjcfReport(file, notes.close(), _frames(model, where), known, gear, low, high)
+        _warn(report)
+        return replace(mech, report=report)
 
 
 def _warn(report: MjcfReport) -> None:
@@ -145,6 +148,17 @@ def _compensation(model: Any, group: GeomGroup, notes: Notes) -> float:
             "gravity compensation acts at the centre of mass of bodies that are one here", [group.name], warn=True
         )
     return float(shares @ masses / masses.sum())
+
+
+@contextmanager
+def _named(file: str) -> Iterator[None]:
+    """Parts of the mechanism name themselves where they refuse a number; the error names the file, too."""
+    try:
+        yield
+    except ValueError as error:
+        if str(error).startswith("load_mjcf"):
+            raise
+        raise ValueError(f"load_mjcf: {file}: {error}") from error
 
 
 def _compile(source: str | Path) -> tuple[Any, str]:
