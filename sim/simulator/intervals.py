@@ -20,7 +20,8 @@ from solvers.status import Status
 from solvers.types import Vector
 
 _FINEST = 1e-3  # how well the share of a momentum is found
-_BRIEF = 3e-4  # of a step: its square is small, and the rounding of displacements over it too
+_BRIEF = 3e-4  # of a step: its cube is small, and the rounding of displacements over it too
+_ANGLE = 1e-3  # [m, rad] by which no joint moves further in such an interval
 
 
 class Intervals:
@@ -154,7 +155,7 @@ class Intervals:
 
             P_v = M (M + C)^-1 p_v      P_q = (M w)_q + M (M + C)^-1 (p_q - (M w)_q)
 
-        (M w)_q is p_q of the velocity w over an interval of length 0, extrapolated from two short ones.
+        (M w)_q is p_q of the velocity w over an interval of length 0, extrapolated from three short ones.
         """
         by_q, by_v = self._arriving_slopes(h, x)
         if self._damped:
@@ -162,8 +163,9 @@ class Intervals:
             damped = M + self._damping(h)
             node = x.copy()
             node[-len(M) :] = np.linalg.solve(damped, self._arriving(h, x))
-            near, far = (self._arriving_slopes(k * _BRIEF * self._h, node)[0] for k in (1.0, 2.0))
-            rest = 2.0 * near - far
+            brief = min(_BRIEF * self._h, _ANGLE / max(float(np.abs(node[-len(M) :]).max()), 1e-9))
+            one, two, three = (self._arriving_slopes(k * brief, node)[0] for k in (1.0, 2.0, 3.0))
+            rest = 3.0 * (one - two) + three
             by_q, by_v = rest + M @ np.linalg.solve(damped, by_q - rest), M @ np.linalg.solve(damped, by_v)
         return by_q, by_v
 

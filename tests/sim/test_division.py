@@ -278,3 +278,18 @@ def test_ctrl_c_inside_a_division_keeps_the_steps_before(
         sim.rollout(x, steps=20)
     assert stopped.value.result.knot == 1
     assert stopped.value.result.status == dojo.Status.INTERRUPTED
+
+
+@pytest.mark.parametrize("speed", [1.0, 100.0, 3000.0])
+def test_momenta_behind_dampers_have_their_slopes_however_fast_joints_turn(speed: float) -> None:
+    sim = dojo.Simulator(chain("spherical", 3, damper=2000.0), time_step=0.01)
+    intervals, nv, part = engine(sim).intervals, sim.nv, 1e-4
+    rng = np.random.default_rng(0)
+    x = random_state(sim, rng, 1.0)
+    x[-nv:] *= speed / np.abs(x[-nv:]).max()
+    by_q, by_v = intervals._momentum_slopes(part, x)
+    for _ in range(3):
+        d = np.r_[rng.normal(size=nv), speed * rng.normal(size=nv)]
+        ends = [intervals.momentum(part, sim.integrate(x, s * 1e-6 * d)) for s in (1.0, -1.0)]
+        slope = (ends[0] - ends[1]) / 2e-6
+        assert np.abs(by_q @ d[:nv] + by_v @ d[nv:] - slope).max() < 1e-6 * np.abs(slope).max()
