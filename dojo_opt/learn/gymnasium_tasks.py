@@ -63,7 +63,7 @@ COARSE = Randomisation(
 _RARELY: dict[str, Any] = {"environments": 32, "evaluations": 5, "episodes": 4}
 _CHEETAH = {**_RARELY, "epochs": 900, "episode": 128, "randomisation": TRANSFER, "evaluations": 6}
 _LEGGED = {**_RARELY, "epochs": 800, "horizon": 32, "gamma": 0.997, "randomisation": BALANCE}
-_ANT = {**_RARELY, "epochs": 700, "episode": 128, "rate": 3e-3, "randomisation": COARSE}
+_ANT = {**_RARELY, "epochs": 2100, "episode": 128, "rate": 3e-3, "randomisation": COARSE}
 
 
 def _model(file: str) -> MjcfMechanism:

@@ -18,8 +18,7 @@ No step of order 2 is shorter than the shortest length, whatever its error (`err
 on the central path a contact is a force kappa/(h gap), a spring without damping to steps that are short enough to
 follow it.
 
-    goal    (7,) accuracy [m/s, rad/s], time step of kappa [s], end of the stretch [s], shortest length [s],
-            least kappa, whether order 8 can be: 1 or 0, shortest length of an impact [s]
+    goal    (8,) columns of AccuracyGoal
 """
 
 from __future__ import annotations

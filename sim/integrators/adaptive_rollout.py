@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.integrators.adaptive import attempt
-from sim.integrators.stretch import MOST, AccuracyGoal, Clock, Embedded, Stretch, begin_stretch
+from sim.integrators.stretch import AccuracyGoal, Clock, Embedded, Stretch, begin_stretch
 from sim.model.columns import StepReport
 from sim.model.layout import data_view
 from sim.model.pace import is_due, start_pace
@@ -81,7 +81,7 @@ def roll_stretches(
             effort, line.taken[0] = line.report[StepReport.ITERATIONS], 0
             status = attempt(models, works, settings, goal, embedded, line)
             path.substeps[t] += line.taken[0]
-            if path.substeps[t] > MOST:
+            if path.substeps[t] > goal[AccuracyGoal.MOST]:
                 status = _MAX_ITERATIONS
             if status != _SOLVED:
                 _end(line, path, end, t, status)

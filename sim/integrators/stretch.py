@@ -12,8 +12,6 @@ from solvers.compiler import kernel
 from solvers.dense import clear, copy_vector
 from solvers.types import Cube, Integers, Matrix, Vector
 
-MOST = 1_000_000  # sub-steps of a stretch: an input is not held for ever
-
 
 class Clock(IntEnum):
     """clock of a Stretch."""
@@ -46,6 +44,7 @@ class AccuracyGoal(IntEnum):
     LEAST_KAPPA = 4  # [N s m]
     TREE = 5  # 1 where nothing couples the trees of joints
     IMPACT = 6  # shortest length of an impact [s]
+    MOST = 7  # sub-steps: an input is not held for ever
 
 
 class Stretch(NamedTuple):

@@ -22,7 +22,7 @@ from sim.integrators.hamilton_gradient import Slopes
 from sim.integrators.node_slopes import node_slopes
 from sim.integrators.node_step import begin_work, mean_of_node, node_at
 from sim.integrators.rollout import Linearized, MotionBuffers, linearize, roll
-from sim.integrators.stretch import MOST, Clock, Embedded, Stretch
+from sim.integrators.stretch import Clock, Embedded, Stretch
 from sim.integrators.tableau import embedded
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.servos import limited_servos
@@ -47,6 +47,7 @@ _LEAST_PRESSING = 1e-6  # [m/s, rad/s] accuracy: shorter impacts would round vel
 _LEAST_KAPPA = 1e-13  # [N s m]
 _CONVERGED = 1e-6  # tolerance of steps with loops or gears, in accuracies
 _ROWS = 256  # sub-steps between two pauses
+_MOST = 1_000_000  # sub-steps of a step: an input is not held for ever
 
 Held = tuple[Vector, Cube]  # input (nu,) and external wrenches (1 or 0, nbody, 6) of a step
 
@@ -125,7 +126,7 @@ class AdaptiveEngine(KnotEngine):
             if status != Status.SOLVED or line.clock[Clock.TIME] >= end:
                 break
             taken += n
-            if taken > MOST:
+            if taken > _MOST:
                 status = int(Status.MAX_ITERATIONS)
                 break
         line.report[StepReport.STATUS], line.report[StepReport.WORST] = status, -1.0
@@ -136,12 +137,13 @@ class AdaptiveEngine(KnotEngine):
         return Substeps(status, line.x.copy(), line.report.copy(), contacts, starts, lengths, orders, error)
 
     def _goal(self, settings: Vector) -> Vector:
-        """(7,) what sub-steps have to reach, see sim/integrators/adaptive.py."""
+        """(8,) what sub-steps have to reach, see sim/integrators/adaptive.py."""
         s = self.settings
         pressing = settings[StepSetting.KAPPA] / s.time_step  # [N m]
         settled = max(self._settling * pressing**0.5, (self._settling**2 * _LEAST_KAPPA) ** (1.0 / 3.0), SHORTEST)
         impact = min(max(SHORTEST, _IMPACT / self._lightest), settled)
-        return np.array([s.accuracy, s.time_step, s.time_step, settled, _LEAST_KAPPA, float(self._is_tree), impact])
+        lengths, tree = (s.time_step, s.time_step, settled), float(self._is_tree)
+        return np.array([s.accuracy, *lengths, _LEAST_KAPPA, tree, impact, _MOST])
 
     # -- sub-steps one by one ------------------------------------------------------------------------------------------
 

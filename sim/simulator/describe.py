@@ -135,7 +135,9 @@ def _far_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
     if not len(model.contact_body):
         return []
     distances = reach(model, settings.time_step, settings.kappa, settings.tolerance)
-    last = int(np.argmax(distances))
+    if not np.isfinite(distances).any():
+        return []
+    last = int(np.argmax(np.where(np.isfinite(distances), distances, -np.inf)))
     nearest, farthest = f"{distances.min():.2g}", f"{distances[last]:.2g}"
     span = f"{nearest} m" if nearest == farthest else f"{nearest} m, {mech.contact_names[last]} {farthest} m"
     return [f"  {'inactive contacts':<18}omitted from the solver beyond a gap of {span}; their force kappa/gap stays"]

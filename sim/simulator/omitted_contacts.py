@@ -12,7 +12,7 @@ from sim.model.model import Model
 
 
 def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDArray[np.float64]:
-    """Gap beyond which each contact of a body at rest is inactive, (ncontact,) [m].
+    """Gap beyond which each contact of a body at rest is inactive, (ncontact,) [m]; infinite if it never is.
 
     Twice the positive root a of the bound in inactive.py, and of that in pairs/inactive_pairs.py for collisions:
 
@@ -28,6 +28,9 @@ def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDA
     for j in np.flatnonzero(model.pair_feature == 0):
         bound = model.pair_far[j]
         points, limit = int(bound[PairBound.POINTS]), bound[PairBound.REACH]
+        if not np.isfinite(bound[PairBound.MOBILITY]):  # a string, whose gap has no ball around it: always active
+            out[ground + j : ground + j + points] = limit
+            continue
         mu, share = model.contact_friction[ground + j], points * bound[PairBound.COLLISIONS] * kappa / COUPLED
         b = share * time_step * (1.0 + mu) * (bound[PairBound.TURNING] + bound[PairBound.MOBILITY] * STEEPEST / limit)
         c = share * (mu * mu + time_step * (1.0 + mu)) * bound[PairBound.MOBILITY]

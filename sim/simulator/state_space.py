@@ -74,6 +74,11 @@ class StateSpace:
             raise AttributeError(f"Simulator.{name}: a Simulator does not change; use replace({name}=...)")
         super().__setattr__(name, value)
 
+    @property
+    def second_order(self) -> str:
+        """Why all steps of a simulator of higher order are of order 2, as where a spring is too stiff; empty if not."""
+        return self._engine.second_order
+
     def describe(self) -> str:
         """A page of text about the simulator.
 

@@ -69,8 +69,8 @@ def test_a_representable_step_is_not_refused_and_a_stop_does_not_pass() -> None:
     gentle = bodies.spin((0.1, 0.2, 0.3), (0.0, 1.0, 0.0), 1e-2, refusal="half a turn")
     verdict = gentle.judge(ours(gentle), ours=True)
     assert not verdict.passed and verdict.text == "not refused" and np.isnan(verdict.value)
-    stopped = ours(chains.heavy_tip(5e4, 1e-3, angle=np.pi / 2.0))
-    verdict = chains.heavy_tip(5e4, 1e-3, angle=np.pi / 2.0).judge(stopped, ours=True)
+    tip = chains.heavy_tip(5e4, 1e-3, angle=np.pi / 2.0)
+    verdict = tip.judge(tip.run(replace(OURS, divide=False)), ours=True)
     assert not verdict.passed and verdict.text.startswith("failed at")
 
 

@@ -23,6 +23,14 @@ def test_collisions_are_contacts_of_a_step() -> None:
     assert "1 cones, 0 pyramids, 8 without friction" in text
     assert "interior point" in text and "omitted" in text and "Newton" not in text
     assert "\ncontacts\n" not in text
+    assert re.search(r"beyond a gap of 0\.\d+ m, ball-box 0\.\d+ m;", text), text
+
+
+def test_strings_are_always_active() -> None:
+    balls = [dojo.Body(name, 1.0, shape=dojo.Sphere(0.1)) for name in "ab"]
+    joints = [dojo.Joint("floating", None, name) for name in "ab"]
+    mech = dojo.Mechanism(balls, joints, collisions=[dojo.Collision("a", "b", dojo.String(1.0), dojo.String(1.0))])
+    assert "inactive contacts" not in dojo.Simulator(mech, time_step=0.01).describe()
 
 
 def test_a_pendulum_has_no_empty_lists_and_one_of_each() -> None:
