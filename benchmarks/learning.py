@@ -4,7 +4,8 @@ python benchmarks/learning.py DIR HalfCheetah --algorithms shac ars --seeds 0 1 
 python benchmarks/learning.py DIR HalfCheetah --only-figure                                 draws saved results
 python benchmarks/learning.py DIR HalfCheetah --beside Hopper --table       and tabulates it, in DIR/learning.json
 
-`best_of` with seed k begins with the seeds 3k, 3k + 1, 3k + 2 of SHAC. A run is DIR/TASK_ALGORITHM_SEED.npz, and its
+`best_of` with seed k begins with the seeds 3k, 3k + 1, 3k + 2 of SHAC; curves and returns after 60 s count the time of
+the chosen one alone, the whole time counts all three. A run is DIR/TASK_ALGORITHM_SEED.npz, and its
 policy DIR/....policy.npz. For one core, set NUMBA_NUM_THREADS=1 and OPENBLAS_NUM_THREADS=1. The table has the returns
 of policies at a time step and a smoothing that they have not learnt on, and in MuJoCo, by
 benchmarks/evaluate_policy.py, which imports nothing of dojo-opt. Runs of other libraries are those of
@@ -117,7 +118,8 @@ def figure(folder: Path, names: list[str]) -> None:
             rows = min(map(len, curves))
             seconds = np.median([c[:rows, 0] for c in curves], axis=0)
             returns = np.array([c[:rows, 1] for c in curves])
-            label = f"{algorithm}, {len(curves)} seed{'s' if len(curves) > 1 else ''}"
+            clock = ", clock of the chosen seed" if algorithm == "best_of" else ""
+            label = f"{algorithm}, {len(curves)} seed{'s' if len(curves) > 1 else ''}{clock}"
             axes.plot(seconds, np.median(returns, axis=0), marker=".", label=label)
             axes.fill_between(seconds, returns.min(axis=0), returns.max(axis=0), alpha=0.2)
         axes.set(xlabel="processor time [s]", ylabel="return in the task", title=name, xlim=(0.0, None))
