@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from sim.contact.contact_report import report_contacts
 from sim.contact.inactive import cluster_gap, highest
-from sim.contact.pairs.clearance import least_gap, measure_pairs, omitted_pairs
+from sim.contact.pairs.clearance import largest_speed, least_gap, measure_pairs, omitted_pairs
 from sim.dynamics.external_forces import set_external
 from sim.integrators.runge_kutta import advance, begin
 from sim.mechanism.confined import IDLE
@@ -29,23 +29,13 @@ from sim.model.model import Model
 from sim.model.pace import is_due, start_pace
 from solvers.compiler import Table, kernel
 from solvers.dense import clear, copy, copy_vector
-from solvers.rotation import cross, quat_matrix, quat_turn
+from solvers.rotation import quat_matrix, quat_turn
 from solvers.status import Status
 from solvers.types import Cube, Matrix, Vector
 
 NEAR = -1  # in place of a Status: a contact or limit is active
 
 _SOLVED = int(Status.SOLVED)
-
-
-@kernel
-def _speed(model: Model, data: Data, c: int) -> float:
-    """|v + w x r| of all points of the cluster at contact c is at most this: |v| + arm |w| of its body."""
-    i = model.contact_body[c]
-    V, o = data.twist[i], data.origin
-    x, y, z = cross(V[3], V[4], V[5], data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2])
-    x, y, z = x + V[0], y + V[1], z + V[2]
-    return sqrt(x * x + y * y + z * z) + model.cluster[c, Cluster.ARM] * sqrt(V[3] * V[3] + V[4] * V[4] + V[5] * V[5])
 
 
 @kernel
@@ -74,7 +64,7 @@ def left_out(model: Model, data: Data, kappa: float, v: Vector, h: float) -> flo
     total = 0.0
     for c in range(model.contact_height.shape[0]):
         if model.cluster_end[c] > 0 and model.contact_hold[c] != IDLE:
-            row, speed = data.inactive[c], _speed(model, data, c)
+            row, speed = data.inactive[c], largest_speed(data, model.contact_body[c], model.cluster[c, Cluster.ARM])
             gap = cluster_gap(model, data, c, highest(model, c), False)
             g = least_gap(gap, speed, row[Apart.GAP], row[Apart.SPEED], h)
             row[Apart.GAP], row[Apart.SPEED] = gap, speed

@@ -110,9 +110,7 @@ class AdaptiveEngine(KnotEngine):
         found: tuple[Table, Embedded, Stretch] = self._kept.line
         return found
 
-    def take(
-        self, x: Vector, u: Vector, wrench: Cube, kappa: float | None = None, length: float | None = None
-    ) -> Substeps:
+    def take(self, x: Vector, u: Vector, wrench: Cube, kappa: float | None = None) -> Substeps:
         """The step from x (nx,) under u (nu,) and external wrenches (1 or 0, nbody, 6)."""
         (models, errors, line), settings = self._line(), self.settings.array(kappa)
         goal, end = self._goal(settings), self.settings.time_step

@@ -31,6 +31,15 @@ def least_gap(gap: float, speed: float, before: float, speed_before: float, trav
 
 
 @kernel
+def largest_speed(data: Data, i: int, arm: float) -> float:
+    """|v| + arm |w| of body i at configuration 2: no point within `arm` of its centre of mass is faster [m/s]."""
+    V, o = data.twist[i], data.origin
+    x, y, z = cross(V[3], V[4], V[5], data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2])
+    x, y, z = x + V[0], y + V[1], z + V[2]
+    return sqrt(x * x + y * y + z * z) + arm * sqrt(V[3] * V[3] + V[4] * V[4] + V[5] * V[5])
+
+
+@kernel
 def _pair_gap(model: Model, data: Data, j: int) -> float:
     """Lower bound of the gaps of the collision that begins at pair j, at configuration 2 [m]."""
     place_shapes(model, data, j, data.pos2, data.rot2)
@@ -41,16 +50,12 @@ def _pair_gap(model: Model, data: Data, j: int) -> float:
 
 @kernel
 def _pair_speed(model: Model, data: Data, j: int) -> float:
-    """Largest speed of a point of one shape relative to the other: the sum of |v| + arm |w| of both bodies [m/s]."""
+    """Largest speed of a point of one shape relative to the other: the sum of both bodies' [m/s]."""
     speed = 0.0
     for side in range(2):
         i = model.coupling_body[model.pair_coupling[j], side]
         if i >= 0:
-            V, o = data.twist[i], data.origin
-            x, y, z = cross(V[3], V[4], V[5], data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2])
-            x, y, z = x + V[0], y + V[1], z + V[2]
-            arm = model.pair_far[j, PairBound.DISTANCE + side]
-            speed += sqrt(x * x + y * y + z * z) + arm * sqrt(V[3] * V[3] + V[4] * V[4] + V[5] * V[5])
+            speed += largest_speed(data, i, model.pair_far[j, PairBound.DISTANCE + side])
     return speed
 
 
