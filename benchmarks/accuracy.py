@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from reference_motions import ReferenceMotion, motions
 
 import dojo_opt as dojo
+from dojo_opt.report.engine import clocked
 from dojo_opt.report.result import Report, Table
 
 Vector = NDArray[np.float64]
@@ -56,10 +57,8 @@ def fixed(motion: ReferenceMotion, exact: Vector, steps: tuple[float, ...]) -> P
             except ValueError:  # closed loops have order 2
                 continue
             x, count = sim.start(motion.q, motion.v), round(motion.seconds / h)
-            sim.rollout(x, steps=count)  # compiles
-            begin = time.process_time()
-            found = sim.rollout(x, steps=count)
-            cost = time.process_time() - begin
+            sim.rollout(x, steps=1)  # compiles
+            found, cost = clocked(partial(sim.rollout, x, steps=count))
             end = found.x[-1][: sim.nq] if found.success else None
             out.append((error(sim, end, exact, motion.seconds), cost, f"order {order}, {1e3 * h:g} ms"))
     return out
@@ -79,12 +78,15 @@ def runge_kutta(motion: ReferenceMotion, exact: Vector, steps: tuple[float, ...]
         return []
     for h in steps:
         model: Any = mujoco_scene.load(sim.model, h, integrator="RK4")
-        with quiet():
+
+        def end(model: Any = model, count: int = round(motion.seconds / h)) -> Vector:
             data: Any = mujoco_scene.state(model, np.r_[motion.q, motion.v])
-            begin = time.process_time()
-            mujoco.mj_step(model, data, round(motion.seconds / h))
-            cost = time.process_time() - begin
-        out.append((error(sim, data.qpos.copy(), exact, motion.seconds), cost, f"{1e3 * h:g} ms"))
+            mujoco.mj_step(model, data, count)
+            return np.asarray(data.qpos)
+
+        with quiet():
+            coordinates, cost = clocked(end)
+        out.append((error(sim, coordinates, exact, motion.seconds), cost, f"{1e3 * h:g} ms"))
     return out
 
 
@@ -148,10 +150,9 @@ def study(motion: ReferenceMotion, quick: bool) -> tuple[list[list[Any]], dict[s
     for asked in _asked(motion, unsure, quick):
         sim = dojo.Simulator(motion.mechanism, time_step=motion.seconds, accuracy=asked)
         x = sim.start(motion.q, motion.v)
-        sim.rollout(x, steps=1)  # compiles
-        begin = time.process_time()
-        found = sim.rollout(x, steps=1)
-        cost = time.process_time() - begin
+        if not lines:
+            sim.rollout(x, steps=1)  # compiles
+        found, cost = clocked(partial(sim.rollout, x, steps=1))
         got = error(sim, found.x[-1][: sim.nq], exact, motion.seconds) if found.success else np.inf
         told = float(found.errors[0]) if found.success else np.inf
         (best, setting), (rival, step) = _best(others, got), _best(peer, got)

@@ -17,6 +17,7 @@ from dojo_opt.gaits.equilibrium import equilibrium as equilibrium
 from dojo_opt.identification.identify import Identified as Identified, identify as identify
 from dojo_opt.identification.parameter_space import ParameterSpace as ParameterSpace
 from dojo_opt.learn.environment import Environment as Environment
+from dojo_opt.mpc.adaptation import Adaptation as Adaptation
 from dojo_opt.mpc.controller import MPC as MPC
 from dojo_opt.mpc.moving import Sampled as Sampled
 from dojo_opt.planning.ilqr import ilqr as ilqr

@@ -105,15 +105,30 @@ class ParameterSpace:
         Raises:
             ValueError: for a wrong shape, a number that is not finite, or values that no mechanism has.
         """
-        at = checks.array("ParameterSpace.simulator(theta)", theta, self.values.shape)
+        changed: Simulator = self._sim.with_parameters(self.named("ParameterSpace.simulator(theta)", theta))
+        return changed
+
+    def named(self, call: str, theta: ArrayLike) -> dict[str, Floats]:
+        """The values at theta, by name, as `Simulator.with_parameters` and `set_parameters` take them.
+
+        Args:
+            call: name of the call, for messages.
+            theta: (n,) the vector.
+
+        Returns:
+            {name: (k,) values}.
+
+        Raises:
+            ValueError: for a wrong shape, or a number that is not finite.
+        """
+        at = checks.array(call, theta, self.values.shape)
         values: dict[str, Floats] = {}
         for group in self._groups:
             numbers, first = group.chart(at[group.columns])[0], 0
             for name in group.names:
                 last = first + len(self._sim.parameters((name,)).values)
                 values[name], first = numbers[first:last], last
-        changed: Simulator = self._sim.with_parameters(values)
-        return changed
+        return values
 
     def chain(self, theta: ArrayLike, blocks: Mapping[str, ArrayLike]) -> Floats:
         """Derivatives by theta, from those by the parameters.

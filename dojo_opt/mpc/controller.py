@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.mpc.adaptation import ParameterEstimator
 from dojo_opt.mpc.delay import Delay, Prediction
 from dojo_opt.mpc.ground import Ground
 from dojo_opt.mpc.horizon import shift_multipliers, tail
@@ -46,7 +47,7 @@ class MPC:
     A tick shifts the plan by the elapsed time and keeps its states as the guess, the measured one in front: the
     disturbance then sits in the first gap, which the iteration closes. (A rollout of the shifted inputs, instead, falls
     over together with the robot.) A plan that the planner rejects is not used: the one before stays in force.
-    `log` has one `Tick` per plan.
+    `log` has one `Tick` per plan; `estimator` has the parameters that `adapt` names, None without.
 
     Args:
         problem: its simulator is the model; the plant may be another one. Its start and guess are those of the first
@@ -57,7 +58,8 @@ class MPC:
             problem at every tick).
         plan: the first plan, at the time of the first call (default None: that of `ilqr` without refinement).
         **settings: period, kappa, kappa_grad, guess, gain_scale, delay, computation, servo, feedforward, time_limit,
-            mean_velocity, friction, learn_ground, options, first, log; see `help(dojo_opt.mpc.settings.MPCSettings)`.
+            mean_velocity, friction, learn_ground, adapt, options, first, log; see
+            `help(dojo_opt.mpc.settings.MPCSettings)`.
 
     Raises:
         TypeError: for an unknown setting, or an argument of the wrong kind.
@@ -96,6 +98,10 @@ class MPC:
         self._tracking = next(terms, None)  # whose error is logged
         self._first = plan
         self._ground = Ground(self.sim, self.settings.kappa if self.settings.learn_ground == "slope" else None)
+        self.estimator: ParameterEstimator | None = None  # of the parameters that `adapt` names
+        if self.settings.adapt is not None:
+            most = np.inf if self.settings.friction is None else self.settings.friction
+            self.estimator = ParameterEstimator(self.nominal, self.sim, self.settings.adapt, most)
         self.reset()
 
     def __reduce__(self) -> Any:
@@ -138,6 +144,8 @@ class MPC:
         self._due = -np.inf
         self.problem.start = self.start.copy()
         self._ground.forget()
+        if self.estimator is not None:
+            self.estimator.forget()
         self._solver.reset()
 
     def __call__(self, time: float, x: ArrayLike) -> Vector:
@@ -169,6 +177,8 @@ class MPC:
             self._tick(now, self.policy)
         u = self._command(now, self._measured.state(), measured)
         self._delay.issue(now, u)
+        if self.estimator is not None:
+            self.estimator.observe(now, measured, self._delay.acting(now, u), self._ground)
         return u if self._actuator is None else self._actuator(u, measured)
 
     def _command(self, now: float, x: Vector, sample: Vector) -> Vector:

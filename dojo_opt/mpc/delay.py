@@ -76,6 +76,10 @@ class Delay:
         """State (nx,) of the model when an input sent at `now` arrives: the measured one, moved on by the delay."""
         return self._predict(now, measured, self._acting)
 
+    def acting(self, now: float, u: Vector) -> Vector:
+        """The input (nu,) that acts from `now` on [s], when u (nu,) has just been issued."""
+        return self._acting(now, u) if self._length else u
+
     def _acting(self, time: float, x: Vector) -> Vector:
         """The input (nu,) that acts at a time [s]."""
         del x

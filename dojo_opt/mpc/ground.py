@@ -92,6 +92,11 @@ class Ground:
         n = self._normal[0]
         return GroundPlane(float(self.height[0] / n[2] - self._flat[0]), (-n[0] / n[2], -n[1] / n[2]))
 
+    @property
+    def normal(self) -> Vector | None:
+        """(3,) normal of the plane that is learnt; None where only heights are."""
+        return self._normal[0] if self._slope else None
+
     def forget(self) -> None:
         """Back to the ground at the beginning."""
         self.height[:] = self._flat

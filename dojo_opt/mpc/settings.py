@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.mpc.adaptation import Adaptation
 from dojo_opt.planning.options import Options, Stage
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
@@ -47,6 +48,8 @@ class MPCSettings:
             the ground is safer.
         learn_ground: whether to take the height of the ground from the standing contacts; "slope" takes the plane on
             which they stand, of a robot on a floating base, and references are turned with it (default False).
+        adapt: parameters of the model that are estimated from the measurements while the controller runs, an
+            `Adaptation`: plans are made with the estimate, `MPC.estimator` has it (default None).
         options: settings of the planner in a tick (default None: `OPTIONS`); its stage is made from kappa and
             kappa_grad.
         first: settings of the planner for the first plan (default None: those of `ilqr`).
@@ -66,6 +69,7 @@ class MPCSettings:
     mean_velocity: bool = True
     friction: float | None = None
     learn_ground: bool | str = False
+    adapt: Adaptation | None = None
     options: Options | None = None
     first: Options | None = None
     log: int | None = 10_000
@@ -93,6 +97,8 @@ class MPCSettings:
             )
         if self.learn_ground not in (False, True, "slope"):
             raise ValueError(f"MPC(learn_ground=...): expected False, True or 'slope', got {self.learn_ground!r}")
+        if self.adapt is not None and not isinstance(self.adapt, Adaptation):
+            raise TypeError(f"MPC(adapt=...): expected an Adaptation, got {self.adapt!r}")
         if self.log is not None:
             whole_number("MPC(log=...)", self.log)
         if self.friction is not None:

@@ -81,6 +81,12 @@ class DividingEngine(Engine):
         for engine in self._engines.values():
             engine.turn_ground(frame)
 
+    def renew(self) -> None:
+        """As Engine.renew."""
+        super().renew()
+        for engine in self._engines.values():
+            engine.renew()
+
     def part(self, parts: int) -> Engine:
         """The engine of the parts of a step."""
         if parts not in self._engines:

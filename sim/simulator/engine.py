@@ -243,6 +243,10 @@ class Engine:
         self.model.contact_frame[self.model.contact_terrain == 0] = frame.ravel()
         self._scratch.turn()
 
+    def renew(self) -> None:
+        """Take anew what Data keeps of the model, after a change in it."""
+        self._scratch.turn()
+
     def _settings_of(self, steps: int, kappa: float | None) -> Vector:
         """Settings of a call of so many steps: a single one has no deadline, and shares them with others."""
         return self._settings if steps <= 1 and kappa is None else self.settings.array(kappa)

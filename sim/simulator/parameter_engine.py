@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.derivatives.parameters.parameters import KINDS, ParameterPlan, Parameters, all_parameters
 from sim.derivatives.parameters.seen_terms import with_seen
-from sim.derivatives.parameters.selection import select, with_values
+from sim.derivatives.parameters.selection import by_names, select, with_values
 from sim.integrators.adjoint import Sweep
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import pack
+from sim.model.model import Model
 from sim.simulator.engine import Engine, Rolled
 from sim.simulator.intervals import Intervals
 from sim.simulator.sensitivity import Request, adjoint_sweep, roll_parameters
@@ -23,6 +24,7 @@ from solvers.types import Vector
 Floats = NDArray[np.float64]
 _VARIABLES = ("state", "input")
 _NUDGE, _LEAST = 1e-5, 1e-2  # relative size of the differences of parameters, of values of at least that size
+_LINKED = ("dof_damper", "dof_spring", "contact_restitution")  # arrays whose kernels are linked where they are not zero
 _OF_MOMENTUM = frozenset(  # kinds on which the momentum of a state depends
     ("mass", "inertia", "com", "parent_point", "child_point", "orientation", "axis", "spring", "rest", "armature")
     + ("damper", "pitch", "gravity", "time_step")
@@ -35,8 +37,10 @@ class ParameterEngine:
     def __init__(self, engine: Engine, mechanism: Mechanism, time_step: float) -> None:
         self._engine, self._mechanism, self._time_step = engine, mechanism, time_step
         self._known = with_seen(engine.model, all_parameters(mechanism, time_step))
+        self._table = by_names(self._known)
         # those made so far: finding parameters by name takes longer than their derivatives
         self._selections: dict[tuple[str, ...], tuple[Parameters, ParameterPlan]] = {}
+        self._packed: Model | None = None  # that of the values that `adopt` has written last
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -57,12 +61,33 @@ class ParameterEngine:
 
     def _selection(self, call: str, names: tuple[str, ...]) -> tuple[Parameters, ParameterPlan]:
         if names not in self._selections:
-            self._selections[names] = select(call, self._known, names)
+            self._selections[names] = select(call, self._table, names)
         return self._selections[names]
 
     def with_values(self, call: str, values: Mapping[str, ArrayLike]) -> tuple[Mechanism, float]:
         """The mechanism and the time step with other values of parameters."""
-        return with_values(call, self._mechanism, self._time_step, values)
+        mech, time_step = with_values(call, self._mechanism, self._table, values)
+        return mech, self._time_step if time_step is None else time_step
+
+    def adopt(self, call: str, values: Mapping[str, ArrayLike]) -> None:
+        """Write other values of parameters into the model; arrays that they do not change stay as they are."""
+        if self._engine.settings.order != 2 or self._engine.settings.accuracy or "time_step" in values:
+            raise ValueError(f"{call}: expected steps of order 2, without accuracy, and no time_step")
+        old = pack(self._mechanism) if self._packed is None else self._packed
+        new = pack(self.with_values(call, values)[0])
+        changes = [
+            (own, after)
+            for name, own, before, after in zip(Model._fields, self._engine.model, old, new, strict=True)
+            if name != "optional" and isinstance(own, np.ndarray) and not np.array_equal(before, after)
+        ]
+        linked = [getattr(self._engine.model, name) for name in _LINKED]
+        new_part = [own.any() != after.any() for own, after in changes if any(own is array for array in linked)]
+        if any(own.dtype != np.float64 for own, _ in changes) or any(new_part):
+            raise ValueError(f"{call}: expected values that change no structure, as a damper where there was none does")
+        for own, after in changes:
+            np.copyto(own, after)
+        self._packed = new
+        self._engine.renew()
 
     def roll(
         self,
@@ -111,7 +136,7 @@ class ParameterEngine:
 
     def _converted(self, name: str, intervals: tuple[float, float], x: Vector, value: float) -> Vector:
         """x over another interval with another value of a parameter; NaN where it has no velocity there."""
-        mech, h = with_values("derivatives of a divided step", self._mechanism, self._time_step, {name: value})
+        mech, h = self.with_values("derivatives of a divided step", {name: value})
         engine, scale = Engine(pack(mech), self._engine.settings), h / self._time_step
         interval, other = intervals
         end = Intervals(engine).changed(scale * interval, scale * other, x)

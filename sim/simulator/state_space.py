@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -138,6 +138,21 @@ class StateSpace:
         if np.any(self.model.contact_hold) or self.order != 2 or self.accuracy:
             raise ValueError("Simulator.turn_ground: expected steps of order 2, and contacts that move freely")
         self._engine.turn_ground(contact_frame(unit))
+
+    def set_parameters(self, values: Mapping[str, ArrayLike]) -> None:
+        """Give parameters other values, in place; `with_parameters` returns a new simulator instead.
+
+        It is for loops that estimate parameters of a simulator of their own. `mechanism` and `parameters` keep the
+        values that it was made with, as do the parameters that are not named here. Kappa stays.
+
+        Args:
+            values: {name: value}, with the names of `parameters`.
+
+        Raises:
+            ValueError: for an unknown name, a value that no mechanism has, or one that changes the structure of the
+                model, such as a damper where there was none; the simulator has steps of a higher order or an accuracy.
+        """
+        self._by_parameters.adopt("Simulator.set_parameters(values)", values)
 
     def neutral(self) -> Floats:
         """The standing or hanging state of the mechanism, at rest, its loops closed as by `close`.

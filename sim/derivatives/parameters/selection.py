@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.derivatives.parameters.directions import Effect
 from sim.derivatives.parameters.mechanism_editor import Draft
-from sim.derivatives.parameters.parameters import KINDS, Parameter, ParameterPlan, Parameters, all_parameters
+from sim.derivatives.parameters.parameters import KINDS, Parameter, ParameterPlan, Parameters
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 
@@ -53,11 +53,10 @@ def _common(parameters: Sequence[Parameter]) -> list[Parameter]:
     return found
 
 
-def select(call: str, known: Sequence[Parameter], names: Sequence[str]) -> tuple[Parameters, ParameterPlan]:
+def select(call: str, table: Table, names: Sequence[str]) -> tuple[Parameters, ParameterPlan]:
     """The parameters of the names, in their order, and the terms of their columns."""
     found: list[Parameter] = []
     rows: dict[str, slice] = {}
-    table = by_names(known)
     for name in (names,) if isinstance(names, str) else names:
         some = chosen(call, table, name)
         rows[name] = slice(len(found), len(found) + len(some))
@@ -74,12 +73,10 @@ def select(call: str, known: Sequence[Parameter], names: Sequence[str]) -> tuple
 
 
 def with_values(
-    call: str, mech: Mechanism, time_step: float, values: Mapping[str, ArrayLike]
-) -> tuple[Mechanism, float]:
-    """The mechanism and the time step with other values of the named parameters."""
-    known = all_parameters(mech, time_step)
-    table = by_names(known)
-    by_place = {(p.kind, p.part, p.component): p for p in known}
+    call: str, mech: Mechanism, table: Table, values: Mapping[str, ArrayLike]
+) -> tuple[Mechanism, float | None]:
+    """The mechanism with other values of the named parameters in the table; the time step if it is named."""
+    time_step = None
     changes: dict[tuple[str, str, str], float] = {}
     for name, given in values.items():
         found = chosen(call, table, name)
@@ -88,9 +85,9 @@ def with_values(
             if p.part != COMMON:
                 changes[p.kind, p.part, p.component] = float(value)
                 continue
-            for place, q in by_place.items():
-                if q.kind == p.kind and q.component == p.component:
-                    changes[place] = q.value + float(value) - p.value
+            for q in table[p.kind]:
+                if q.component == p.component:
+                    changes[q.kind, q.part, q.component] = q.value + float(value) - p.value
     together: dict[tuple[str, str], dict[str, float]] = {}
     for (kind, part, component), value in changes.items():
         together.setdefault((kind, part), {})[component] = value

@@ -1,0 +1,235 @@
+"""Adaptation: parameters of the model, estimated from measurements while the controller runs.
+
+An extended Kalman filter of the parameters theta, whose measurements are the states at both ends of an interval:
+
+    theta+ = theta + w,                   w ~ N(0, P0 dt/memory)
+    r = x+ (-) f(x, u; theta) = J (theta+ - theta) + e,   e ~ N(0, R + A R A')
+
+f are the steps of the model, of the length of the samples and with hard contact; J and A are its derivatives by the
+parameters and by the state, R is the noise of the measured state. A residual r larger than its covariance explains
+counts less, as with Huber's loss: a foot that touches what the model does not know says nothing about the payload.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.identification.parameter_space import ParameterSpace
+from dojo_opt.mpc.ground import Ground
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
+from sim.simulator.simulator import Simulator
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+_ROUNDING = 1e-9  # [s]
+_OUTLIER = 2.0  # standard deviations beyond which a residual counts less, and a change of the estimate is shortened
+_CURVED = 0.25  # share of a change of the estimate that may be wrong, as the residual is not linear in it
+_MOVED = 0.02  # share of the spread by which the estimate moves until models take it; in between they are linear in it
+_NEAR = 3.0  # standard deviations of the height of a contact that stands
+_CLOSE = 1e-4  # [m] the same without noise
+_ROUND_OFF = 1e-6  # [m, rad, m/s, rad/s] least noise: contact is not exact to the last digit
+
+__all__ = ["Adaptation", "ParameterEstimator"]
+
+
+@dataclass(frozen=True)
+class Adaptation:
+    """Which parameters `MPC(adapt=...)` estimates while it runs, and from what.
+
+    Attributes:
+        parameters: names, as in `Simulator.parameters`, such as ("mass:trunk", "friction:*").
+        spread: standard deviation of the parameters before the first measurement, as a share of their values, or {label
+            of `ParameterSpace`: standard deviation} (default 0.5).
+        noise: standard deviation of the measured state: (2,) of coordinates and velocities, or (ndx,) [m, rad, m/s,
+            rad/s] (default (1e-4, 1e-2)).
+        interval: time between the two measurements of an update [s] (default 0.02).
+        memory: time in which the parameters may change by their spread [s] (default 5).
+        bounds: as in `ParameterSpace` (default None).
+    """
+
+    parameters: Sequence[str]
+    spread: float | Mapping[str, float] = 0.5
+    noise: ArrayLike = (1e-4, 1e-2)
+    interval: float = 0.02
+    memory: float = 5.0
+    bounds: Mapping[str, tuple[float, float]] | None = None
+
+    __repr__ = brief_repr
+
+    def __post_init__(self) -> None:
+        call = "Adaptation"
+        object.__setattr__(self, "parameters", checks.names(f"{call}(parameters)", self.parameters))
+        if not isinstance(self.spread, Mapping):
+            checks.number(f"{call}(spread=...)", self.spread, above=0.0)
+        noise = checks.array(f"{call}(noise=...)", self.noise, (None,))
+        if not np.all(noise >= 0.0):
+            raise ValueError(f"{call}(noise=...): expected numbers >= 0, got {noise}")
+        for name in ("interval", "memory"):
+            checks.number(f"{call}({name}=...)", getattr(self, name), above=0.0)
+
+
+class ParameterEstimator:
+    """The filter of one controller; it writes its estimate into the simulator of the plans.
+
+    Args:
+        nominal: simulator of the robot; its kappa is not used.
+        planner: simulator of the plans, of the same mechanism, which takes the estimate.
+        settings: what to estimate.
+        friction: largest friction that plans count on.
+
+    Raises:
+        ValueError: for an unknown parameter, or noise of the wrong shape.
+    """
+
+    def __init__(self, nominal: Simulator, planner: Simulator, settings: Adaptation, friction: float = np.inf) -> None:
+        self._nominal, self._planner, self._settings, self._friction = nominal, planner, settings, friction
+        self.space = ParameterSpace(nominal, settings.parameters, bounds=settings.bounds)
+        noise = checks.array("Adaptation(noise=...)", settings.noise, (None,))
+        if noise.shape == (2,):
+            noise = np.repeat(noise, nominal.nv)
+        if noise.shape != (nominal.ndx,):
+            raise ValueError(f"Adaptation(noise=...): expected (2,) or ({nominal.ndx},), got {noise.shape}")
+        self._noise = np.maximum(noise, _ROUND_OFF) ** 2
+        self._near = max(_CLOSE, _NEAR * float(noise[: nominal.nv].max()))
+        self._prior = self._spread() ** 2
+        self._fine: Simulator | None = None  # with steps of the length of the samples
+        self._written = self.space.values.copy()  # the values of the models
+        self.forget()
+
+    def _spread(self) -> Vector:
+        """(n,) standard deviations before the first measurement."""
+        given, values = self._settings.spread, self.space.values
+        if isinstance(given, Mapping):
+            for label in given:
+                checks.one_of("Adaptation(spread=...)", label, self.space.labels)
+            missing = [label for label in self.space.labels if label not in given]
+            if missing:
+                raise ValueError(f"Adaptation(spread=...): {missing[0]!r} has none")
+            return np.array([checks.number("Adaptation(spread=...)", given[x], above=0.0) for x in self.space.labels])
+        if not np.all(values):
+            label = self.space.labels[int(np.argmin(np.abs(values)))]
+            raise ValueError(f"Adaptation(spread=...): {label!r} is 0; give {{label: standard deviation}}")
+        return float(given) * np.abs(values)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The estimate, by label of the parameter."""
+        return dict(zip(self.space.labels, self.theta.tolist(), strict=True))
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """The standard deviations of the estimate, by label."""
+        return dict(zip(self.space.labels, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    def forget(self) -> None:
+        """Back to the values of the robot, without measurements."""
+        self.theta, self.covariance = self.space.values.copy(), np.diag(self._prior)
+        if not np.array_equal(self.theta, self._written):
+            self._write()
+        self._samples: list[tuple[float, Vector, Vector]] = []  # (time, state, input after it)
+
+    def observe(self, time: float, x: Vector, u: Vector, ground: Ground) -> None:
+        """Take a sample.
+
+        Args:
+            time: time of the measurement [s].
+            x: (nx,) measured state.
+            u: (nu,) input that acts from then on [N, N m].
+            ground: the ground as the controller believes it to be.
+        """
+        samples = self._samples
+        if samples and time <= samples[-1][0]:
+            samples.clear()
+        samples.append((time, x.copy(), u.copy()))
+        if len(samples) > 1 and time - samples[0][0] >= self._settings.interval - _ROUNDING:
+            self._update(ground)
+            del samples[:-1]
+
+    def _model(self) -> Simulator | None:
+        """The model with steps of the length of the samples; None where they come at uneven times."""
+        times = np.diff([time for time, *_ in self._samples])
+        h = float(times.mean())
+        if np.abs(times - h).max() > _ROUNDING:
+            return None
+        if self._fine is None or abs(self._fine.time_step - h) > _ROUNDING:
+            self._fine = self._nominal.replace(time_step=h, kappa=None)
+            self._fine.set_parameters(self.space.named("MPC", self._written))
+        return self._fine
+
+    def _update(self, ground: Ground) -> None:
+        """One measurement of the filter."""
+        fine = self._model()
+        if fine is None:
+            return
+        x, us = self._samples[0][1], np.array([u for *_, u in self._samples[:-1]])
+        self._stand(fine, ground, x)
+        found = self._predict(fine, x, us)
+        if found is None:
+            return
+        end, A, slopes = found
+        off = fine.difference(self._samples[-1][1], end)
+        P = self.covariance + np.diag(self._prior * len(us) * fine.time_step / self._settings.memory)
+        if self._surprise(off, P, A, slopes) > _OUTLIER:  # a foot that sticks in the model says nothing of friction
+            smooth = self._planner.kappa * fine.time_step / self._planner.time_step
+            found = self._predict(fine, x, us, smooth)
+            slopes = slopes if found is None else found[2]
+        self._correct(off, P, A, slopes)
+        if np.any(np.abs(self.theta - self._written) > _MOVED * np.sqrt(self._prior)):
+            self._write()
+
+    def _predict(
+        self, fine: Simulator, x: Vector, us: Matrix, kappa: float | None = None
+    ) -> tuple[Vector, Matrix, Matrix] | None:
+        """State after the inputs us, and its derivatives by x and by the parameters; None where a step fails."""
+        xs, linear = fine.linearize_rollout(x, us, kappa, wrt=self.space.wrt)
+        if not linear.success:
+            return None
+        A, slopes = np.eye(fine.ndx), np.zeros((fine.ndx, len(self.theta)))
+        blocks = self.space.chain(self._written, linear.parameters)
+        for step, block in zip(linear.A, blocks, strict=True):
+            A, slopes = step @ A, step @ slopes + block
+        return xs[-1], A, slopes
+
+    def _covariance(self, P: Matrix, A: Matrix, slopes: Matrix) -> tuple[Matrix, Matrix]:
+        """Those of a residual: of the measured states, and of the parameters."""
+        return np.diag(self._noise) + (A * self._noise) @ A.T, slopes @ P @ slopes.T
+
+    def _surprise(self, off: Vector, P: Matrix, A: Matrix, slopes: Matrix) -> float:
+        """Size of a residual in standard deviations."""
+        residual = off - slopes @ (self.theta - self._written)
+        return float(np.sqrt(residual @ np.linalg.solve(sum(self._covariance(P, A, slopes)), residual) / len(off)))
+
+    def _correct(self, off: Vector, P: Matrix, A: Matrix, slopes: Matrix) -> None:
+        """Update estimate and covariance by a measurement that is `off` what the models predict."""
+        residual = off - slopes @ (self.theta - self._written)
+        R, of_parameters = self._covariance(P, A, slopes)
+        R *= max(1.0, self._surprise(off, P, A, slopes) / _OUTLIER)
+        gain = np.linalg.solve(R + of_parameters, slopes @ P).T
+        change = gain @ residual
+        change /= max(1.0, np.sqrt(change @ np.linalg.solve(P, change) / len(change)) / _OUTLIER)
+        low, high = (0.5 * (self.theta + bound) for bound in (self.space.low, self.space.high))
+        self.theta = np.clip(self.theta + change, low, high)  # at most half-way to a bound at once
+        P = P - gain @ slopes @ P
+        self.covariance = 0.5 * (P + P.T) + np.diag((_CURVED * change) ** 2)
+
+    def _stand(self, fine: Simulator, ground: Ground, x: Vector) -> None:
+        """Put the ground of the model under every contact that stands at x: its height is that of a noisy state."""
+        if ground.normal is not None:
+            fine.turn_ground(ground.normal)
+        gaps = ground.gaps(ground.points(x))
+        fine.model.contact_height[:] = ground.height + np.where(np.abs(gaps) < self._near, gaps, np.minimum(gaps, 0.0))
+
+    def _write(self) -> None:
+        """Write the estimate into both models, which takes some milliseconds."""
+        self._written = self.theta.copy()
+        values = self.space.named("MPC", self.theta)
+        if self._fine is not None:
+            self._fine.set_parameters(values)
+        planned = {k: np.minimum(self._friction, v) if k.startswith("friction") else v for k, v in values.items()}
+        self._planner.set_parameters(planned)
