@@ -136,11 +136,14 @@ def test_the_python_of_the_pages_runs(page: str, tmp_path: Path) -> None:
     python("\n".join(blocks), cwd=tmp_path)
 
 
-def test_the_python_for_jax_runs(tmp_path: Path) -> None:
-    pytest.importorskip("jax")
+@pytest.mark.parametrize("library", ["trimesh", "jax"])
+def test_the_python_of_the_guide_that_needs_an_extra_runs(library: str, tmp_path: Path) -> None:
+    """Such a block is marked py, and imports the library of the extra first."""
+    pytest.importorskip(library)
     blocks = re.findall(r"```py\n(.*?)```", (ROOT / "docs/guide.md").read_text(), flags=re.DOTALL)
-    assert len(blocks) == 1
-    python("import numpy as np, dojo_opt as dojo\n" + blocks[0], cwd=tmp_path)
+    (block,) = [block for block in blocks if block.startswith(f"import {library}\n")]
+    assert len(blocks) == 2
+    python("from pathlib import Path\nimport numpy as np, dojo_opt as dojo\n" + block, cwd=tmp_path)
 
 
 @pytest.mark.parametrize("package", [*PACKAGES, "benchmarks", "examples"])
