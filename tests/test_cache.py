@@ -179,6 +179,48 @@ def test_a_damaged_file_is_compiled_again(filled: Filled, kind: str) -> None:
     assert [path.name for path in filled.digest.iterdir()] == [filled.file.name]
 
 
+ALARM = """
+import os, pickle, signal
+from numba.core.registry import cpu_target
+from own import one
+
+def alarm(number, frame):
+    signal.signal(number, signal.SIG_IGN)
+    raise TimeoutError("alarm")
+
+def during(owner, name):
+    before = getattr(owner, name)
+    def call(*args):
+        signal.raise_signal(signal.SIGTERM)
+        return before(*args)
+    setattr(owner, name, call)
+
+signal.signal(signal.SIGTERM, alarm)
+engine = cpu_target.target_context.codegen()._engine._ee
+during({})
+try:
+    one(1.0)
+    print("lost", end=" ")
+except TimeoutError:
+    print("heard", end=" ")
+print(one(1.0))
+"""
+DURING = {  # where the handler of a signal raises
+    "code comes from LLVM": "engine, '_object_cache_notify'",
+    "a file is written": "os, 'replace'",
+    "a file is read": "pickle, 'loads'",
+    "code goes to LLVM": "engine, '_object_cache_getbuffer'",
+}
+
+
+@pytest.mark.parametrize("name", DURING)
+def test_an_exception_of_a_signal_is_heard_and_loses_no_code(filled: Filled, name: str) -> None:
+    if name in ("code comes from LLVM", "a file is written"):
+        filled.file.unlink()
+    assert filled.run(ALARM.format(DURING[name])) == ["heard", "2.0"]
+    assert filled.run() == ["2.0", "1"]
+
+
 def test_a_full_disk_is_one_warning(filled: Filled) -> None:
     filled.file.unlink()
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"  # the system's own error for a write

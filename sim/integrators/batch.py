@@ -32,9 +32,8 @@ def linearize_knots(
     n = line.us.shape[0]
     chunks = data_ats.shape[0]
     for c in prange(chunks):
-        if seconds() < settings[StepSetting.DEADLINE]:
-            knots = (c * n // chunks, done[c], (c + 1) * n // chunks)
-            done[c] = linearize(model_at, data_ats[c], settings, knots, substeps, line)
+        knots = (c * n // chunks, done[c], (c + 1) * n // chunks)
+        done[c] = linearize(model_at, data_ats[c], settings, knots, substeps, line)
 
 
 class BatchBuffers(NamedTuple):
@@ -112,13 +111,16 @@ def linearize_rows(rows: RowTables, substeps: int, line: Linearized, done: Integ
 
 @kernel
 def _roll_some(rows: RowTables, part: tuple[int, int], motions: BatchBuffers) -> None:
-    """Motions of the rows part[0] up to part[1], as far as they are not done, until the deadline."""
-    steps = motions.us.shape[1]
+    """Motions of the rows part[0] up to part[1], as far as they are not done, until the deadline; at least a part of
+    one.
+    """
+    steps, begun = motions.us.shape[1], False
     for i in range(part[0], part[1]):
         report = motions.reports[i]
         if report[0, StepReport.STATUS] == _SOLVED and motions.knots[i] < steps:
-            if seconds() > rows.settings[i, StepSetting.DEADLINE]:
+            if begun and seconds() > rows.settings[i, StepSetting.DEADLINE]:
                 return
+            begun = True
             x, u = motions.xs[i], motions.us[i]
             one = MotionBuffers(x, u, motions.wrenches, report, motions.contacts, motions.A, motions.B)
             knot = motions.knots[i]

@@ -293,6 +293,8 @@ def linearize(
             if not (is_finite_matrix(A) and is_finite_matrix(B)):
                 report[StepReport.STATUS] = _NOT_FINITE
                 break
-            if is_due(data, report[StepReport.ITERATIONS] + A.shape[0]):
+            if s + 1 < substeps and is_due(data, report[StepReport.ITERATIONS] + A.shape[0]):
                 return t * substeps + s + 1
+        if is_due(data, report[StepReport.ITERATIONS] + A.shape[0]):
+            return (t + 1) * substeps
     return knots[2] * substeps

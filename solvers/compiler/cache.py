@@ -44,6 +44,7 @@ from solvers.compiler.notice import because
 from solvers.compiler.ownership import OTHERS, WORLD, foreign
 from solvers.compiler.pipeline import FAST, inner_result
 from solvers.compiler.shipped import Shipped, open_shipped, write_shipped
+from solvers.compiler.signals import hold_while_translating, signals_held
 
 __all__ = [
     "CALLEE",
@@ -274,6 +275,7 @@ def prepare() -> None:
     """
     cpu_target.typing_context.refresh()
     cpu_target.target_context.refresh()
+    hold_while_translating(cpu_target.target_context.codegen()._engine)
     why = shipped().why_not or "this is not among the shipped code"
     because(f"{why}; {f'kept in {STORE.folder}' if STORE.folder else 'not kept on disk'}")
 
@@ -321,6 +323,7 @@ class KernelCache(FunctionCache):
         key = (self._form, self._file, self._text, self._index_key(sig, codegen))
         return key, f"{self._stem}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.nbc"
 
+    @signals_held()
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compile result that was shipped or kept for this signature; None where there is none, or none of use."""
         if self._form != INNER and (found := self._load_shipped(sig, target_context)) is not None:
@@ -367,6 +370,7 @@ class KernelCache(FunctionCache):
         shipped().drop(name)
         return None
 
+    @signals_held()
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compile result."""
         if data.lifted or data.library.has_dynamic_globals:

@@ -183,6 +183,50 @@ def test_pieces_change_no_bit(sim: Any, monkeypatch: pytest.MonkeyPatch) -> None
         np.testing.assert_array_equal(found, expected)
 
 
+LATE = {  # calls of a few pieces, each of which begins after its deadline
+    "rows": lambda: HOPPER.step_batch(rows(HOPPER, 3), inputs(HOPPER, 3), 200),
+    "rows with derivatives": lambda: HOPPER.step_batch(rows(HOPPER, 3), inputs(HOPPER, 3), 200, derivatives=True),
+    "trajectory": lambda: QUADRUPED.linearize_trajectory(*standing(QUADRUPED, 60)),
+    "batch": lambda: HOPPER.rollout_batch(rows(HOPPER, 3), np.zeros((3, 200, 3))),
+    "gradient": lambda: gradient(HOPPER, 20, ("state", "input")),
+}
+
+
+@pytest.fixture
+def begun(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The pieces that were begun, at most a thousand."""
+    found, real = [], pace._pieces
+
+    def counted(settings: Any) -> Any:
+        for piece in real(settings):
+            found.append(1)
+            assert len(found) < 1000, "no progress"
+            yield piece
+
+    monkeypatch.setattr(pace, "_pieces", counted)
+    return found
+
+
+@pytest.mark.parametrize("name", LATE)
+def test_a_piece_that_begins_after_its_deadline_makes_progress(
+    name: str, begun: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pace, "PAUSE", -1.0)
+    LATE[name]()
+    assert len(begun) > 1
+
+
+@pytest.mark.parametrize("steps", [50, 400], ids=["one thread", "threads"])
+def test_knots_that_cannot_be_solved_go_back_to_python(
+    steps: int, begun: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sim = HOPPER.replace(max_iterations=1, divide=False)
+    monkeypatch.setattr(pace, "PAUSE", 0.0)
+    knots = sim.linearize_trajectory(*standing(sim, steps))
+    assert (knots.status == dojo.Status.MAX_ITERATIONS).all()
+    assert len(begun) > 1
+
+
 RESTS = {
     "rollout": lambda sim: sim.rollout(sim.neutral(), steps=1000),
     "closed loop with many substeps": lambda sim: sim.closed_loop(sim.neutral(), inputs(sim, 1), substeps=1000),
@@ -192,12 +236,10 @@ RESTS = {
 
 @pytest.mark.parametrize("name", RESTS)
 def test_a_robot_at_rest_whose_steps_take_no_iterations_goes_back_to_python(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    name: str, begun: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sim = dojo.Simulator(dojo.models.pendulum(), 0.01)
     assert sim.step(sim.neutral()).iterations == 0
-    begun, real = [], pace._pieces
     monkeypatch.setattr(pace, "PAUSE", 0.0)
-    monkeypatch.setattr(pace, "_pieces", lambda settings: (begun.append(1) for _ in real(settings)))
     assert RESTS[name](sim).success
     assert len(begun) > 10
