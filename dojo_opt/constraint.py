@@ -1,4 +1,4 @@
-"""Constraints: the hard aims of a plan, met by an augmented Lagrangian with a multiplier and a penalty per entry.
+"""Constraints of a plan, met by an augmented Lagrangian with a multiplier and a penalty per entry.
 
 Those in task space, from `CenterOfMass` to `Velocity`, are also costs: it depends on where they are given.
 """

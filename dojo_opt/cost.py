@@ -1,4 +1,4 @@
-"""Costs: the soft aims of a plan. All are weighted squares of residuals, so Gauss-Newton is exact for linear ones.
+"""Costs of a plan. All are weighted squares of residuals, so Gauss-Newton is exact for linear ones.
 
 Weights multiply squares without a factor 1/2: a cost is `scale * sum w r^2`. Use `scale=0.5` for the other convention.
 

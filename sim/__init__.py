@@ -1,1 +1,1 @@
-"""One mechanism, one time step, and the derivatives of that step. Imports `solvers` only."""
+"""Rigid-body simulation with contact: mechanisms, time steps and their derivatives. Imports `solvers` only."""

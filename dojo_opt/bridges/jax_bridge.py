@@ -1,4 +1,4 @@
-"""Steps and rollouts as functions of JAX: it calls the simulator back; derivatives are those of `Simulator.vjp`."""
+"""Steps and rollouts as functions of JAX: callbacks to the simulator, with the derivatives of `Simulator.vjp`."""
 
 from __future__ import annotations
 

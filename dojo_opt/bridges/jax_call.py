@@ -1,4 +1,4 @@
-"""A call of Python from JAX that gets NumPy arrays.
+"""A callback from JAX to Python with NumPy arrays.
 
 `jax.pure_callback` turns its arguments into arrays of JAX, whose copies are made by the threads that computations, and
 so callbacks, run on. Where there is one such thread, as on one core, the callback waits for ever for its own arguments

@@ -1,4 +1,4 @@
-"""References for legged robots: gaits, standing, turning, jumps; by inverse kinematics, torques by inverse dynamics."""
+"""Reference motions of legged robots: gaits, standing, turning, jumps; by inverse kinematics and inverse dynamics."""
 
 from dojo_opt.gaits.biped import step
 from dojo_opt.gaits.gait import Gait

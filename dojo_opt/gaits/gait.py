@@ -1,4 +1,4 @@
-"""Gait: a reference motion of a legged robot, with the feet that should carry it and the torques that would."""
+"""Gait: a reference motion of a legged robot, with its contact schedule and the torques of inverse dynamics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Legs: a robot of any make as its problems need it: on its feet, with bent knees, and with the scales of its costs."""
+"""Legs: any legged robot, prepared for its problems: feet, a stance with bent knees, and scales of its costs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ten coordinates of the mass, the centre and the inertia of a rigid body, of which every value is a body.
+"""Ten coordinates of mass, centre of mass and inertia, in which every value is a physical body.
 
 Mass m, first and second moments of a distribution of mass are a positive definite 4 x 4 matrix, and each of those is
 U U^T of one upper triangle U with a positive diagonal (Rucker and Wensing, Smooth Parameterization of Rigid-Body

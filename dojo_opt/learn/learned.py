@@ -1,4 +1,4 @@
-"""Learned: a policy that an algorithm found, how it went, and all that is needed to go on."""
+"""Learned: the policy of an algorithm, the history of the training, and its state for a continuation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Seeds: an algorithm run with several of them, one after the other or in workers, to the end or until one leads."""
+"""Seeds: runs of an algorithm with several seeds, one after the other or in workers, to the end or until one leads."""
 
 from __future__ import annotations
 

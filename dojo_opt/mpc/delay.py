@@ -1,4 +1,4 @@
-"""Delay: inputs that are on their way to the robot, and the state in which the next one will find it."""
+"""Delay: inputs on their way to the robot, and its state when the next one arrives."""
 
 from __future__ import annotations
 

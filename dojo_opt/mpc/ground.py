@@ -1,4 +1,4 @@
-"""Ground: the distances of the contacts from it, and its height and slope learnt from the contacts that stand."""
+"""Ground: the distances of the contacts from it, and its height and slope learnt from the stance contacts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measurement: the last measured states, and the state of the model that they amount to."""
+"""Measurement: the last measured states, and the corresponding state of the model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Gains that keep a motion on its plan: the linear-quadratic regulator of the problem's own costs around it."""
+"""Tracking gains of a plan: the linear-quadratic regulator of the problem's own costs around it."""
 
 from __future__ import annotations
 

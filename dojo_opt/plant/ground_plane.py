@@ -1,4 +1,4 @@
-"""GroundPlane: the plane that a controller takes the ground for, and references that go with it."""
+"""GroundPlane: a controller's estimate of the ground as a plane, and references on it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Problems, ready to solve: hops, swing-ups, gaits and leaps of robots with legs, arms that reach and push."""
+"""Ready-made planning problems: hops, swing-ups, gaits and leaps of legged robots, reaching and pushing with arms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Leaps: problems of a quadruped that jumps with no gait to follow."""
+"""Leaps: problems of a quadruped that jumps without a reference gait."""
 
 from __future__ import annotations
 

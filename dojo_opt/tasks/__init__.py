@@ -1,4 +1,4 @@
-"""Closed-loop tasks: an MPC with its reference, ready to run on a plant; `idto` has those of a published suite."""
+"""Closed-loop tasks: MPC with a reference, ready to run on a plant; `idto` has the tasks of a published suite."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,4 +1,4 @@
-"""A quadruped that finds its gait: a velocity and one pose are all that it is given."""
+"""A quadruped that finds its gait, given a velocity and one pose."""
 
 from __future__ import annotations
 

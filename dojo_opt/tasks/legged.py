@@ -1,4 +1,4 @@
-"""A robot of any make walks under a velocity command."""
+"""Any legged robot walks under a velocity command."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far the impulses of an inactive cluster (inactive.py) may change until they are evaluated again."""
+"""Bounds of the change of the impulses of an inactive cluster (inactive.py) until their next evaluation."""
 
 from __future__ import annotations
 

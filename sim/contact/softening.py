@@ -1,4 +1,4 @@
-"""How hard the contacts of a derivative are: no harder than digits allow.
+"""The hardness of the contacts of a derivative, limited by rounding.
 
 The condensed law df = W d(gap, slip) is added to the inertia of a body, and a hard impact has W/m up to 1e14: only
 two digits of the inertia in the free directions of the contact would remain. A contact that gives a

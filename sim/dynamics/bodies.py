@@ -1,4 +1,4 @@
-"""Energy and momentum of bodies that are seen from outside: maximal states with the velocities of one moment."""
+"""Energy and momentum of bodies from maximal states, whose velocities belong to one instant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From one step to the next of a motion: its configurations 2 and 3 are the next one's 1 and 2."""
+"""Transition from one step of a motion to the next: configurations 2 and 3 become configurations 1 and 2."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loops that are spread over the threads: knots of a trajectory, motions from several states, and independent rows,
+"""Parallel loops: knots of a trajectory, motions from several states, and independent rows,
 each with its own model, settings and guess.
 
 Nothing is carried from one row to the next, so a row does not depend on its neighbours, nor on the number of threads.

@@ -1,4 +1,4 @@
-"""An attempt of order 2: one step of length h, the two halves of it that are kept, and how much they differ."""
+"""An attempt of order 2: one step of length h, its two halves, which are kept, and their difference."""
 
 from __future__ import annotations
 

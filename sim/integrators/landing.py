@@ -1,4 +1,4 @@
-"""Contacts and limits that a step of order 2 reaches somewhere on its way: whether it has to be cut before.
+"""Contacts and limits that a step of order 2 reaches midway, before which it may have to end.
 
 Columns of `bounce`: Bounce of sim/model/columns.py; `look_back` fills them with gaps at configurations 1 and 2.
 """

@@ -1,4 +1,4 @@
-"""Derivatives of the velocity that the node's momentum of a state means.
+"""Derivatives of the velocity that corresponds to the momentum at the node of a state.
 
 (M(q2) + C) v = p(q2, v15),    C: of dampers (dynamics/joints/damper.py), p: sim/derivatives/momentum_gradient.py
 """

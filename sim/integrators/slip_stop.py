@@ -1,4 +1,4 @@
-"""Errors where contacts stop sliding, which a step and its two halves, all of them alike, do not see.
+"""Errors at the end of sliding, which the comparison of a step with its two halves does not show.
 
 parts    (2, ncontact, 11) contacts of both halves, as in rollout.py
 slips    (ncontact,) at the node where the step begins; UNKNOWN, or BEGINS where nothing went before

@@ -1,1 +1,1 @@
-"""Mechanisms from files."""
+"""Mechanisms from URDF and MJCF files, with their meshes."""

@@ -1,4 +1,4 @@
-"""The surface that the centre of a ball on a height field cannot sink below, at places of a grid.
+"""The offset surface of a height field: the lowest places of the centre of a ball, on a grid.
 
     F(x) = max over s of  f(s) + sqrt(radius^2 - |s - x|^2)
 

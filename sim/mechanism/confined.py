@@ -1,4 +1,4 @@
-"""Contacts that no motion can move, or lift out of the ground: found from the joints, before any step.
+"""Contacts that no motion of the joints can move, or lift out of the ground; found before any step.
 
 Along the normal n of its ground, the height of a contact point stays constant while the joints above it slide across
 n or turn about it. The first joint that turns otherwise keeps its own height; from there on the point is within reach:

@@ -1,4 +1,4 @@
-"""Names of degrees of freedom, and the components of a perturbation dx that go by them."""
+"""Names of degrees of freedom, and the components of a perturbation dx with these names."""
 
 from __future__ import annotations
 

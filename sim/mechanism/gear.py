@@ -1,4 +1,4 @@
-"""Gear: one joint coordinate that follows another one."""
+"""Gear: a joint coordinate that follows another one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Memory: counts that size arrays are refused by name where the machine cannot hold them, before any work."""
+"""Memory: counts whose arrays the machine cannot hold are refused by name, before any work."""
 
 from __future__ import annotations
 

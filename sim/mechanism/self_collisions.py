@@ -1,4 +1,4 @@
-"""Collisions of a mechanism with itself: all shapes but those of neighbours, and those that overlap from the start."""
+"""Collisions of a mechanism with itself: all pairs of shapes, except neighbours and initial overlaps."""
 
 from __future__ import annotations
 

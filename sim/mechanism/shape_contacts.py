@@ -1,4 +1,4 @@
-"""Contacts of the shapes of a body with the ground: the points and balls by which they stand, as on a half-space.
+"""Contacts of the shapes of a body with the ground: the points and balls that stand on a half-space.
 
     sphere     itself          capsule    a ball at either end          box, polytope    its corners
 

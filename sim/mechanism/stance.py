@@ -1,4 +1,4 @@
-"""Stance: the neutral coordinates of a loaded robot, and how high it stands with them."""
+"""Stance: the neutral coordinates of a loaded robot, and the height of its base."""
 
 from __future__ import annotations
 

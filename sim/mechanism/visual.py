@@ -1,4 +1,4 @@
-"""Visual: a part of the picture of a body, which touches nothing."""
+"""Visual: a part of the picture of a body, without contact."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pace: loops over steps go back to Python every few hundredths of a second, which hears Ctrl-C between two of them.
+"""Pace: loops over steps return to Python every few hundredths of a second, so that it can handle Ctrl-C.
 
 A signal waits until Python runs again. So a call of a long loop is made in pieces: a kernel stops at the first step
 after its deadline and returns its progress; Python resumes it from there, with all that the step before left in its

@@ -1,4 +1,4 @@
-"""Rollout under a function of Python that is asked for the input before each step."""
+"""Rollout under a Python function that returns the input before each step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""ik: coordinates at which frames are where they shall be, within the limits of the joints."""
+"""ik: coordinates at which frames reach their targets, within the joint limits."""
 
 from __future__ import annotations
 

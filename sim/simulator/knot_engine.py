@@ -1,4 +1,4 @@
-"""Engines whose steps are made of calls of several kernels, so that Python makes their loops."""
+"""Engines whose steps call several kernels, with loops in Python."""
 
 from __future__ import annotations
 

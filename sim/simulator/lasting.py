@@ -1,4 +1,4 @@
-"""Rollouts of a given duration: those of a simulator whose time step is that for which an input is held."""
+"""Rollouts of a given duration, whose time step is the duration of an input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files of motions: archives that come back with their simulator, and tables and joint trajectories for other tools."""
+"""Files of motions: archives that contain their simulator, and tables and joint trajectories for other tools."""
 
 from __future__ import annotations
 

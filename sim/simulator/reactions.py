@@ -1,4 +1,4 @@
-"""Reactions: the wrenches that joints transmit over a step, which the elimination of the joints hides.
+"""Reactions: the wrenches that joints transmit over a step, recovered after the elimination of the joints.
 
 A step leaves in `data.subtree` the momentum balance of the bodies behind each joint, without the forces of joints:
 

@@ -1,4 +1,4 @@
-"""StateSpace: the states of one mechanism on their manifold, and other views of them. Nothing here moves."""
+"""StateSpace: the states of one mechanism on their manifold, and other views of them, without motion."""
 
 from __future__ import annotations
 

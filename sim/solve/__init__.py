@@ -1,1 +1,1 @@
-"""The solution of a step: Newton's method, and the interior point where there are contacts or limits."""
+"""The solution of a step: Newton's method, and the interior point for scenes with contacts or limits."""

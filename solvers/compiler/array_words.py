@@ -1,4 +1,4 @@
-"""The words of an array in compiled code, kept apart until the array is used as one value."""
+"""The words of an array in compiled code, separate until the array is used as one value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The clock of kernels: a loop that may take long looks at it, and goes back to Python in time.
+"""The clock of kernels: a long loop reads it, and returns to Python in time.
 
     deadline = seconds() + pause
     ...

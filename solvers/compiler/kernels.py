@@ -1,4 +1,4 @@
-"""`@kernel` and its kin: functions that Numba compiles with the flags of this house, and keeps on disk."""
+"""`@kernel` and its variants: functions that Numba compiles with our flags, and keeps on disk."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Signs of life during compilation, which happens once and takes a while; and the count of compiled functions.
+"""Progress messages during compilation, and the count of compiled functions.
 
 dojo_opt: compiling, once: no code is shipped; kept in /home/me/.cache/dojo_opt/0123456789abcdef
 dojo_opt: compiling function 34 of about 120 (5 s so far, part 2 of 14): the active set of contacts with the ground

@@ -1,4 +1,4 @@
-"""Whose code it is: to load compiled code is to run it, so nobody but the user and root may have written it."""
+"""Ownership of compiled code: loading code means running it, so only the user and root may have written it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""References that owe nothing to our simulator: equations of motion in continuous time, integrated by DOP853.
+"""References independent of our simulator: equations of motion in continuous time, integrated by DOP853.
 
 motion       any tree, by Newton and Euler for each body and Jacobians of its centre of mass
 pendulum     a chain of equal links in a plane, in absolute angles

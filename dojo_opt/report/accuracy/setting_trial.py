@@ -1,4 +1,4 @@
-"""SettingTrial: one choice of time step and kappa, and how well it did."""
+"""SettingTrial: one choice of time step and kappa, and its results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Derivatives of one step of a robot: error and cost of every way, and the kappa that its contacts need."""
+"""Derivatives of one step of a robot: error and cost of every method, and the kappa that its contacts need."""
 
 from __future__ import annotations
 

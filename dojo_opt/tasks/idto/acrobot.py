@@ -1,4 +1,4 @@
-"""The acrobot swings up and stays up."""
+"""The acrobot swings up and balances."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A quadruped walks on, with no gait given."""
+"""A quadruped walks without a given gait."""
 
 from __future__ import annotations
 

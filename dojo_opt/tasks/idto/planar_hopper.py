@@ -1,4 +1,4 @@
-"""A planar hopper with a knee and an ankle moves half a metre on."""
+"""A planar hopper with a knee and an ankle moves half a metre forward."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far cylinders are from polytopes and cylinders where their closest elements run along each other.
+"""Distance of cylinders from polytopes and cylinders whose closest elements are parallel.
 
 Lines and rims that cross have a normal of their own, across both. Where they run along each other at their closest
 points x and y they have a fan of normals: those of both, n.x >= n.y between them, are that from y to x, where the two

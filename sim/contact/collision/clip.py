@@ -1,4 +1,4 @@
-"""An edge of a above a rectangular face of b: where it begins and ends, seen along the normal of the face.
+"""An edge of a, clipped by a rectangular face of b along the normal of the face.
 
     0         nothing: the edge does not begin (end) here
     1         at its own vertex

@@ -1,4 +1,4 @@
-"""The contact of a with b as that of b with a: for obstacles whose shape comes first in the order of its pair."""
+"""Exchange of the two shapes of a contact, for obstacles whose shape comes first in the order of its pair."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Elements of one contact point in the place of another: those of a choice before that still press.
+"""Elements of an earlier choice that still press, in the place of a contact point.
 
 The number of a point that has taken over others encodes them: KEPT + feature 2^24 + code.
 """

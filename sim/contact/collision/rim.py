@@ -1,4 +1,4 @@
-"""Rims of a cylinder b along z against a plane, a line and a rim of a: where they touch, with derivatives.
+"""Rims of a cylinder b along z against a plane, a line and a rim of a: points of contact, with derivatives.
 
 A point of a rim is y = rho e + z Z, e = (cos, sin, 0) of its angle, t = (-sin, cos, 0) along the rim. Where a line or
 another rim touches it, the vector between the closest points is across both, d n = x - y with n across t and the other

@@ -1,1 +1,1 @@
-"""Contact between two bodies, or a body and an obstacle, as part of a step."""
+"""Contact between two bodies, or between a body and an obstacle, as part of a step."""

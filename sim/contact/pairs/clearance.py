@@ -1,4 +1,4 @@
-"""How far the shapes of collisions stay apart in a step of higher order, in which no collision acts.
+"""Clearance of the shapes of collisions during a step of higher order, in which no collision acts.
 
 As for contacts with the ground (sim/integrators/phases.py): a gap that is g0 where a step begins and g1 where it ends
 is nowhere less than (g0 + g1 - d)/2, where d is the distance by which points of the two shapes move relative to each

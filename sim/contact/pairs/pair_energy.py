@@ -1,4 +1,4 @@
-"""The work of the impulses of collisions in a step: none, where the shapes touch with the elements that were chosen.
+"""The work of the impulses of collisions in a step, which is zero if the shapes touch with the chosen elements.
 
 An impulse acts along the normal at the end of a step. Where shapes that were apart have passed through one another, or
 an element was chosen that is none there, that normal points where the bodies came from, and the step gives them energy

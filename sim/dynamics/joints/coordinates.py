@@ -1,4 +1,4 @@
-"""Coordinates of one joint from the poses of its bodies: the way back from motion.py."""
+"""Coordinates of one joint from the poses of its bodies: the inverse of motion.py."""
 
 from __future__ import annotations
 

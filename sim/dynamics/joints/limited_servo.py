@@ -1,4 +1,4 @@
-"""The drive of a servo whose force has limits: the force that it would have without, in the form of dry friction.
+"""The drive of a servo with force limits: its unlimited force, in the form of dry friction.
 
     P = h (g u - kp (q + h (nu - v)/4) - kd nu) = P0 - h k nu,    k = h kp/4 + kd
 

@@ -1,4 +1,4 @@
-"""Motion of one joint: where it puts its body, the columns that turn its rates into twists, and how both move.
+"""Motion of one joint: the pose of its body, the columns that map its rates to twists, and the derivatives of both.
 
 A joint is a row of translations along axes t_k of its frame, and then one rotation: none, about an axis a, a swing
 (swing.py), or a quaternion. A rotation about an axis may carry its body along the axis: by its lead [m/rad] for each

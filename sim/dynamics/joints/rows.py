@@ -1,4 +1,4 @@
-"""How the coordinates of a joint change with the poses of its two bodies: rows of the minimal Jacobian."""
+"""Derivatives of the coordinates of a joint by the poses of its two bodies: rows of the minimal Jacobian."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The nearest zero of an error: Newton's method of least norm, begun again from elsewhere where that ends nowhere.
+"""The nearest zero of an error: Newton's method of least norm, with random restarts.
 
 Where a linkage lies in one line, its closing joint cannot be moved along that line to first order, and no step of
 Newton's method leads out of there. Other starts, drawn with a fixed seed around the first and further away as long as

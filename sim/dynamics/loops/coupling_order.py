@@ -1,4 +1,4 @@
-"""The order in which active couplings and gears are eliminated, and which of them meet: nodes of solvers/block_lu.py.
+"""The order in which active couplings and gears are eliminated, and their connections: nodes of solvers/block_lu.py.
 
 An impulse moves the trees of its two bodies and no others. So the equations of a coupling have the impulses of those
 that share a tree with it, and of further ones by fill. The next to be eliminated is the one that meets the fewest

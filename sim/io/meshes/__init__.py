@@ -1,1 +1,1 @@
-"""Meshes of files: where they are, their triangles and colours, and the convex shapes that stand for them."""
+"""Meshes of robot files: their paths, triangles and colours, and convex shapes in their place."""

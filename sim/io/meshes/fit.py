@@ -1,4 +1,4 @@
-"""Spheres, boxes and capsules that stand for a mesh, and how far its corners are from their surface."""
+"""Spheres, boxes and capsules fitted to a mesh, and the distances of its corners from their surface."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""reduced_hull: a convex hull with few corners, and how far it is from the full one."""
+"""reduced_hull: a convex hull with few corners, and its distance from the full hull."""
 
 from __future__ import annotations
 

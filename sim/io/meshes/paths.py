@@ -1,4 +1,4 @@
-"""Where the mesh of a file is: package://, model://, file://, absolute and relative names, as ROS resolves them."""
+"""The path of a mesh: package://, model://, file://, absolute and relative names, as ROS resolves them."""
 
 from __future__ import annotations
 
