@@ -139,7 +139,7 @@ class SpeedLimits(Spec):
     """|v_i| <= share speed_i for the joints whose inputs have a largest speed, as a file gives it.
 
     Attributes:
-        share: part of that speed (default 1).
+        share: allowed share of that speed (default 1).
         knots: numbers of the knots (default None: 1 to T).
     """
 
@@ -160,7 +160,7 @@ class SpeedLimits(Spec):
 
 @dataclass(frozen=True)
 class ControlBounds(Spec):
-    """lower <= u_i <= upper for chosen inputs at chosen knots, as a constraint that tightens with its penalty.
+    """lower <= u_i <= upper for chosen inputs at chosen knots, as a constraint of the augmented Lagrangian.
 
     `Problem(control_limits=...)` holds exactly at every iteration and is usually better. Use this one to bound single
     knots.

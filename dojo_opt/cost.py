@@ -84,7 +84,7 @@ class Tracking(Spec):
 
 @dataclass(frozen=True)
 class Effort(Spec):
-    """Weigh inputs: scale * sum_t sum_i weight_ti (u_t - reference_t)_i^2.
+    """Cost of inputs: scale * sum_t sum_i weight_ti (u_t - reference_t)_i^2.
 
     Attributes:
         weight: a number, (nu,), (T, nu), or a table by names of inputs [1/N^2, 1/(N m)^2].

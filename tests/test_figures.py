@@ -44,7 +44,7 @@ def test_a_changed_number_is_put_right(figures, studies):
     text = (figures.ROOT / "docs/numbers.md").read_text(encoding="utf-8")
     quotes = figures.quotes()
     _, spans = figures.fill("docs/numbers.md", text, quotes, studies)
-    command = text.index("random extreme states, unsolved; refused")
+    command = text.index("random extreme states: unsolved; refused")
     start, end = next((a, b) for a, b in spans if a <= command < b)
     wrong = text[:start] + text[start:end].replace("gains energy | ", "gains energy | 1") + text[end:]
     assert wrong != text

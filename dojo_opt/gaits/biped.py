@@ -30,11 +30,11 @@ def step(
     settle: float = 0.4,
     after: Gait | None = None,
 ) -> Gait:
-    """One step of a biped along x, so slow that the robot is in balance all the way.
+    """One step of a biped along x, so slow that the robot is always in balance.
 
     In `shift` seconds the centre of mass moves over the middle of the other foot, in `swing` seconds the foot moves, in
     `shift` seconds the centre of mass moves between the feet, and for `settle` seconds nothing moves. The base goes
-    down during the first shift, and stays there. Joints that lead to no foot keep their neutral angles.
+    down during the first shift, and stays there. Joints outside the legs keep their neutral angles.
 
     Feet are the bodies at the ends of the tree that have contacts: two, with three contacts or more each, or the ankles
     would be free. Three steps of Atlas in a row:

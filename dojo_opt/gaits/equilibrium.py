@@ -124,7 +124,7 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     1 cm of the same distance from the ground: `dojo_opt.gaits.feet.Feet.place` puts a robot with legs there on
     terrain.
 
-    Rest need not be stable: under constant torques a robot on legs leaves it in some tenths of a second.
+    The state need not be stable: under constant torques a robot on legs falls within some tenths of a second.
 
     Args:
         sim: the simulator.
@@ -135,9 +135,9 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         (state (nx,), input (nu,) [N, N m]).
 
     Raises:
-        ValueError: no such forces exist: the centre of mass is not above the feet, a joint without input would have
-            to carry load, the ground is steeper than friction holds, a contact is in the ground, or the smoothing is
-            so large that inactive contacts carry the weight.
+        ValueError: there is no equilibrium: the centre of mass is not above the feet, a joint without input would have
+            to carry load, the ground is steeper than friction holds, a contact is in the ground, or the smoothing is so
+            large that inactive contacts carry the weight.
     """
     if not isinstance(sim, Simulator):
         raise TypeError(f"equilibrium(sim): expected a Simulator, got {sim!r}")

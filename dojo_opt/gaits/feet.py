@@ -148,7 +148,7 @@ class Feet:
         return np.moveaxis(slope, -3, -1)
 
     def place(self, x: ArrayLike, targets: ArrayLike) -> Array:
-        """Inverse kinematics: joint angles that put the feet at given places, with the base where it is.
+        """Inverse kinematics: joint angles for given places of the feet, with a fixed base.
 
         Damped Gauss-Newton starts at the joint angles of x, so a knee stays bent to its side. It solves all states at
         once.
@@ -161,7 +161,7 @@ class Feet:
             (n, nx) states.
 
         Raises:
-            ValueError: a target is out of reach, or only reached beyond the stops of a joint.
+            ValueError: a target is out of reach, or requires a joint beyond its limits.
         """
         sim, nb = self.sim, self.base
         x = np.array(np.broadcast_to(x, (len(np.asarray(targets)), sim.nx)), dtype=float)

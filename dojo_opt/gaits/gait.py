@@ -26,7 +26,8 @@ _EVEN = 1e-4  # weight of small foot forces against the balance of the base
 
 @dataclass(frozen=True)
 class Gait:
-    """A motion along the time steps of a simulator. It is a reference: feet and base agree, forces need not.
+    """A motion along the time steps of a simulator. It is a reference: feet and base are consistent, but forces may not
+    be.
 
     The velocity of row t is that of the interval from t - 1 to t, as in every state. x[0] has that of the interval
     before the motion, which for a periodic gait is the last one of a period.
@@ -37,7 +38,7 @@ class Gait:
         time: (T + 1,) times of the rows [s].
         x: (T + 1, nx) states.
         feet: (T + 1, k, 3) centres of the feet, world axes [m].
-        contact: (T + 1, k) whether a foot is on the ground.
+        contact: (T + 1, k) whether each foot is on the ground.
         foot_names: names of the k contacts.
     """
 

@@ -48,22 +48,22 @@ _HEADER = "{:>9} {:>8} {:>12} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8}".format(*COLUM
 
 @dataclass(frozen=True, repr=False)
 class Identified:
-    """Parameters and how well the data determine them.
+    """Identified parameters, with the accuracy to which the data determine them.
 
     Attributes:
         success: whether the last smoothing converged.
-        status: SOLVED, or why it ended before.
+        status: SOLVED, or the reason for an early end.
         message: the same as a sentence.
         labels: of the values.
         values: (n,).
         start: (n,) before.
-        covariance: (n, n); infinite on the diagonal where the data tell nothing.
+        covariance: (n, n); infinite on the diagonal for parameters that the data do not determine.
         simulator: with the values.
-        rms: root mean square of the errors over their noise: 1 where the noise is as stated.
-        unseen: combinations, by label, that change no prediction, and that no prior tells.
-        outliers: share of states that count less than fully.
-        unsolved: windows that could not be predicted at the end, and do not count.
-        cost: that of the data and the prior, as in the module.
+        rms: root mean square of the errors over their noise: 1 if the given noise is right.
+        unseen: combinations, by label, that change no prediction and have no prior.
+        outliers: share of states with reduced weight.
+        unsolved: windows without a prediction at the end, which are not counted.
+        cost: cost of the data and the prior, see the module.
         starts: (nx,) of every window.
         history: one record per iteration.
         seconds: processor time.
@@ -93,7 +93,7 @@ class Identified:
 
     @property
     def correlation(self) -> Floats:
-        """(n, n) of the estimates; NaN where the data tell nothing."""
+        """(n, n) correlation of the estimates; NaN for parameters that the data do not determine."""
         d = self.deviation
         with np.errstate(invalid="ignore"):
             return self.covariance / np.outer(d, d)
@@ -108,7 +108,7 @@ class Identified:
         return list(zip(self.labels, self.values, self.deviation, self.start, strict=True))
 
     def closing_line(self) -> str:
-        """One line: how it ended.
+        """The end of the fit in one line.
 
         Returns:
             The line.
@@ -280,10 +280,11 @@ def identify(
         parameters: names, as in `Simulator.parameters`.
         bodies: whose mass, centre and inertia are fitted together, as physical bodies; see `ParameterSpace`.
         bounds: {name: (low, high)}, as in `ParameterSpace`.
-        prior: {name: deviation} or {name: (mean, deviation)} of parameters, of which more is known than bounds: from a
-            ruler, scales, a data sheet. A name covers all its components; the mean is that of `sim` by default, or one
-            number or one for each component. Few motions determine few parameters; the rest stay at their priors.
-        noise: standard deviation of the measurement of a state, one or (ndx,); infinite where there is none.
+        prior: {name: deviation} or {name: (mean, deviation)} of parameters with prior knowledge, from a ruler, scales,
+            or a data sheet. A name covers all its components; the mean is that of `sim` by default, or one number or
+            one for each component. A few motions determine a few parameters; the others stay at their priors.
+        noise: standard deviation of the measured state, a number or (ndx,); infinite for components without a
+            measurement.
         starts: number of fits; the first begins with the values of `sim`, further ones with values drawn from the
             prior, or around those of `sim` with a deviation of three tenths (default 1). The best one is returned.
         seed: of these values (default 0).
@@ -295,7 +296,7 @@ def identify(
 
     Raises:
         TypeError: for an argument of the wrong kind.
-        ValueError: for a value out of range, or names that are not there.
+        ValueError: for a value out of range, or an unknown name.
     """
     call = "identify"
     if not isinstance(sim, Simulator):

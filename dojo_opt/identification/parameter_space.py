@@ -31,7 +31,7 @@ class _ParameterGroup(NamedTuple):
 
 
 class ParameterSpace:
-    """Parameters of a simulator as one vector theta (n,), in which a fit moves:
+    """Parameters of a simulator as one vector theta (n,), for fits:
 
         space = dojo.ParameterSpace(sim, ("friction:*", "damper"), bodies=("trunk",))
         def errors(theta): ... space.simulator(theta).rollout(x, us).x ...
@@ -43,9 +43,9 @@ class ParameterSpace:
     Args:
         sim: the simulator.
         names: names of parameters, as in `Simulator.parameters`; they are their own coordinates.
-        bodies: names of bodies whose mass, centre of mass and inertia are fitted together, in ten coordinates of which
-            every value is a body (inertia_coordinates.py). With `inertia` among the names instead, theta may leave the
-            set of physical bodies; `simulator` then raises a ValueError.
+        bodies: names of bodies whose mass, centre of mass and inertia are fitted together, in ten coordinates in which
+            every value is a physical body (inertia_coordinates.py). With `inertia` among the names instead, theta may
+            leave the set of physical bodies; `simulator` then raises a ValueError.
         bounds: {label: (low, high)} within those that mechanisms have: masses, sizes, friction > 0, springs, dampers,
             armatures, radii >= 0, restitution from 0 to 1 (default None: the latter).
 

@@ -216,9 +216,9 @@ def ant() -> Task:
 def humanoid() -> Task:
     """Humanoid-v5 with positions and velocities only: run along x; 45 observations, 17 actions, 0.015 s each.
 
-    That is the task of all `include_..._in_observation=False` and `contact_cost_weight=0`, but the forward velocity is
-    that of the torso and not of the centre of mass: over an episode they differ little. The knees start within their
-    limits, 3 degrees bent.
+    It is the task with all `include_..._in_observation=False` and `contact_cost_weight=0`, but with the forward
+    velocity of the torso instead of the centre of mass; over an episode they differ little. The knees start within
+    their limits, 3 degrees bent.
 
     Returns:
         The task.

@@ -176,7 +176,7 @@ def imitate(
         task: whose states, inputs and control steps the plans have.
         plans: of `dojo.ilqr`, or (states (T + 1, nx), inputs (T, nu) [N, N m], gains (T, nu, ndx)).
         seed: of all random numbers; the same seed gives the same policy, to the last bit.
-        resume: a run to go on with, of the same plans, seed and options.
+        resume: a run to continue, of the same plans, seed and options.
         **options: fields of `ImitationOptions`.
 
     Returns:

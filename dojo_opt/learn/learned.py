@@ -42,12 +42,12 @@ def table_line(record: dict[str, Any]) -> str:
 
 @dataclass(repr=False)
 class Learned:
-    """The result of `shac`, `ars` and `gradient_search`. Of the policies evaluated on the way, `policy` is the best.
+    """The result of `shac`, `ars` and `gradient_search`. `policy` is the best of the evaluated policies.
 
     Attributes:
         policy: the best policy.
         success: whether all epochs were done.
-        status: SOLVED, or why it ended before.
+        status: SOLVED, or the reason for an early end.
         message: the same as a sentence.
         algorithm: its name.
         seed: of all random numbers.
@@ -81,7 +81,7 @@ class Learned:
         return brief_table(self.closing_line(), COLUMNS, [[r[name] for name in COLUMNS] for r in self.history])
 
     def closing_line(self) -> str:
-        """One line: how it ended.
+        """The end of the training in one line.
 
         Returns:
             The line.

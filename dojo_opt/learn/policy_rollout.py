@@ -102,12 +102,12 @@ class PolicyRollout:
         self._kept: list[list[Floats]] = []
 
     def act(self, t: int, noise: Noise | None, slopes: bool) -> Floats:
-        """The actions (n, nu) of step t; returns the derivatives of the observations.
+        """Choose the actions (n, nu) of step t.
 
         Args:
             t: number of the step.
             noise: of the rollout, or None.
-            slopes: whether the derivatives are wanted.
+            slopes: whether to compute the derivatives.
 
         Returns:
             (n, no, ndx) derivatives of the observations by the states, or none.
@@ -201,7 +201,7 @@ def roll_policy_batch(
         steps: actions of each row.
         drawn: models of the rows; that of the task by default.
         noise: of actions and observations; none by default.
-        slopes: whether `gradient` will be asked for.
+        slopes: whether `gradient` will be called.
         kappa_grad: smoothing of the derivatives [N s m]; that of the motion by default.
         delays: the last actions of the rows, for the delay of `drawn`; none by default, as where episodes begin.
         restart: function of (step, terminated (n,), unsolved (n,), states (n, nx)) that replaces the states of rows

@@ -22,7 +22,7 @@ __all__ = ["Models", "Randomisation"]
 
 @dataclass(frozen=True)
 class Randomisation:
-    """Ranges that models are drawn from, uniformly; with none, all rows have that of the task.
+    """Ranges of uniformly drawn models; without any, all rows have the model of the task.
 
     Attributes:
         values: {parameter: (low, high)}; one value for all its components, of names as in `Simulator.parameters`.

@@ -53,7 +53,7 @@ class RandomSearchOptions:
         horizon: control steps of a rollout (default None: those of the task).
         hidden: sizes of hidden layers (default (): a linear policy).
         activation: "tanh" or "elu" (default "tanh").
-        shift: subtracted from the reward of every step, against the reward of mere survival (default 0).
+        shift: number that is subtracted from the reward of every step, to offset the reward of survival (default 0).
         randomisation: models that the policy learns on (default: that of the task).
         evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
         episodes: of an evaluation (default 8).
@@ -247,7 +247,7 @@ def ars(
     Args:
         task: the task to learn.
         seed: of all random numbers; the same seed gives the same policy, to the last bit.
-        resume: a run to go on with, of the same task, seed and options.
+        resume: a run to continue, of the same task, seed and options.
         executor: anything with the interface of `concurrent.futures.Executor`, as for `dojo.monte_carlo`; its workers
             roll out the directions, and the policy is the same to the last bit (default None: none).
         **options: fields of `RandomSearchOptions`.
@@ -268,7 +268,7 @@ def gradient_search(task: Task, *, seed: int = 0, resume: Learned | None = None,
     Args:
         task: the task to learn.
         seed: of all random numbers; the same seed gives the same policy, to the last bit.
-        resume: a run to go on with, of the same task, seed and options.
+        resume: a run to continue, of the same task, seed and options.
         **options: fields of `GradientSearchOptions`.
 
     Returns:

@@ -25,9 +25,9 @@ def seeds(
     executor: Executor | None = None,
     **options: Any,
 ) -> list[Learned]:
-    """Learn a task several times: runs differ between seeds, and one run tells little.
+    """Learn a task with several seeds, because runs differ between seeds.
 
-    A run depends on its seed alone, neither on the executor nor on the number of its workers; its time does.
+    The result of a run depends on its seed alone, neither on the executor nor on the number of its workers.
 
     Args:
         algorithm: `shac`, `ars`, `gradient_search`, or another function of (task, seed=, **options).
@@ -86,16 +86,16 @@ def best_of(
     executor: Executor | None = None,
     **options: Any,
 ) -> Learned:
-    """Begin with several seeds, and go on with the one that earns most while it learns.
+    """Begin with several seeds, and continue with the one of the highest return.
 
-    Some runs settle early in a motion that leads nowhere, and show it early.
+    Some runs settle early in a poor motion, and show it early.
 
     Args:
         algorithm: `shac`, `ars` or `gradient_search`.
         task: the task to learn.
         numbers: seeds (default 0 to 2).
-        epochs: of the run that goes on.
-        share: of these epochs after which it is chosen (default 0.2).
+        epochs: epochs of the continued run.
+        share: share of these epochs after which it is chosen (default 0.2).
         executor: whose workers begin, as in `seeds` (default None: one run after the other).
         **options: of the algorithm.
 

@@ -48,8 +48,8 @@ class ShacOptions:
         epochs: number of epochs; each is one rollout of the batch and one step of the policy (default 900).
         environments: rows of the batch (default 64).
         horizon: control steps of an epoch (default 16).
-        episode: control steps after which a row starts anew while learning (default None: those of the task). Where
-            long episodes hold a row in a posture that the policy has got used to, short ones bring it back.
+        episode: control steps after which a row starts anew while learning (default None: those of the task). If a row
+            stays in one posture during long episodes, short ones bring it back.
         hidden: sizes of the hidden layers of policy and critic (default (64, 64)).
         activation: "tanh" or "elu" (default "tanh").
         gamma: discount of a control step (default 0.99).
@@ -284,7 +284,7 @@ def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options:
     Args:
         task: the task to learn.
         seed: of all random numbers; the same seed gives the same policy, to the last bit, on any number of cores.
-        resume: a run to go on with, of the same task, seed and options: epochs that are done are not done again.
+        resume: a run to continue, of the same task, seed and options: epochs that are done are not done again.
         **options: fields of `ShacOptions`; by default those of `task.settings`.
 
     Returns:

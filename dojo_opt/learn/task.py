@@ -157,13 +157,13 @@ class Task:
         low: (nu,) inputs of the action -1 [N, N m].
         high: (nu,) inputs of the action 1.
         start: function of a generator that draws a first state (nx,).
-        terminated: function of x that tells whether an episode ends there (default `never`).
+        terminated: function of x that returns whether an episode ends there (default `never`).
         survival: reward of every step that does not end the episode, beside `reward` (default 0).
         steps: actions after which an episode is cut off (default 1000).
         name: its name (default "task").
         survival_probability: function of x with a smooth probability, from 0 to 1, that the episode goes on there: near
-            1 in safe states, small where `terminated` says that it ends. Where an episode ends is not differentiable:
-            `shac` learns in its place that rewards after x count times this probability (default None: 1 or 0).
+            1 in safe states, small where `terminated` is true. The end of an episode is not differentiable: `shac`
+            multiplies the rewards after x by this probability instead (default None: 1 or 0).
         commands: number of entries of a command (default 0).
         command: function of a generator that draws a command (commands,) (default None).
         hold: actions after which a command is drawn anew (default None: never; random search does not, either).
@@ -281,7 +281,7 @@ class Task:
 
         Args:
             xs: (n, nx) states.
-            slopes: whether the derivatives are wanted (default False).
+            slopes: whether to compute the derivatives (default False).
 
         Returns:
             (n, no) observations, and (n, no, ndx) derivatives, or (0, no, ndx).
@@ -299,7 +299,7 @@ class Task:
             xs: (n, nx) states.
             actions: (n, nu) in [-1, 1].
             nexts: (n, nx) states after the actions.
-            slopes: whether the derivatives are wanted (default False).
+            slopes: whether to compute the derivatives (default False).
 
         Returns:
             (n,) rewards, and (n, ndx + nu + ndx) derivatives, or none.

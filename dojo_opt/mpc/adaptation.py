@@ -40,7 +40,7 @@ __all__ = ["Adaptation", "ParameterEstimator"]
 
 @dataclass(frozen=True)
 class Adaptation:
-    """Which parameters `MPC(adapt=...)` estimates while it runs, and from what.
+    """The parameters that `MPC(adapt=...)` estimates while it runs, and the settings of the estimate.
 
     Attributes:
         parameters: names, as in `Simulator.parameters`, such as ("mass:trunk", "friction:*").

@@ -44,16 +44,16 @@ __all__ = ["MPC"]
 class MPC:
     """Model-predictive control: `u = mpc(time, x)`, called at any rate, plans anew once per `period`.
 
-    A tick shifts the plan by the elapsed time and keeps its states as the guess, the measured one in front: the
-    disturbance then sits in the first gap, which the iteration closes. (A rollout of the shifted inputs, instead, falls
-    over together with the robot.) A plan that the planner rejects is not used: the one before stays in force.
-    `log` has one `Tick` per plan; `estimator` has the parameters that `adapt` names, None without.
+    A tick shifts the plan by the elapsed time and keeps its states as the guess, with the measured state in front: the
+    disturbance is then the first gap, which the iteration closes. (A rollout of the shifted inputs would fall over
+    together with the robot.) If the planner rejects a plan, the previous one stays in force. `log` has one `Tick` per
+    plan; `estimator` has the parameters that `adapt` names, None without.
 
     Args:
         problem: its simulator is the model; the plant may be another one. Its start and guess are those of the first
             plan only, which is solved to the end, with the settings `first`; `reference` overwrites its references.
         iterations: iterations of the planner per tick (default 1). One is enough for costs, control limits and
-            equalities. An iteration that starts on the good side of an inequality does not see it; that takes about 3.
+            equalities. Inequalities take about 3, because an iteration from the feasible side ignores them.
         reference: states to track over time, see `dojo_opt.mpc.moving.References` (default None: the reference of the
             problem at every tick).
         plan: the first plan, at the time of the first call (default None: that of `ilqr` without refinement).

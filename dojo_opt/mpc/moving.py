@@ -28,18 +28,18 @@ __all__ = ["Onward", "References", "Sampled"]
 class Sampled:
     """A trajectory as a function of time: interpolated between its rows, constant after the last one.
 
-    Rows that are states of a simulator are interpolated on their manifold. With a `cycle`, the trajectory goes round:
-    its last row is its first one, moved on, and it has neither beginning nor end.
+    Rows that are states of a simulator are interpolated on their manifold. With a `cycle`, the trajectory is periodic:
+    its last row is its first one, displaced by the cycle, and it has neither beginning nor end.
 
     Args:
-        time: (n,) growing times of the rows [s], n >= 2.
+        time: (n,) increasing times of the rows [s], n >= 2.
         rows: (n, nx) states, or (n, width) other numbers.
         sim: simulator of the states (default None: the rows are any numbers).
         cycle: (ndx,) change of the state over one period, such as the advance of a gait, or (width,) change of other
             rows (default None: no period).
 
     Raises:
-        ValueError: for times that do not grow, a wrong shape, or a number that is not finite.
+        ValueError: for times that do not increase, a wrong shape, or a number that is not finite.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Sampled:
     def over(self, interval: float) -> Sampled:
         """The same states with their mean velocities over an interval, such as the time step of a model.
 
-        A gait sampled finely has its touchdowns where they are, but the velocities of its own short steps.
+        A finely sampled gait has exact touchdowns, but the velocities of its own short steps.
 
         Args:
             interval: length of the interval before each row [s].
@@ -175,9 +175,9 @@ class Onward:
 class References:
     """The costs of a problem whose references move, and the functions that move them.
 
-    A function takes times (n,) [s] and returns rows (n, nx) or (n, nu). A trajectory is rows one knot apart, or
-    anything with `x` (n, nx) and `time` (n,), such as a plan. Both start at time zero. A function with a method
-    anchor(time, x), such as `Onward`, is told the beginning of each horizon and the state there before it is called.
+    A function takes times (n,) [s] and returns rows (n, nx) or (n, nu). A trajectory is an array of rows one knot
+    apart, or an object with `x` (n, nx) and `time` (n,), such as a plan. Both start at time zero. If a function has a
+    method anchor(time, x), as `Onward` has, it is called with the beginning of each horizon and the state there.
 
     Args:
         problem: the problem; the references of its terms are overwritten.
@@ -250,7 +250,7 @@ class References:
     def rows(self, kind: type[StateTerm] | type[PickTerm], begin: float, count: int) -> Matrix | None:
         """Rows of the first reference of a kind, one knot apart.
 
-        Rows of the present horizon are not computed again, and states are on the plane then, as all others of it.
+        Rows of the present horizon are not computed again; their states are on the plane already.
 
         Args:
             kind: class of the term.

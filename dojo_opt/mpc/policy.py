@@ -24,9 +24,9 @@ __all__ = ["Policy"]
 class Policy:
     """A plan over time: states, inputs and gains of the knots at time + i knot_time.
 
-    A step of the model acts on the node it starts from: its input is an impulse there, and so stands for the input from
-    half a simulation step before that node on. `control` reads u that way; read from the node on, every input would
-    come half a step late.
+    A step of the model applies its input as an impulse at its first node. The input therefore represents the interval
+    that begins half a simulation step before the node, and `control` reads u accordingly; otherwise every input would
+    be half a step late.
 
     Attributes:
         sim: simulator of the model.

@@ -32,22 +32,22 @@ class MPCSettings:
         guess: first trajectory of a tick: "states" keeps the shifted states, "feedback" rolls out from the measured
             state under the gains, "open loop" without them (default "states").
         gain_scale: factor of the feedback between plans; 0 applies the planned inputs without feedback (default 1).
-        delay: time from a measurement to the input that it causes [s]; plans start that much later (default 0).
-        computation: time that a plan takes [s]: a plan takes effect that much after the measurement it was made from,
-            and starts from where the plan before, which stays in force until then, leads the model (default 0). Unlike
-            `delay`, it lets measurements act at once, through the feedback.
+        delay: time from a measurement to the input that it causes [s]; plans start later by this time (default 0).
+        computation: time that a plan takes [s]: a plan takes effect this long after its measurement. It starts from the
+            predicted state at that time, and the previous plan stays in force until then (default 0). Unlike `delay`,
+            measurements act at once, through the feedback.
         servo: (kp, kd), each a number or (nu,), of servos that follow the plan in place of the planner's gains [N/m,
             N m/rad; N s/m, N m s/rad]; or the mechanism of the robot, where the springs and dampers that the model's
             driven joints have beyond it are servos: the controller then returns the forces of their actuators. See
             `dojo_opt.mpc.servo` (default None).
-        feedforward: whether the planned inputs are applied, too; without them a servo has to be there (default True).
-        time_limit: limit of the wall time of a tick, looked at before each iteration [s] (default inf).
-        mean_velocity: whether the velocity is taken from the coordinates one step of the model ago (default True);
-            see `dojo_opt.mpc.measurement`.
-        friction: coefficient of friction that plans count on (default None: that of the model). A value below that of
-            the ground is safer.
-        learn_ground: whether to take the height of the ground from the standing contacts; "slope" takes the plane on
-            which they stand, of a robot on a floating base, and references are turned with it (default False).
+        feedforward: whether the planned inputs are applied, too; without them a servo is required (default True).
+        time_limit: limit of the wall time of a tick, checked before each iteration [s] (default inf).
+        mean_velocity: whether the velocity is computed from the coordinates one step of the model earlier (default
+            True); see `dojo_opt.mpc.measurement`.
+        friction: coefficient of friction that plans assume (default None: that of the model). A value below that of the
+            ground is safer.
+        learn_ground: whether to estimate the height of the ground from the stance contacts; "slope" estimates their
+            plane, for a robot on a floating base, and turns the references with it (default False).
         adapt: parameters of the model that are estimated from the measurements while the controller runs, an
             `Adaptation`: plans are made with the estimate, `MPC.estimator` has it (default None).
         options: settings of the planner in a tick (default None: `OPTIONS`); its stage is made from kappa and

@@ -72,8 +72,8 @@ def ilqr(
 ) -> Plan:
     """Plan a trajectory.
 
-    A guess of states begins at the stage that it fits best, so that smooth contact does not lead a good guess away.
-    A guess with a resting joint that has to move begins at the smoothest stage. When an attempt fails, the planner
+    A guess of states begins at the stage that it fits best, because smooth contact would move a good guess away. A
+    guess with a resting joint that has to move begins at the smoothest stage. When an attempt fails, the planner
     restarts at another stage, within `max_iterations`; the table of iterations shows it.
 
     A problem with a `refinement` is planned with its own time steps first, and from there with shorter ones. The plan
@@ -84,7 +84,7 @@ def ilqr(
         controls: (T, nu) guess of the inputs [N, N m]; by default that of the problem.
         states: (T + 1, nx) guess of the states; by default that of the problem, or the rollout of the inputs.
         warm_start: an earlier plan of the same problem, whose trajectory, multipliers and penalties are taken over. A
-            plan of an easier variant, with more damping, say, often helps where a direct solve fails.
+            plan of an easier variant, for example with more damping, often helps if a direct solve fails.
         starts: number of guesses to plan from: the given one, and others whose inputs are changed at random (default
             1). The best plan is returned: the cheapest of the solved ones, else that with the least violation.
         seed: seed of these changes (default 0). A plan depends on it, neither on the executor nor on its workers.

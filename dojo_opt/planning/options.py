@@ -15,12 +15,13 @@ __all__ = ["CONTINUATION", "PLANNED", "Options", "Stage"]
 
 
 class Stage(NamedTuple):
-    """One stage of the continuation: its smoothing, and when the next one begins.
+    """One stage of the continuation: its smoothing, and its end.
 
     Attributes:
         kappa_eval: smoothing of the contacts in rollouts [N s m].
         kappa_grad: smoothing of the contacts in derivatives [N s m].
-        decrease: the stage ends when an iteration promises or brings less than this share of the merit (default 0.03).
+        decrease: the stage ends when the predicted or actual decrease of an iteration is less than this share of the
+            merit (default 0.03).
         iterations: the stage ends after this many iterations (default 100).
     """
 
@@ -52,11 +53,11 @@ class Options:
             (default 3e-2, 3e-3, 1e-4, 1e-6).
         reopen: at a change of kappa, "feedback" rolls out with the gains, "gaps" keeps the states and opens the gaps
             (default "feedback").
-        follow: share of the merit; a rollout at the next kappa that raises the merit by more has lost the trajectory
-            (default 1).
-        bisections: number of times that a step of kappa is halved, on a logarithmic scale, when its rollout loses the
-            trajectory (default 3).
-        tolerance: share of the merit; the last stage ends when an iteration brings less (default 1e-3).
+        follow: share of the merit; a rollout at the next kappa that raises the merit by more counts as lost (default
+            1).
+        bisections: number of times that a step of kappa is halved, on a logarithmic scale, if its rollout is lost
+            (default 3).
+        tolerance: share of the merit; the last stage ends when an iteration lowers the merit by less (default 1e-3).
         max_iterations: limit of all iterations, rejected ones included (default 300).
         max_updates: multiplier updates before the constraints count as infeasible (default 20).
         violation: largest violation of a constraint in a plan that counts as solved [unit of the residual]
@@ -74,11 +75,11 @@ class Options:
         armijo: share of the predicted decrease that a step must achieve (default 0.01).
         ascent: allowed multiple of a predicted increase, which only open gaps cause (default 2).
         halvings: number of times that the line search halves the step size (default 6).
-        rejections: failed line searches in a row before gaps are closed by a rollout, or derivatives sharpened
-            (default 2).
+        rejections: failed line searches in a row before gaps are closed by a rollout, or kappa_grad is reduced (default
+            2).
         shooting: with open gaps, a step shorter than this is compared with one of multiple shooting; 0 for single
             shooting only (default 1).
-        time_limit: limit of the wall time, looked at before each iteration [s] (default inf).
+        time_limit: limit of the wall time, checked before each iteration [s] (default inf).
         callback: function of the record of each iteration; it may raise StopIteration to end the solve (default None).
         verbose: whether to print one line per iteration (default False).
         stream: file for these lines (default None: the standard output).

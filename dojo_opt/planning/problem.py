@@ -61,7 +61,7 @@ class Problem:
     """Minimise the sum of costs over x (T + 1, nx) and u (T, nu), from x_0 = start, along the motion of the simulator.
 
     The attribute `refinement` is 1. If it is larger, `ilqr` ends by planning `refined(refinement)` from its first plan.
-    `refined_constraints` are constraints of that problem only, for those that lead nowhere from a distant guess.
+    `refined_constraints` are constraints of that problem only: those that do not help from a distant guess.
 
     Args:
         sim: the simulator.
@@ -76,8 +76,8 @@ class Problem:
         states0: (T + 1, nx) guess of the states, which need not be consistent: the planner closes its gaps (default
             None: the rollout of the inputs).
         free_start: tangent components of the start that the planner may change, by number or name, or True for all;
-            `start` is then a guess (default None: a fixed start). With the constraint `Periodic`, such a plan is a gait
-            that repeats itself.
+            `start` is then a guess (default None: a fixed start). With the constraint `Periodic`, such a plan is a
+            periodic gait.
 
     Raises:
         TypeError: `sim` is not a Simulator, or an entry of `cost` or `constraints` is not a term.
@@ -138,7 +138,7 @@ class Problem:
     def refined(self, count: int = 5) -> Problem:
         """The same problem with shorter time steps: same knots, inputs and terms, and `refined_constraints`.
 
-        A plan with long steps may exploit the few instants at which a foot touches the ground, and stumble with shorter
+        A plan with long steps may exploit the few times at which a foot touches the ground, and stumble with shorter
         steps. `ilqr(problem.refined(5), warm_start=plan)` adapts it to them.
 
         Args:

@@ -21,8 +21,8 @@ def tracking_gains(problem: Problem, plan: Any, *, kappa: float | None = None) -
 
         K = -(R + B^T P B)^-1 (S + B^T P A),      P := Q + A^T P A + (S^T + A^T P B) K
 
-    Q, R, S are the Gauss-Newton Hessians of the costs. Unlike a plan's own gains, these ignore constraints, near which
-    those are stiff, and control limits, at which those are zero.
+    Q, R, S are the Gauss-Newton Hessians of the costs. Unlike a plan's own gains, these ignore constraints and control
+    limits; a plan's gains are stiff near constraints and zero at control limits.
 
     Args:
         problem: the problem, for its simulator and costs.

@@ -19,7 +19,7 @@ __all__ = ["Disturbances"]
 class Disturbances:
     """A sampler of perturbations: uniform in ranges (low, high), and in the horizontal plane for directions.
 
-    A range without extent is a constant. The push happens once; its impulse has the sampled size.
+    A range of zero width is a constant. The push happens once; its impulse has the sampled size.
 
     Attributes:
         nv: number of velocities of the robot; the first two are those of its base along x and y.

@@ -41,7 +41,7 @@ class ClosedLoop:
         u: (N, nu of the plant) inputs that acted, pushes included [N, N m].
         status: (N,) or (N + 1,) Status of every step that was tried.
         contacts: contacts of every step, world axes.
-        survived: whether the run lasted to its end.
+        survived: whether the run reached its end.
         message: the end of the run as a sentence.
         softened: number of steps of the plant that needed softer contact than its own, see `Plant`.
         log: every tick of the controller; empty for a controller without ticks.
@@ -144,7 +144,7 @@ def closed_loop(
             step of the plant (default None: every time step).
         reference: function of times (n,) [s] that returns the states (n, nx) of the error (default None: that of the
             controller, raised by the height of the ground that the controller has learnt by then).
-        fallen: function of a state that tells whether the robot has fallen, which ends the run (default None:
+        fallen: function of a state that returns whether the robot has fallen, which ends the run (default None:
             `plant.fallen`).
 
     Returns:

@@ -35,7 +35,7 @@ class MonteCarloRun:
     """One run.
 
     Attributes:
-        survived: whether the run lasted to its end.
+        survived: whether the run reached its end.
         message: the end of the run as a sentence.
         duration: length of the run [s].
         rms: `ClosedLoop.rms` of the components of the study [m, rad]; NaN without a reference.
@@ -79,7 +79,7 @@ class MonteCarlo:
 
     @property
     def survived(self) -> int:
-        """Number of runs that lasted to their end."""
+        """Number of runs that reached their end."""
         return sum(outcome.survived for outcome in self.outcomes)
 
     @property
@@ -94,7 +94,7 @@ class MonteCarlo:
 
     @property
     def rms(self) -> Vector:
-        """(runs,) distances from the reference of the runs that lasted [m, rad]; NaN for the others."""
+        """(runs,) distances from the reference of the surviving runs [m, rad]; NaN for the others."""
         return np.array([o.rms if o.survived else np.nan for o in self.outcomes])
 
     def summary(self) -> str:

@@ -47,7 +47,8 @@ class Push:
 
 @dataclass(frozen=True)
 class Perturbation:
-    """Differences between a plant and the model that MPC plans with. Each field acts on its own; by default none does.
+    """Differences between a plant and the model that MPC plans with. The fields are independent; by default there are
+    no differences.
 
     Attributes:
         offset: (ndx,) change of the initial state [m, rad, m/s, rad/s] (default (): none).

@@ -29,10 +29,10 @@ _LEVEL = 1e-6  # vertical part of a level axis
 
 
 class Plant:
-    """A robot in the world: measured, commanded, pushed.
+    """A simulated robot that is measured, commanded and pushed.
 
-    `simulator` is the perturbed one. It has three more inputs for every body that is pushed. A step that it cannot
-    solve is tried again with softer contact, up to a thousand times its kappa; `softened` counts those steps.
+    `simulator` is the perturbed one. It has three more inputs for every body that is pushed. An unsolved step is
+    repeated with softer contact, up to a thousand times its kappa; `softened` counts these steps.
 
     Args:
         sim: mechanism, time step and smoothing of the plant before the perturbation: usually those of the model with a
@@ -161,13 +161,13 @@ class Plant:
         return result
 
     def fallen(self, x: Vector) -> bool:
-        """Whether a robot lies: its base below half its first height, or tilted by more than 60 degrees from the start.
+        """Whether a robot has fallen: its base is below half its initial height, or tilted by more than 60 degrees.
 
         Args:
             x: (nx,) state.
 
         Returns:
-            True if it lies. Always False for a robot whose base neither floats nor moves in a vertical plane.
+            True if it has fallen. Always False for a robot whose base neither floats nor moves in a vertical plane.
         """
         if not stands_free(self.sim.mechanism):
             return False

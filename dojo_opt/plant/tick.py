@@ -18,7 +18,7 @@ __all__ = ["Tick", "milliseconds"]
 
 @dataclass(frozen=True)
 class Tick:
-    """One planning instant. When `fallback` is true the plan before it stays in force, with its gains.
+    """One planning instant. If `fallback` is true, the previous plan stays in force, with its gains.
 
     Attributes:
         time: time of the measurement [s].
@@ -27,12 +27,12 @@ class Tick:
         iterations: iterations of the planner, rejected ones included.
         cost: cost of the plan that is in force, at the time when it was made.
         alpha: last step size; 0 after a rejected step.
-        gap: largest entry of x (-) the state that the plan before expected [m, rad, m/s, rad/s].
+        gap: largest entry of x (-) the state that the previous plan predicted [m, rad, m/s, rad/s].
         status: status of the planner.
-        fallback: whether the plan before stays in force.
+        fallback: whether the previous plan stays in force.
         contacts: names of the contacts that touch the ground.
         error: (nv,) coordinates of x (-) reference [m, rad]; empty without a reference.
-        x: (nx,) start of the plan: measured, as the model means it, after the delay.
+        x: (nx,) start of the plan: the measured state, as a state of the model, after the delay.
         first: whether the others are warm-started from this plan.
     """
 

@@ -69,9 +69,9 @@ def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.
 def block(goal: str = "right", *, friction: float = 0.5, **model: Any) -> Problem:
     """A half-metre cube of 1 kg moves from rest on the ground to rest one metre to the right, or one metre up.
 
-    Ten knots of 0.1 s, three forces at the centre. They are zero at first: without smoothing, "up" has no gradient
-    there. Half of the squares of position, velocity and angular velocity, a quarter of that for the rotation vector,
-    and 1e-2 per N^2 are the cost. The full state at the end is a constraint.
+    Ten knots of 0.1 s, three forces at the centre. The guess is zero: without smoothing, "up" has no gradient there.
+    Half of the squares of position, velocity and angular velocity, a quarter of that for the rotation vector, and 1e-2
+    per N^2 are the cost. The full state at the end is a constraint.
 
     Args:
         goal: "right" or "up".

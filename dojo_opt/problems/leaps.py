@@ -34,23 +34,24 @@ def leap(
     refinement: int = 5,
     **model: Any,
 ) -> Problem:
-    """The quadruped leaps ahead from rest, with neither a gait nor a contact sequence to follow.
+    """The quadruped leaps forward from rest, without a reference gait or a contact schedule.
 
-    As in `hop`, the cost asks for a few poses: for a fifth of `duration` the standing one lowered by `crouch`, for two
-    fifths the one half-way to the goal, `height` up, then the one at the goal. Squares of place weigh 1, 1, 20,
-    attitude 2, angles .05 per second, the rest as in `follow`. The pose of the base at the end is a constraint. The
-    guess is a robot that stands still at the smoothing of the planner's first stage: states and torques. Torques alone
-    are not a guess: under them the robot has fallen on its back at the end, and plans that begin there may stay there.
+    As in `hop`, the cost has a few reference poses: for a fifth of `duration` the standing pose lowered by `crouch`,
+    for two fifths the pose half-way to the goal, raised by `height`, then the pose at the goal. Squares of place weigh
+    1, 1, 20, attitude 2, angles .05 per second, the rest as in `follow`. The pose of the base at the end is a
+    constraint. The guess is a robot that stands still at the smoothing of the planner's first stage: states and
+    torques. Torques alone are no good guess: under them the robot falls on its back, and plans that begin there may
+    stay there.
 
-    Legs that push from the standing pose reach their torque limits below .27 m. Hence the crouch, which no planner
-    finds from a goal that is up. Most leaps planned with steps of 20 ms stumble at their landing in shorter ones, hence
-    the refinement. In the refined problem the height is a constraint, too: half-way between the crouch and the landing
-    the base is that much higher than at first, or the plan fails.
+    Legs that push from the standing pose reach their torque limits below .27 m. Hence the crouch, which the planner
+    does not find from a goal above. Most leaps planned with steps of 20 ms stumble at their landing in shorter steps;
+    hence the refinement. In the refined problem the height is a constraint, too: half-way between the crouch and the
+    landing, the base has to rise by it.
 
     Args:
         distance: displacement along x [m].
         height: rise of the base [m].
-        duration: length of the motion [s].
+        duration: duration of the motion [s].
         crouch: drop of the base before the leap [m], at least 0.
         damping: damper of the joints [N m s/rad].
         time_step: length of a knot [s].

@@ -42,16 +42,16 @@ def trot(
     stance: Any = None,
     **settings: Any,
 ) -> Problem:
-    """A robot trots: the library's quadruped, or any one with two, four or six legs.
+    """A robot trots: the library's quadruped, or any robot with two, four or six legs.
 
     Without a robot, the quadruped of the A1's size trots for two periods of one second, 40 knots of 50 ms. The defaults
     are the reference of Dojo's quadruped example, its weights (impulses .01 per (N m s)^2), friction of .8, and less
     damping in the joints (5 N m s/rad there; with .5 here the robot falls over by itself). The pose of the base at the
     end is a constraint. Torques are limited to 33.5 N m.
 
-    Of another robot feet and stance are found, see `dojo_opt.gaits.legs.Legs`, and weights, times and lengths follow
-    from its weight and height h: two periods of 0.6 s at 0.2 m/s for h = 0.29 m, in proportion to the root of h, with
-    20 knots each. Torques keep within the limits of its inputs. Six legs move in two sets of three.
+    Feet and stance of another robot are found, see `dojo_opt.gaits.legs.Legs`; weights, times and lengths follow from
+    its weight and height h: two periods of 0.6 s at 0.2 m/s for h = 0.29 m, in proportion to the root of h, with 20
+    knots each. Torques stay within the limits of its inputs. Six legs move in two sets of three.
 
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
@@ -130,11 +130,11 @@ def jump(
     stance: Any = None,
     **settings: Any,
 ) -> Problem:
-    """A robot jumps forward, from standing to standing: the library's quadruped, or any one with legs.
+    """A robot jumps forward, from standing to standing: the library's quadruped, or any robot with legs.
 
     Jumps planned with steps of 20 ms land up to 72 mm off at 1 ms; upward and backward jumps are the worst. As for
-    `leap`, `ilqr` therefore ends with divided steps, and jumps land within 4 mm. There the height at the top is a
-    constraint.
+    `leap`, `ilqr` therefore ends with the refined problem, and jumps land within 4 mm. In the refined problem the
+    height at the top is a constraint.
 
     The quadruped jumps 0.3 m far and 0.2 m high. Others jump as far and high for their height h, that of the quadruped
     being 0.29 m, a third of it on flat feet; times follow the root of h, weights the robot's weight and height.

@@ -241,7 +241,7 @@ def bound(
         speed: forward speed [m/s].
         damping: damper of the joints [N m s/rad].
         step_height: lift of a swinging foot [m]. With less than the default, a foot is so low at the beginning and the
-            end of its swing that plans drag it instead of flying.
+            end of its swing that plans drag it along the ground.
         time_step: length of a knot [s].
         **settings: further arguments of `gaits.bound` and of `follow`, and of the model, as for `trot`.
 
@@ -267,8 +267,8 @@ def jump(
     """The quadruped jumps forward: standing, flight, standing.
 
     Jumps planned with steps of 20 ms land up to 72 mm off at 1 ms; upward and backward jumps are the worst. As for
-    `leap`, `ilqr` therefore ends with divided steps, and jumps land within 4 mm. There the height at the top is a
-    constraint.
+    `leap`, `ilqr` therefore ends with the refined problem, and jumps land within 4 mm. In the refined problem the
+    height at the top is a constraint.
 
     Args:
         distance: displacement along x [m].

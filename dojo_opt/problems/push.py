@@ -51,11 +51,11 @@ def push(
 ) -> Problem:
     """An arm pushes an object along a table to a place, where both come to rest.
 
-    The object stands with its x axis in the direction of the push. The hand is a ball at a frame of the arm, which
-    begins 1 cm behind the object, at the height of its centre of mass. The guess is a
-    hand that moves straight ahead, the object before it, with the torques that hold the arm; it does not know the
-    contact. Place and heading of the object at the end are constraints, and so is the rest of both. The friction of the
-    object's shapes, 0.5 where they have none, acts at the table and at the ball.
+    The object stands with its x axis in the direction of the push. The hand is a ball at a frame of the arm; it begins
+    1 cm behind the object, at the height of its centre of mass. In the guess the hand moves straight ahead with the
+    object in front of it, under the torques that hold the arm, without contact. Place and heading of the object at the
+    end are constraints, and both are at rest there. The friction of the object's shapes, 0.5 where they have none, acts
+    at the table and at the ball.
 
     Args:
         arm: the mechanism, or its simulator, whose time step is then `time_step`; its own contacts are omitted.
@@ -64,10 +64,10 @@ def push(
         frame: name of the link that has the ball (default None: the body at the end of the longest row of hinges).
         offset: (3,) of the ball from the origin of the frame, in its axes [m].
         radius: radius of the ball [m].
-        start: (nq,) coordinates where the search for those behind the object begins (default None: the neutral ones).
+        start: (nq,) coordinates from which the search for the starting pose begins (default None: the neutral ones).
         at: (3,) point of the table below the object at the beginning [m] (default None: on the ground, below the ball
             of the coordinates `start`).
-        duration: of the motion, of which a fifth is for the rest at the end [s].
+        duration: duration of the motion, a fifth of which is rest at the end [s].
         time_step: time step of the simulator [s].
 
     Returns:

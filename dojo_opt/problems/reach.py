@@ -40,16 +40,16 @@ def reach(
     """An arm moves a frame to a target, and is at rest there.
 
     The guess is a smooth motion of the joints to the nearest coordinates at the target, with the torques that hold the
-    arm on the way. The plan weighs joint rates, and torques beside those of the guess; the pose of the frame and the
-    rest at the end are constraints, and so are the largest speeds of the joints where the arm has some. Torques keep
-    within the limits of its inputs.
+    arm on the way. The costs are joint rates, and differences of the torques from those of the guess. The pose of the
+    frame and the rest at the end are constraints, as are the largest speeds of the joints, if the arm has any. Torques
+    stay within the limits of the inputs.
 
     Args:
         arm: the mechanism, or its simulator, whose time step is then `time_step`. Its base may be fixed or not.
         frame: name of a link, merged ones too, or of a body, as in `dojo.Kinematics`.
         target: (3,) place of the frame [m], or (place, unit quaternion (w, x, y, z)).
         start: (nq,) coordinates, or (nx,) state (default None: the neutral state).
-        duration: of the motion [s].
+        duration: duration of the motion [s].
         time_step: time step of the simulator [s].
         substeps: time steps per knot.
         offset: (3,) of the point that reaches the place from the origin of the frame, in its axes [m] (default zero).

@@ -108,10 +108,9 @@ def free_gait_mpc(
     height 80, of its rotation 10, of joint angles 1, rates a thirtieth of that, all of them ten times as much at the
     end; torques weigh `effort`, the slip of feet near the ground 3, differences of torques between diagonal legs .01.
     Costs are those of Kim et al. 2023 (arXiv 2312.08961), but for a slip that weighs three times as much, and no term
-    for long swings. Plans are made at a kappa of .01, where contact acts at a distance of a centimetre: it is this
-    smoothing that lets a foot leave the ground. Servos follow them on the plant, whose contact is hard. Plans count on
-    three quarters of the friction, and the slope of the ground is learnt from the feet that stand; the pose goes with
-    it.
+    for long swings. Plans are made at a kappa of .01, where contact acts at a distance of a centimetre; this smoothing
+    lets a foot leave the ground. Servos follow them on the plant, whose contact is hard. Plans assume three quarters of
+    the friction. The slope of the ground is estimated from the stance feet, and the pose follows it.
 
     Args:
         velocity: (3,) velocity forward and to the left, and rate of the heading [m/s, m/s, rad/s].

@@ -104,9 +104,9 @@ def hopper_mpc(
     Squares of position weigh 100, attitude 20 (yaw 1), leg 15, velocities along x and y 4, the others .01, impulses
     .001 per (N s)^2. Inputs are limited to 50 N m, 50 N m, 500 N.
 
-    A push in flight costs more until the foot is down: a light leg weight lets it reach down early. The weight on the
-    velocity keeps the body from leaning further than friction holds on the way back. Impulses that weigh ten times as
-    much, beside positions that weigh a tenth, are spared at the top of the hop: it is 40 mm too low then.
+    After a push in flight, a small weight of the leg lets it reach down early. The weight of the velocity keeps the
+    body from leaning further than friction allows on the way back. With ten times the weight of impulses and a tenth of
+    the weight of positions, hops are 40 mm too low.
 
     Args:
         velocity: (2,) horizontal velocity of the body [m/s].

@@ -50,9 +50,9 @@ def legged_mpc(
     """A robot with two, four or six legs walks at a commanded velocity: 20 knots, 12 of them a period of its gait.
 
     Feet and stance are found, see `dojo_opt.gaits.legs.Legs`. Weights are those of `quadruped_mpc` in units of the
-    robot's weight and height, times go with the root of the height: 40 ms a knot for one of 0.29 m. Torques keep within
-    the limits of its inputs. The cost tracks the gait with its torques by inverse dynamics; plans count on half the
-    friction of the feet, and learn the height of the ground from those that stand.
+    robot's weight and height, times go with the root of the height: 40 ms a knot for one of 0.29 m. Torques stay within
+    the limits of its inputs. The cost tracks the gait with its torques by inverse dynamics; plans assume half the
+    friction of the feet, and the height of the ground is estimated from the stance feet.
 
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator.

@@ -39,7 +39,7 @@ def quadruped_mpc(
 
     The cost tracks the gait of `gaits.trot` with its torques as reference. Squares of position and attitude of the
     trunk weigh 10, of joint angles 1, of velocities .1 and .01, of the torques 1e-4 per (N m)^2. Torques are limited to
-    33.5 N m. Plans are made at a kappa of 1e-3, where feet feel the ground before they touch it. They count on a
+    33.5 N m. Plans are made at a kappa of 1e-3, where the ground acts on feet before they touch it. They assume a
     friction of .4 where the robot's feet have .8: the planned friction is available on slippery ground, too.
 
     Args:

@@ -28,7 +28,7 @@ document.getElementById("bar").style.display = "none";"""
 
 
 class Live:
-    """A page that shows the states it is given; made by `dojo.viewer.live`.
+    """A page that shows a robot in given states; made by `dojo.viewer.live`.
 
     Args:
         sim: the simulator of the robot.
@@ -72,7 +72,7 @@ class Live:
         return f'<iframe src="{self.url}" style="width: 100%; height: 420px; border: 0"></iframe>'
 
     def show(self, x: ArrayLike) -> None:
-        """Move the robot to a state; states that follow faster than the screen shows them are passed over.
+        """Move the robot to a state; states that arrive faster than the screen shows them are skipped.
 
         Args:
             x: (nx,) state.
@@ -183,7 +183,7 @@ def live(sim: Simulator, *, port: int = 0, rate: float = 60.0, open_browser: boo
             print(view.url)
             dojo.closed_loop(view.watch(mpc), plant, 10.0)
 
-    The server listens on 127.0.0.1: pages of other computers do not reach it.
+    The server listens on 127.0.0.1: other computers cannot reach it.
 
     Args:
         sim: the simulator of the robot.

@@ -14,17 +14,17 @@ from sim.mechanism.shapes import Solid, String
 
 @dataclass(frozen=True)
 class Collision:
-    """Bodies a and b keep apart: their shapes touch, and rub, but do not overlap.
+    """A collision of bodies a and b: their shapes touch with friction, and do not overlap.
 
-    With a String on both sides, the bodies are tied together instead: their points keep within its length, and there is
-    no friction. A taut string moves as a rod does (string.py), and one that is jerked taut takes the energy of the
-    jerk.
+    With a String on both sides, a string connects the bodies instead: the distance of its ends is at most its length,
+    and there is no friction. A taut string moves like a rod (string.py); a string that is jerked taut dissipates the
+    energy of the jerk.
 
     A mechanism makes one collision for each shape of a body that has several, called "name.shape" by the name or the
     number of the shape.
 
-    A motion may start with shapes that overlap: its first step moves them apart, at a speed of their overlap over the
-    time step, and adds the energy that this takes.
+    A motion may start with shapes that overlap: the first step moves them apart, at a speed of their overlap over the
+    time step, and adds the energy of this motion.
 
     Attributes:
         a: name of the first body.
@@ -37,9 +37,9 @@ class Collision:
         name: name of the collision (default "a-b").
         restitution: share of the normal velocity that an impact gives back, 0 to 1 (default None: the larger one of the
             two shapes, 0 where they have none).
-        reach: gap from which the shapes do not act on one another [m]; up to half of it the contact law is as it is
-            without. Shapes at twice the reach and more cost next to nothing, and their contacts have a gap of 1e9 m
-            in results (default None: no reach, but some impulse kappa/gap at every distance).
+        reach: gap beyond which the shapes do not act on one another [m]; below half of it, the contact law is
+            unchanged. Shapes farther apart than twice the reach cost next to nothing, and their contacts have a gap of
+            1e9 m in results (default None: an impulse kappa/gap at every distance).
 
     Raises:
         ValueError: for one body on both sides, an obstacle without a shape, or a value out of range.

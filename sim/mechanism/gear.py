@@ -13,16 +13,16 @@ from sim.mechanism.parts import Joint
 
 @dataclass(frozen=True)
 class Gear:
-    """q[joint] = ratio q[other] + offset: toothed wheels, belts, a rack, a joint that mimics another one.
+    """q[joint] = ratio q[other] + offset: toothed wheels, belts, a rack, a mimic joint.
 
-    The gear acts on both coordinates as two motors would: on their children, and back on their parents. Quaternions
-    have no gears.
+    The gear acts on both coordinates like two motors: on their children, and in the opposite direction on their
+    parents. Quaternions have no gears.
 
     Attributes:
-        joint: name of the joint that follows.
-        other: name of the joint that leads.
+        joint: name of the driven joint.
+        other: name of the driving joint.
         ratio: ratio of the coordinates [rad/rad, m/rad, ...] (default 1).
-        offset: offset of the coordinate that follows [m, rad] (default 0).
+        offset: offset of the driven coordinate [m, rad] (default 0).
         dof: number of the coordinate of `joint`, for joints with several (default 0).
         other_dof: number of the coordinate of `other` (default 0).
         name: name of the gear (default that of `joint`).

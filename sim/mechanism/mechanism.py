@@ -43,10 +43,11 @@ class Mechanism:
         name: name of the mechanism.
         neutral: coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero for joints
             without a name in it, or all of q (default None: zero).
-        collisions: bodies and obstacles that keep apart (default none). "self" stands for all pairs of shapes but those
-            of links that a joint connects, and those that overlap in the neutral state (self_collisions.py).
+        collisions: collisions of bodies with each other and with obstacles (default none). "self" stands for all pairs
+            of shapes but those of links that a joint connects, and those that overlap in the neutral state
+            (self_collisions.py).
         loops: joints that close loops (default none).
-        gears: joint coordinates that follow others (default none).
+        gears: couplings of joint coordinates (default none).
         scenery: parts of pictures that are fixed to the world (default none).
 
     Raises:
@@ -224,7 +225,7 @@ class Mechanism:
         return out
 
     def add(self, other: Mechanism, pose: ArrayLike = (0.0, 0.0, 0.0), prefix: str = "", name: str = "") -> Mechanism:
-        """One mechanism of this one and another one, whose bodies, joints, contacts, inputs and collisions follow.
+        """The union of this mechanism and another one, whose bodies, joints, contacts, inputs and collisions come last.
 
         Args:
             other: the mechanism to add.
@@ -277,7 +278,7 @@ class Mechanism:
         return replace(self, collisions=[*self.collisions, *collisions])
 
     def self_collisions(self) -> tuple[list[Collision], list[str]]:
-        """The pairs of `collisions="self"`: all of shapes of bodies that no joint connects.
+        """The pairs of `collisions="self"`: all pairs of shapes of bodies that no joint connects.
 
         Returns:
             (the collisions, the names of the pairs that overlap in the neutral state and are omitted).
@@ -291,7 +292,7 @@ class Mechanism:
 
         Args:
             shape: the obstacle, placed in world axes by its centre and orientation.
-            bodies: names of bodies all of whose shapes touch it; by default the balls of the contacts do.
+            bodies: names of bodies, all of whose shapes touch it; by default the balls of the contacts touch it.
             name: prefix of the names of the collisions.
             **options: friction, law, restitution of Collision.
 

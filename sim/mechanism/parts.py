@@ -43,20 +43,20 @@ LAWS = ("impact", "linear", "nonlinear")
 class Body:
     """A rigid body. Its frame has its origin at the centre of mass.
 
-    A body of mass 0, without inertia and shape, is the middle of a joint put together from several, such as hinges one
-    after the other. Something with a mass has to hang on it.
+    A body of mass 0, without inertia and shape, connects the parts of a compound joint, such as a chain of hinges. A
+    body with a mass has to hang on it.
 
     Attributes:
         name: name of the body.
         mass: mass [kg] (default 1).
         inertia: (3,) principal moments or (3, 3) matrix, about the centre of mass, body axes [kg m^2] (default None:
             that of `shape`).
-        shape: shape for inertia, collisions and drawings, or several (default None: no shape). All of them touch the
-            ground (`Mechanism.on`), obstacles and other bodies where asked, each with its own friction and restitution.
-            Several shapes share the mass by their volumes; `shapes` has them as a tuple.
-        visuals: picture of the body, where it is another one than the shapes (default none).
-        gravity_compensation: share of its weight that is taken off it: 1 for a body that floats, such as the link of an
-            arm whose drives carry it, 0 for none (default 0).
+        shape: shape for inertia, collisions and drawings, or several (default None: no shape). All of them can touch
+            the ground (`Mechanism.on`), obstacles and other bodies, each with its own friction and restitution. Several
+            shapes share the mass in proportion to their volumes; `shapes` has them as a tuple.
+        visuals: picture of the body, if it differs from the shapes (default none).
+        gravity_compensation: compensated share of its weight: 1 for a body that floats, such as the link of an arm
+            whose drives carry it, 0 for none (default 0).
 
     Raises:
         ValueError: for a value out of range, or an inertia that no rigid body has; the message names the body.
@@ -125,15 +125,14 @@ class Joint:
             limits).
         cone: largest angle of the child's axis from the parent's, for kinds with three rotations [rad] (default None:
             no limit).
-        armature: inertia that moves with a coordinate and with nothing else, as a geared rotor's [kg, kg m^2] (default
-            0).
-        friction: dry friction: the largest force or torque that holds a coordinate, and the one that brakes it when it
-            moves; one number, or one per degree of freedom, none for quaternions [N, N m] (default 0). A joint at rest
-            creeps with kappa, as contacts do: by kappa/(h f) (1/(1 - s) - 1/(1 + s)) in a step h under a share s of f.
-        close: whether the child hangs on another joint already, and this one closes a loop (default False). With a
-            spring, a damper, friction, limits, armature, an input, a pitch or two rotations, it has coordinates of its
-            own, and the child is cut there: a second part of it, the body "child.name", hangs on this joint and is
-            welded to the first (sim/mechanism/closing.py).
+        armature: inertia of a coordinate alone, such as that of a geared rotor [kg, kg m^2] (default 0).
+        friction: dry friction: the largest force or torque that holds a coordinate at rest, and that brakes its motion;
+            a number, or one per degree of freedom, not for quaternions [N, N m] (default 0). A joint at rest creeps
+            with kappa, as contacts do: by kappa/(h f) (1/(1 - s) - 1/(1 + s)) in a step h under a share s of f.
+        close: whether the child already hangs on another joint, so that this joint closes a loop (default False). With
+            a spring, a damper, friction, limits, armature, an input, a pitch or two rotations, the joint has
+            coordinates of its own, and the child is cut in two: the second part, the body "child.name", hangs on this
+            joint and is welded to the first (sim/mechanism/closing.py).
         pitch: displacement of a screw along its axis per turn, positive for a right-handed thread, negative for a
             left-handed one [m/rev] (default 0). Its coordinate is the angle.
 
@@ -304,10 +303,9 @@ class Input:
         Input("knee", servo="position", stiffness=80, damping=2)    u is the angle it turns to [rad]
         Input("wheel", servo="velocity", damping=5)                 u is the rate it turns at [rad/s]
 
-    A servo makes the force kp (u - q) - kd v, or kd (u - v). Springs and dampers of a step are implicit, so are those
-    of a servo: it is stable for every gain. It counts as a spring at rest at zero in energies. With `force_limits` its
-    force stays between them, as exactly as contacts hold, and counts as a drive's in energies; its damper is then of
-    first order in the time step.
+    The force of a servo is kp (u - q) - kd v, or kd (u - v). Like all springs and dampers of a step it is implicit, so
+    it is stable for every gain. In energies it is a spring with its rest at zero. `force_limits` hold as exactly as
+    contacts; the force is then that of a drive in energies, and the damper is of first order in the time step.
 
     Attributes:
         joint: name of the joint (default None: the input acts on a body).
@@ -316,16 +314,15 @@ class Input:
         force: (3,) force on the body per unit of the input (default zero).
         torque: (3,) torque on the body per unit of the input [m] (default zero).
         frame: axes of force and torque, "world" or "body" (default "world").
-        name: name of the input (default that of the joint, with the number of one of several degrees of freedom, or of
-            the body).
+        name: name of the input (default that of the joint or the body; with several degrees of freedom, numbered).
         limits: (lo, hi) of the force or torque, or of the target of a servo, as a file gives them: default control
             limits of problems and plants; a simulator does not clip [N, N m; m, rad; m/s, rad/s] (default inf).
-        speed: largest speed of the joint's coordinate, see `dojo.constraint.SpeedLimits`; nothing else holds it [m/s,
-            rad/s] (default inf).
+        speed: largest speed of the joint's coordinate, used by `dojo.constraint.SpeedLimits` only [m/s, rad/s] (default
+            inf).
         servo: "position" or "velocity": the input is the target of its joint (default None: a force or torque).
         stiffness: kp of a position servo [N/m, N m/rad] (default 0).
         damping: kd of a servo [N s/m, N m s/rad] (default 0).
-        force_limits: (lo, hi) of the force of a servo, both finite [N, N m] (default inf: it has none).
+        force_limits: (lo, hi) of the force of a servo, both finite [N, N m] (default inf: no limits).
 
     Raises:
         ValueError: for both a joint and a body or neither, a servo without its gain, or a value out of range.

@@ -26,7 +26,7 @@ class Polytope(Solid):
     """The convex hull of points. `vertices` keeps the corners of the hull only.
 
     A body that takes its inertia from the shape has its origin at the centre of mass: `Polytope.about_centroid(points)`
-    moves it there. Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+    moves it there. The keywords of `sim.mechanism.shapes.Solid` give its place in the body.
 
     Attributes:
         vertices: (n, 3) points in the frame of the shape, at least four, not all in one plane [m].

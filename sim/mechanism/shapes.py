@@ -136,7 +136,7 @@ class Solid:
         """Radius of the sphere about the centre of the shape that contains it.
 
         Returns:
-            The radius [m]; infinite for a shape without an end.
+            The radius [m]; infinite for an unbounded shape.
         """
         return inf
 
@@ -144,7 +144,7 @@ class Solid:
         """Volume of the shape.
 
         Returns:
-            The volume [m^3]; infinite for a shape without an end.
+            The volume [m^3]; infinite for an unbounded shape.
         """
         return inf
 
@@ -155,7 +155,7 @@ class Solid:
             n: (3,) unit vector.
 
         Returns:
-            The support [m]; infinite for a shape without an end.
+            The support [m]; infinite for an unbounded shape.
         """
         stance = self.stance()
         return inf if stance is None else float((stance.points @ n).max()) + stance.radius
@@ -167,7 +167,7 @@ class Solid:
             (n, 3) points in the frame of the shape [m].
 
         Raises:
-            NotImplementedError: the shape has no end.
+            NotImplementedError: the shape is unbounded.
         """
         raise NotImplementedError
 
@@ -245,7 +245,7 @@ class Solid:
 class Sphere(Solid):
     """A ball. Its moments of inertia are 2/5 m r^2.
 
-    Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+    The keywords of `sim.mechanism.shapes.Solid` give its place in the body.
 
     Attributes:
         radius: radius r [m].
@@ -284,7 +284,7 @@ class Sphere(Solid):
 class Box(Solid):
     """A cuboid. Its moments of inertia are m/12 (y^2 + z^2) and so on.
 
-    Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+    The keywords of `sim.mechanism.shapes.Solid` give its place in the body.
 
     Attributes:
         x: edge along x [m].
@@ -328,7 +328,7 @@ class Box(Solid):
 class Cylinder(Solid):
     """A cylinder about its z axis. Its moments of inertia are m/12 (3 r^2 + l^2) across and m/2 r^2 along the axis.
 
-    Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+    The keywords of `sim.mechanism.shapes.Solid` give its place in the body.
 
     Attributes:
         radius: radius r [m].
@@ -373,7 +373,7 @@ class Capsule(Solid):
         across = m_c (l^2/12 + r^2/4) + m_s (2/5 r^2 + l^2/4 + 3/8 l r)
         along  = m_c r^2/2 + m_s 2/5 r^2,     m_c : m_s = l : 4/3 r
 
-    Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+    The keywords of `sim.mechanism.shapes.Solid` give its place in the body.
 
     Attributes:
         radius: radius r [m].
@@ -420,8 +420,8 @@ class Capsule(Solid):
 class Ellipsoid(Solid):
     """An ellipsoid. Its moments of inertia are m/5 (y^2 + z^2) and so on.
 
-    It touches ground and planes as a collision with a HalfSpace: the point it stands on moves over it. Its place in the
-    body is given by the keywords of `sim.mechanism.shapes.Solid`.
+    It touches the ground through a collision with a HalfSpace, because its contact point moves over its surface. The
+    keywords of `sim.mechanism.shapes.Solid` give its place in the body.
 
     Attributes:
         x: semi-axis along x [m].
@@ -464,7 +464,7 @@ class Ellipsoid(Solid):
 class HalfSpace(Solid):
     """Everything below the plane z = 0 of its frame: ground, a wall, a slope. An obstacle, not the shape of a body.
 
-    Its place is given by the keywords of `sim.mechanism.shapes.Solid`.
+    The keywords of `sim.mechanism.shapes.Solid` give its place.
     """
 
     code = shape_kinds.Shape.HALFSPACE
@@ -480,7 +480,7 @@ class HalfSpace(Solid):
 class String(Solid):
     """One end of a string between two bodies, at the centre of this shape. It is not the shape of a body.
 
-    Its place is given by the keywords of `sim.mechanism.shapes.Solid`.
+    The keywords of `sim.mechanism.shapes.Solid` give its place.
 
     Attributes:
         length: length of the string [m].

@@ -34,13 +34,13 @@ class SignedDistance(Solid):
     """The solid inside of the level set phi = 0 of a field on a grid: phi < 0 inside, phi > 0 outside.
 
     phi is a cubic B-spline through the values: its surface, normals and curvature are smooth. The gap of a contact is
-    the Euclidean distance to the level set, whatever the scale of phi; phi itself only says where to look for the
-    nearest point, so that distances are the best values. Edges of the solid are rounded, by about one cell.
+    the Euclidean distance to the level set, whatever the scale of phi; phi itself only leads to the nearest point;
+    signed distances are the best values. Edges of the solid are rounded, by about one cell.
 
-    Spheres and capsules collide with it, other shapes do not. One sphere, or end of a capsule, touches it at one point,
-    the nearest: a ball that fits a hollow at two places touches in turn. On planes and ground it stands on equal balls
-    inside it, which touch the surface at corners of its convex hull, at most 32. Shapes with the same array of values
-    share one table. Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+    Spheres and capsules collide with it, other shapes do not. A sphere, or an end of a capsule, touches it at the
+    nearest point only: a ball that fits a hollow at two places touches them in turn. On planes and ground it stands on
+    equal balls inside it, which touch the surface at corners of its convex hull, at most 32. Shapes with the same array
+    of values share one table. The keywords of `sim.mechanism.shapes.Solid` give its place in the body.
 
     Attributes:
         values: (nx, ny, nz) values of phi, at least 4 along each axis; positive on the outermost grid points [m].
@@ -97,7 +97,7 @@ class SignedDistance(Solid):
 
     @classmethod
     def from_function(cls, f: Field, bounds: ArrayLike, spacing: float, **place: Any) -> SignedDistance:
-        """A solid by a function, which is called once, for all grid points.
+        """A solid given by a function, which is called once, for all grid points.
 
         Args:
             f: phi of points (n, 3) [m] as an array (n,), negative inside; best the signed distance [m].
@@ -109,7 +109,7 @@ class SignedDistance(Solid):
             The shape.
 
         Raises:
-            ValueError: for values of another number, or that SignedDistance refuses.
+            ValueError: for a wrong number of values, or values that SignedDistance refuses.
         """
         call = "SignedDistance.from_function"
         if not callable(f):
@@ -128,7 +128,7 @@ class SignedDistance(Solid):
         origin: ArrayLike = (0.0, 0.0, 0.0),
         **place: Any,
     ) -> SignedDistance:
-        """The solid in which a density is above a level, as of a neural radiance field.
+        """The solid in which a density, such as that of a neural radiance field, is above a level.
 
         The surface is where the cubic B-spline through the density has that level. The values of the shape are the
         distances of the grid points to it, negative where the density is above the level: gaps are distances in
@@ -195,7 +195,8 @@ class SignedDistance(Solid):
         return cls(values, origin, spacing, **place)
 
     def about_centroid(self) -> SignedDistance:
-        """The shape with the centroid of the solid at its origin, as a body that takes its inertia from it has it.
+        """The shape with the centroid of the solid at its origin, as needed for a body that takes its inertia from the
+        shape.
 
         Returns:
             The shape; its values are the same.

@@ -30,7 +30,7 @@ _MARGIN = 8  # level grid lines around kinks: the waves of a spline fade by .27 
 
 @dataclass(frozen=True, eq=False)
 class Terrain:
-    """Ground for contacts: `mechanism.on(terrain)`, or Contact(..., terrain=...) one by one.
+    """Ground for contacts: `mechanism.on(terrain)` for all, or Contact(..., terrain=...) for one.
 
     Derivatives by parameters of the heights follow by the chain rule. For a loss L and the rises of stairs:
 

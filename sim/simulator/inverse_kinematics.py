@@ -29,7 +29,7 @@ Target = tuple[Floats | None, Floats | None]  # place, rotation
 
 @dataclass(frozen=True)
 class IkResult:
-    """Coordinates, and how near the targets they are.
+    """Coordinates, and their distances from the targets.
 
     Attributes:
         q: (nq,) coordinates.
@@ -61,28 +61,29 @@ def ik(
     max_iterations: int = 200,
     attempts: int = 8,
 ) -> IkResult:
-    """Coordinates near `start` with frames at their targets: Levenberg and Marquardt's method, steps within the limits.
+    """Coordinates near `start` with frames at their targets, by Levenberg and Marquardt's method with steps within the
+    limits.
 
     Each step is min |J dq + r|^2 + damping |dq|^2 under lo <= q + dq <= hi, solved as a bounded problem, so that joints
     slide along their limits.
 
     Args:
         sim: the simulator, or its Kinematics with frames that were added.
-        targets: by frame, its place (3,) [m]; or with its orientation, (place, quaternion (w, x, y, z)) or (None,
+        targets: by frame: its place (3,) [m], or, with its orientation, (place, quaternion (w, x, y, z)) or (None,
             quaternion). "center of mass" is a place, too.
         start: coordinates (nq,), by default those of the neutral state.
         fixed: names of joints that keep their coordinates, "floating_base" for one.
-        limits: whether joint limits hold; cones are not looked at.
+        limits: whether joint limits hold; cone limits are ignored.
         tolerance: largest error of a success [m, rad].
-        max_iterations: of the method, from one start.
-        attempts: starts, the further ones at random around the best coordinates so far: arms have postures in which no
-            small motion helps.
+        max_iterations: limit of the iterations from one start.
+        attempts: number of starts; further ones are random, around the best coordinates so far, because arms have
+            postures in which no small motion helps.
 
     Returns:
-        IkResult, whose message says which target is farthest when there is no solution nearby.
+        IkResult; without a solution nearby, its message names the farthest target.
 
     Raises:
-        ValueError: a frame or a joint is unknown, or a target has another form.
+        ValueError: a frame or a joint is unknown, or a target has the wrong form.
     """
     kin = sim if isinstance(sim, Kinematics) else Kinematics(sim)
     if not isinstance(targets, Mapping):

@@ -22,9 +22,9 @@ _ORDER_8 = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)
 class Kinematics:
     """Smooth quantities of a mechanism at coordinates q (nq,) and joint velocities v (nv,).
 
-    Frames are called by the names of bodies, whose origin is the centre of mass, and, of a robot from a file, of its
-    links, merged ones too; `frames` lists them, `add` adds one. Of a link that has the name of its body the frame is
-    that of the link. Velocities are those of joints, as in `Simulator.start`, not momenta of a step.
+    A frame has the name of a body, with its origin at the centre of mass, or of a link of a robot from a file, merged
+    links included; `frames` lists them, `add` adds one. If a link and a body have the same name, the frame is that of
+    the link. Velocities are those of joints, as in `Simulator.start`, not momenta of a step.
 
     Jacobians, twists and wrenches have linear parts first, world axes: [velocity of the frame's origin; angular].
 
@@ -61,7 +61,7 @@ class Kinematics:
         """Add a frame.
 
         Args:
-            name: a name that no frame has.
+            name: an unused name.
             parent: a frame, or "world".
             point: of its origin in the parent's frame (3,) [m].
             orientation: unit quaternion (w, x, y, z) from its axes to those of the parent; the same axes by default.
@@ -79,7 +79,7 @@ class Kinematics:
         self._frames[name] = body, at, turn @ own
 
     def place(self, frame: str) -> tuple[int, Floats, Floats]:
-        """Where a frame sits on its body.
+        """The place of a frame on its body.
 
         Args:
             frame: name of the frame.

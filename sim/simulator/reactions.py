@@ -46,7 +46,7 @@ class Reactions(Result):
 
     Torques are about the joint point of the child where the step begins, whose place in the world is `point`. Axes are
     those of the world, of the joint frame in the parent, or of the child where the step begins, as `frame` says. Joints
-    of the tree come first, then those that close loops. Some of redundant constraints carry nothing.
+    of the tree come first, then those that close loops. Some of the redundant constraints carry no load.
 
     Attributes:
         names: names of the n joints.

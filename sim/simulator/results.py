@@ -52,7 +52,7 @@ class Interrupted(KeyboardInterrupt):
     Attributes:
         result: return value of the call so far: the Trajectory, Shot or Batch of a rollout with the solved steps, the
             Plan of `ilqr` with the trajectory of its last iteration, the ClosedLoop of `closed_loop`; None if nothing
-            was done yet. Calls that only differentiate raise KeyboardInterrupt.
+            was done yet. Calls that compute derivatives only raise KeyboardInterrupt.
     """
 
     def __init__(self, result: Any = None) -> None:
@@ -121,8 +121,8 @@ class Contacts:
         time_step: time step [s].
         impulse: (..., ncontact, 3) impulse on the body [N s].
         point: (..., ncontact, 3) its point of action at the end of the step [m].
-        gap: (..., ncontact) distance from the ground at the end of the step, 1e9 beyond its reach (see
-            Collision) or does not exist in this configuration [m].
+        gap: (..., ncontact) distance from the ground at the end of the step [m]; 1e9 for a contact beyond its reach
+            (see Collision), or one that does not exist in this configuration.
         slip: (..., ncontact) sliding speed [m/s].
     """
 
@@ -181,8 +181,8 @@ class StepResult(Result):
         violation: largest |product - kappa| of the complementary pairs [N s m].
         scene: mechanism, time step, and rows of the contacts, for `contacts`.
         substeps: number of steps that it was divided into.
-        share: share of the momentum of bodies against each other that a divided step handed on.
-        error: estimated error over the one that the accuracy of the simulator allows; 0 without an accuracy.
+        share: share of the relative momentum of bodies that a divided step conserved.
+        error: ratio of the estimated error to the one that the accuracy allows; 0 without an accuracy.
         detail: sentence about an unsolved step, with its numbers.
     """
 
@@ -220,9 +220,9 @@ class Trajectory(Result):
         iterations: (T,) iterations of each step.
         contacts: contacts of each step, (T, ncontact, ...).
         substeps: (T,) number of steps that each step was divided into.
-        shares: (T,) share of the momentum of bodies against each other that each step handed on: 1, but in whips.
-        errors: (T,) estimated error of each step over the one that the accuracy of the simulator allows: above 1 where
-            contacts forced it to go on; 0 without an accuracy.
+        shares: (T,) share of the relative momentum of bodies that each step conserved: 1, except in whip-like motions.
+        errors: (T,) ratio of the estimated to the allowed error of each step: above 1 if contacts prevented a shorter
+            step; 0 without an accuracy.
         detail: sentence about an unsolved step, with its numbers.
         wrenches: (T, nbody, 6) external wrenches [N, N m]; None without any.
     """
@@ -365,7 +365,7 @@ class Shot(Result):
 class Jacobian(Result):
     """Derivatives of one step: `A, B = jacobian`; with names (wrt=...), a table of blocks by these names.
 
-    A, B and blocks of an unsolved step raise SimulationError when they are taken out.
+    Access to A, B or a block of an unsolved step raises SimulationError.
 
     Attributes:
         blocks: "state" (ndx, ndx), "input" (ndx, nu), parameters (ndx, n).
@@ -477,7 +477,7 @@ class Linearization(Result):
 class Gradient(Result, Mapping[str, Floats]):
     """Gradient of a scalar of a rollout, by the names of wrt=...
 
-    Blocks of an unsolved rollout raise SimulationError when they are taken out.
+    Access to a block of an unsolved rollout raises SimulationError.
 
     Attributes:
         blocks: "state" (ndx,), "input" (T, nu), parameters (n,).

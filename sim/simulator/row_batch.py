@@ -380,7 +380,9 @@ class RowStepping(StateSpace):
 
     @property
     def has_single_rows(self) -> bool:
-        """Whether it has them: compiled loops make its steps, which have no accuracy and change no order."""
+        """Whether the simulator has single rows: only with steps of one order in compiled loops, without an
+        accuracy.
+        """
         return self._engine.in_one_kernel
 
     @cached_property

@@ -67,15 +67,16 @@ class Simulator(RowStepping):
             (default 1e-9 m/s m |g| h with the lightest free mass m, within 1e-13 and 1e-6; see settings.py).
         tolerance: error of the equations of a step [N s, N m s, m], relative to 1 + the largest momentum.
         max_iterations: limit of the iterations of the interior point.
-        order: 2, or 4, 6, 8 for trees: explicit steps with 4, 7, 12 evaluations of the dynamics. All keep momentum.
-            Order 2 bounds the energy for ever; the others have a much smaller error that grows, and steps of order 2
-            near contacts, collisions and limits, and with joints too stiff for an explicit step: see `describe()`.
+        order: 2, or 4, 6, 8 for trees: explicit steps with 4, 7, 12 evaluations of the dynamics. All keep momentum. The
+            energy error of order 2 stays bounded; that of the others is much smaller, but grows. They use steps of
+            order 2 near contacts, collisions and limits, and for joints too stiff for an explicit step: see
+            `describe()`.
         divide: whether a step that cannot be solved, or turns a body too far, becomes 2, 4, ... up to 1024 steps, as
-            few as it needs: see `substeps` of results. Momentum is handed on exactly, unless no poses a step apart have
-            it. Then bodies lose momentum against each other: see `shares`.
-        accuracy: error of the joint coordinates that a motion may make per second [m, rad], of a tree. Each step is
-            divided into sub-steps of order 8 or 2 as that allows, and impacts happen at their times. `errors` of
-            results says where the estimated error is larger; see sim/integrators/adaptive.py.
+            few as it needs: see `substeps` of results. The parts conserve momentum exactly, unless no two poses one
+            step apart have this momentum. Then bodies lose relative momentum: see `shares`.
+        accuracy: allowed error of the joint coordinates per second of motion [m, rad]. Each step is divided into
+            sub-steps of order 8 or 2 accordingly, and impacts happen at their own times. `errors` of results has the
+            ratio of estimated to allowed error; see sim/integrators/adaptive.py.
 
     Raises:
         TypeError: for a mechanism or a `divide` of the wrong kind.
@@ -120,7 +121,7 @@ class Simulator(RowStepping):
         return f"Simulator({self.mechanism.name}, {', '.join(f'{name}={value:g}' for name, value in shown)})"
 
     def replace(self, **settings: Any) -> Simulator:
-        """The same simulator with other settings. Compiled code is shared, and a default kappa stays one.
+        """The same simulator with other settings. Compiled code is shared, and a default kappa remains the default.
 
         Args:
             **settings: settings of Simulator(...), `mechanism`, `gravity` (3,) [m/s^2], and `friction` and `law` of
@@ -366,7 +367,7 @@ class Simulator(RowStepping):
     def horizon(self, knots: int, substeps: int = 1, limits: tuple[ArrayLike, ArrayLike] | None = None) -> Horizon:
         """Rollouts and derivatives of many trajectories of one length, for a planner: see horizon.py.
 
-        Steps are whole: a planner is better off with a refusal of wild steps than with their parts.
+        Steps are not divided: a planner does better with refused steps than with divided ones.
 
         Args:
             knots: number of knots.

@@ -76,7 +76,9 @@ class StateSpace:
 
     @property
     def second_order(self) -> str:
-        """Why all steps of a simulator of higher order are of order 2, as where a spring is too stiff; empty if not."""
+        """The reason why all steps of a simulator of higher order are of order 2, such as a stiff spring; empty if they
+        are not.
+        """
         return self._engine.second_order
 
     def describe(self) -> str:
@@ -124,7 +126,7 @@ class StateSpace:
     def turn_ground(self, normal: ArrayLike) -> None:
         """Turn the half-spaces under all contacts, in place.
 
-        It is for loops that learn their ground in a simulator of their own. `mechanism` keeps the normals that it was
+        It is meant for loops that estimate the ground in their own simulator. `mechanism` keeps the normals that it was
         made with; heights along the normals stay.
 
         Args:
@@ -142,7 +144,7 @@ class StateSpace:
     def set_parameters(self, values: Mapping[str, ArrayLike]) -> None:
         """Give parameters other values, in place; `with_parameters` returns a new simulator instead.
 
-        It is for loops that estimate parameters of a simulator of their own. `mechanism` and `parameters` keep the
+        It is meant for loops that estimate parameters of their own simulator. `mechanism` and `parameters` keep the
         values that it was made with, as do the parameters that are not named here. Kappa stays.
 
         Args:
@@ -230,10 +232,10 @@ class StateSpace:
         """State with coordinates q (nq,) whose velocity at the node is v (nv,).
 
         The velocity of a state is the mean over the interval before it. This state has the momentum M(q) v at the end
-        of that interval, so a simulation from it is right to second order from its first step. The motion is assumed to
-        be free of contacts: start(q, 0) on the ground has the velocity g h/2, which gravity alone would take away, a
-        little hop. A robot at rest on its contacts did not move before the node either: its state is [q; 0], as from
-        `neutral` and `equilibrium`.
+        of that interval, so a simulation from it is of second order from its first step. The motion is assumed to be
+        free of contacts: start(q, 0) on the ground has the velocity g h/2, which gravity alone would cancel, and the
+        robot makes a small hop. A robot at rest on its contacts did not move before the node either: its state is [q;
+        0], as returned by `neutral` and `equilibrium`.
 
         Loops are closed, as by `close`, and the velocity is the part of v that they allow.
 

@@ -36,7 +36,7 @@ def frame_on_body(call: str, sim: Any, frame: str, offset: ArrayLike) -> tuple[i
 class Point(TaskSpec):
     """Place of a frame, or of a point fixed to it.
 
-    Entries are "x", "y" and "z", world axes. In a few knots it is a via-point, with bounds a box to stay in.
+    Entries are "x", "y" and "z", world axes. At a few knots it is a via-point; with bounds it is a box.
 
     Attributes:
         frame: name of a link, merged ones too, or of a body, as in `dojo.Kinematics`; of a body, its centre of mass.

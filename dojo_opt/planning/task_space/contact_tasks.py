@@ -124,7 +124,7 @@ class Slip(TaskSpec):
     """Slip of contacts over the ground, in the time step before a state [m/s].
 
     Entries are "foot first" and "foot second" by the name of the contact, along the tangents of the ground, x and y on
-    a floor; groups are "foot". Choose knots or weights for the times at which a foot stands, or let `near` do it.
+    a floor; groups are "foot". Choose knots or weights for the times at which a foot is on the ground, or use `near`.
 
     Attributes:
         contacts: names of contacts, or of bodies or links that have some (default None: all).
@@ -200,10 +200,10 @@ class Clearance(TaskSpec):
 
 @dataclass(frozen=True)
 class TorqueRate(Spec):
-    """Change of inputs from one knot to the next, u_t - u_t-1 [N, N m]: weighed, or bounded by `limit`.
+    """Change of inputs from one knot to the next, u_t - u_t-1 [N, N m]: as a cost, or bounded by `limit`.
 
-    Divide weights by the square of the knot's length for those of rates. Neighbouring knots depend on one another; the
-    planner takes exact gradients and a bound of the curvature.
+    For weights of rates, divide by the square of the knot's length. The term couples neighbouring knots; the planner
+    uses exact gradients and a bound of the curvature.
 
     Attributes:
         weight: a number, (nu,), one row per knot, or a table by names of inputs [1/N^2, 1/(N m)^2] (default 1).

@@ -19,8 +19,8 @@ Integers = NDArray[np.int64]
 class JointLimits(Spec):
     """lower + margin <= q_i <= upper - margin for the joints that have limits.
 
-    The limits of a mechanism hold in the simulator anyway, by impulses of its joints. Here the plan keeps clear of
-    them; in costs, the square of the excess counts.
+    The simulator enforces the limits of a mechanism anyway, by impulses of its joints. This term keeps the plan away
+    from them; in costs, the square of the excess counts.
 
     Attributes:
         margin: distance from the limits [m, rad] (default 0).

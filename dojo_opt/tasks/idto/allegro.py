@@ -152,11 +152,11 @@ def mechanism(friction: float, palm: float, servos: bool = False) -> Mechanism:
 
 
 def allegro(**settings: Any) -> SuiteTask:
-    """Turn a ball by 90 degrees about the vertical, where it is: 40 knots of 50 ms at 10 Hz.
+    """Turn a ball in place by 90 degrees about the vertical: 40 knots of 50 ms at 10 Hz.
 
     A run of 10 s is a success when the ball ends within 15 degrees of its goal and stays above z = 50 mm throughout.
-    The fingers of the start are opened until they touch nothing: those of the publication are up to 7.2 mm inside the
-    ball. The stop of the thumb is where its start fits.
+    The fingers start opened, without contact; those of the publication start up to 7.2 mm inside the ball. The limit of
+    the thumb is moved to fit its start.
 
     Args:
         **settings: settings of `dojo.MPC`, instead of the ones of the task.

@@ -137,10 +137,10 @@ def jaco_ball(**settings: Any) -> SuiteTask:
     """Roll a ball by .27 m: 20 knots of 50 ms and two iterations per tick, at 100 Hz.
 
     The arm is carried by its drives. Its servos are those of the publication, which the plan knows here: hard contact
-    has no overlap, so an arm led along the planned angles alone would touch the ball without pressing on it. Three
+    has no overlap, so an arm that follows the planned angles alone would touch the ball without pressing on it. Three
     things differ from the publication's cost. The horizon is 1 s instead of .5 s, and the spin of the ball weighs .03
     instead of .1: a ball that rolls without slip would take 3 s for two thirds of its way. The squared distance of the
-    arm's stub from the ball weighs 10 per m^2, else the arm, once it has lost the ball, lets it roll on.
+    arm's stub from the ball weighs 10 per m^2; without it, an arm that loses the ball lets it roll away.
 
     A run of 5 s is a success when the ball stays within 20 mm of its goal for .5 s. Its radius is 60 mm in the plant,
     too, where the publication has 63 mm, against forces that act at a distance.

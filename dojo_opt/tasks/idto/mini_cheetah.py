@@ -106,15 +106,15 @@ def mechanism(friction: float, terrain: Terrain | None = None) -> Mechanism:
 
 
 def mini_cheetah(*, speed: float = 0.4, terrain: Terrain | None = None, **settings: Any) -> SuiteTask:
-    """Walk along x at .4 m/s: 20 knots of 25 ms at 60 Hz. Nothing tells it which foot to lift, or when.
+    """Walk along x at .4 m/s: 20 knots of 25 ms at 60 Hz, without a contact schedule.
 
-    A run of 10 s is a success when the trunk gets 3.2 m far (in proportion at other speeds) and stays above .15 m, with
-    its roll and pitch below .5 rad. Left out are the trunk's contacts: a robot that lies has failed before. The start
-    touches the ground, which that of the publication is 5.5 mm inside of.
+    A run of 10 s is a success if the trunk advances 3.2 m (in proportion at other speeds) and stays above .15 m, with
+    roll and pitch below .5 rad. The trunk has no contacts, because a robot that lies has failed before. The feet start
+    on the ground; in the publication they start 5.5 mm inside it.
 
     With hard contact the publication's cost is least for a robot that leans forward and stands. The cost is therefore
-    that of `tasks.free_gait_mpc`, with knots half as long, and plans that count on a friction of .3. They act at once:
-    with a delay of one tick the robot jumps at the start. It walks from the given start; of perturbed ones many fall.
+    that of `tasks.free_gait_mpc`, with knots half as long, and plans assume a friction of .3. They act at once: with a
+    delay of one tick the robot jumps at the start. It walks from the given start; of perturbed ones many fall.
 
     Args:
         speed: speed of the nominal motion [m/s].

@@ -66,7 +66,7 @@ def hopper(**settings: Any) -> SuiteTask:
 
     The nominal motion of every plan begins at x = 0 and ends at .5 m after 2 s, wherever the robot is by then, as in
     the publication. A run of 5 s is a success when the torso ends within 50 mm of x = .5 m with its pitch within .2 rad
-    of .3. The start touches the ground, which that of the publication is 3.1 mm inside of.
+    of .3. The foot starts on the ground; in the publication it starts 3.1 mm inside it.
 
     Args:
         **settings: settings of `dojo.MPC`, instead of the ones of the task.

@@ -54,7 +54,7 @@ def mechanism(friction: float) -> Mechanism:
 
 
 def spinner(**settings: Any) -> SuiteTask:
-    """Turn the disc at 1 rad/s for ever, the finger held near its place otherwise: 40 knots of 50 ms at 200 Hz.
+    """Turn the disc at 1 rad/s, with the finger close to its place: 40 knots of 50 ms at 200 Hz.
 
     A run of 5 s is a success when the mean speed of the disc over its last 3 s is .8 to 1.2 rad/s.
 

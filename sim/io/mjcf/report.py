@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 class MjcfWarning(UserWarning):
-    """The mechanism differs from the model of the file in a way that its motion shows."""
+    """The motion of the mechanism differs from that of the model in the file."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,8 @@ class MjcfReport:
         file: name of the file.
         notes: unsupported elements, and other differences.
         bodies: pose of the frame of every body of the file.
-        joints: of every joint of the file, the joint of the mechanism that has its coordinates, and the first of them.
+        joints: for every joint of the file, the joint of the mechanism with its coordinates, and the number of the
+            first one.
         gear: (nu,) force or torque of every input, or target of a servo, per unit of MuJoCo's control, u = gear * ctrl.
         low: (nu,) lower bounds of u from the control and force ranges of the actuators, infinite without any [N, N m].
         high: (nu,) upper bounds likewise [N, N m].

@@ -18,7 +18,7 @@ OVERLAPPING = "shapes that overlap in the neutral state, and do not collide"
 
 
 class UrdfWarning(UserWarning):
-    """The mechanism differs from the robot of the file in a way that its motion shows."""
+    """The motion of the mechanism differs from that of the robot in the file."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Note:
 
     Attributes:
         text: the difference.
-        names: links or joints that it is about.
+        names: links or joints concerned.
         warn: whether `load_urdf` also issues a UrdfWarning.
     """
 
@@ -63,7 +63,7 @@ class UrdfReport:
         file: name of the file.
         notes: unsupported elements, and other differences.
         links: pose of every link of the file.
-        effort: (nu,) largest force or torque of every input, infinite where the file gives none: as control limits
+        effort: (nu,) largest force or torque of every input, infinite if the file has none; control limits are
             (-effort, effort) [N, N m].
         velocity: (nu,) largest speed of every input's joint; nothing enforces it [m/s, rad/s].
     """
