@@ -6,7 +6,7 @@
 to 24 kg on a robot of 11.9 kg, a friction of 0.2 to 0.8, and a push of up to 8 N s between 1 and 2 s; half of the runs
 measure with noise (0.2 mm and mrad; 2 mm/s and mrad/s). The model has no payload and a friction of 0.8, of which plans
 count on 0.4 at most. The adapting controller estimates the mass of the trunk and the friction; friction is known where
-its standard deviation is below 0.05, which takes a foot that slides.
+its standard deviation is below 0.1, which takes a foot that slides.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from dojo_opt.report.result import Cell, Report, Row, Table
 
 ADAPT = ("mass:trunk", "friction:*")
 NOISE = (2e-4, 2e-3)  # [m, rad], [m/s, rad/s]
-SECONDS, KNOWN, CHECKED = 4.0, 0.05, 1.0  # [s], [1], [s]
+SECONDS, KNOWN, CHECKED = 4.0, 0.1, 1.0  # [s], [1], [s]
 
 
 def perturbation(run: int) -> dict[str, Any]:
@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> Report:
         number("error of the loaded trunk's mass after 1 s, median", 100.0 * float(np.median(payload)), 5.0, unit="%"),
         number("error of the loaded trunk's mass after 1 s, largest", 100.0 * max(payload), unit="%"),
         number("runs in which friction is known after 1 s", float(len(friction))),
-        number("error of a known friction, median", float(np.median(friction)) if friction else 0.0, 0.05),
+        number("error of a known friction, median", float(np.median(friction)) if friction else float("nan"), 0.1),
         number("processor time over that of the fixed model, median", float(np.median(costs))),
     ]
     header = (

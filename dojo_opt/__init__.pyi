@@ -28,6 +28,7 @@ from dojo_opt.planning.residual import kernel as kernel
 from dojo_opt.planning.tracking import tracking_gains as tracking_gains
 from dojo_opt.plant.disturbances import Disturbances as Disturbances
 from dojo_opt.plant.loop import ClosedLoop as ClosedLoop, closed_loop as closed_loop
+from dojo_opt.report.identification import identification_report as identification_report
 from dojo_opt.plant.perturbation import Perturbation as Perturbation, Push as Push
 from dojo_opt.plant.plant import Plant as Plant
 from dojo_opt.plant.monte_carlo import monte_carlo as monte_carlo

@@ -31,6 +31,7 @@ from dojo_opt.planning.executors import check_executor, results_in_order
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_table
 from sim.mechanism.memory import room_for
+from sim.simulator.results import Trajectory
 from sim.simulator.simulator import Simulator
 from solvers.status import MESSAGES, Status
 
@@ -65,6 +66,9 @@ class Identified:
         unsolved: windows without a prediction at the end, which are not counted.
         cost: cost of the data and the prior, see the module.
         starts: (nx,) of every window.
+        windows: the measured windows.
+        noise: (ndx,) standard deviations of the measurement.
+        solved: whether each window could be predicted at the end.
         history: one record per iteration.
         seconds: processor time.
     """
@@ -83,6 +87,9 @@ class Identified:
     unsolved: int
     cost: float = float("nan")
     starts: list[Floats] = field(default_factory=list)
+    windows: list[Window] = field(default_factory=list)
+    noise: Floats = field(default_factory=lambda: np.zeros(0))
+    solved: list[bool] = field(default_factory=list)
     history: list[dict[str, Any]] = field(default_factory=list)
     seconds: float = 0.0
 
@@ -97,6 +104,20 @@ class Identified:
         d = self.deviation
         with np.errstate(invalid="ignore"):
             return self.covariance / np.outer(d, d)
+
+    def predictions(self) -> list[tuple[Window, Trajectory, Floats]]:
+        """The motions that the values predict, of all windows but the unsolved ones.
+
+        Returns:
+            The window, the trajectory from its start, and (T + 1, ndx) the residuals: predicted (-) measured states
+            over the noise, 0 where the noise is infinite.
+        """
+        out, sim = [], self.simulator
+        for window, start, solved in zip(self.windows, self.starts, self.solved, strict=True):
+            path = sim.rollout(start, window.u) if solved else None
+            if path is not None and path.success:
+                out.append((window, path, sim.difference(path.x, window.x) / self.noise))
+        return out
 
     def __repr__(self) -> str:
         return f"Identified({self.closing_line()})"
@@ -419,5 +440,6 @@ def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str,
     return Identified(
         status == Status.SOLVED, status, MESSAGES[status], space.labels, fit.theta, space.values, covariance,
         space.simulator(fit.theta), float(np.sqrt(cost / max(count, 1))), unseen, far, usable.count(False),
-        fit.rest(cost, found, usable), fit.starts, history, time.process_time() - began,
+        fit.rest(cost, found, usable), fit.starts, fit.windows, fit.predictor.noise, usable,
+        history, time.process_time() - began,
     )  # fmt: skip

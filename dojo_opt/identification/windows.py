@@ -97,7 +97,7 @@ class Predictor:
     """Predictions of windows by one simulator of a space."""
 
     def __init__(self, space: ParameterSpace, noise: Floats, every: int) -> None:
-        self._space, self._every = space, every
+        self._space, self._every, self.noise = space, every, noise
         self.measured = np.flatnonzero(np.isfinite(noise))
         self._scale = 1.0 / noise[self.measured]
         self._found: Integers | None = None

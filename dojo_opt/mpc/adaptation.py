@@ -49,7 +49,7 @@ class Adaptation:
         noise: standard deviation of the measured state: (2,) of coordinates and velocities, or (ndx,) [m, rad, m/s,
             rad/s] (default (1e-4, 1e-2)).
         interval: time between the two measurements of an update [s] (default 0.02).
-        memory: time in which the parameters may change by their spread [s] (default 5).
+        memory: time in which the parameters may change by their spread [s] (default 20).
         bounds: as in `ParameterSpace` (default None).
     """
 
@@ -57,7 +57,7 @@ class Adaptation:
     spread: float | Mapping[str, float] = 0.5
     noise: ArrayLike = (1e-4, 1e-2)
     interval: float = 0.02
-    memory: float = 5.0
+    memory: float = 20.0
     bounds: Mapping[str, tuple[float, float]] | None = None
 
     __repr__ = brief_repr
@@ -168,18 +168,19 @@ class ParameterEstimator:
         if fine is None:
             return
         x, us = self._samples[0][1], np.array([u for *_, u in self._samples[:-1]])
+        self.covariance = self.covariance + np.diag(self._prior * len(us) * fine.time_step / self._settings.memory)
         self._stand(fine, ground, x)
         found = self._predict(fine, x, us)
-        if found is None:
+        if found is None or self._lands(ground, x, self._samples[-1][1], found[0]):
             return
         end, A, slopes = found
-        off = fine.difference(self._samples[-1][1], end)
-        P = self.covariance + np.diag(self._prior * len(us) * fine.time_step / self._settings.memory)
+        off, P = fine.difference(self._samples[-1][1], end), self.covariance
+        wrong = _CURVED
         if self._surprise(off, P, A, slopes) > _OUTLIER:  # a foot that sticks in the model says nothing of friction
             smooth = self._planner.kappa * fine.time_step / self._planner.time_step
             found = self._predict(fine, x, us, smooth)
-            slopes = slopes if found is None else found[2]
-        self._correct(off, P, A, slopes)
+            slopes, wrong = (slopes, wrong) if found is None else (found[2], 1.0)
+        self._correct(off, P, A, slopes, wrong)
         if np.any(np.abs(self.theta - self._written) > _MOVED * np.sqrt(self._prior)):
             self._write()
 
@@ -205,8 +206,11 @@ class ParameterEstimator:
         residual = off - slopes @ (self.theta - self._written)
         return float(np.sqrt(residual @ np.linalg.solve(sum(self._covariance(P, A, slopes)), residual) / len(off)))
 
-    def _correct(self, off: Vector, P: Matrix, A: Matrix, slopes: Matrix) -> None:
-        """Update estimate and covariance by a measurement that is `off` what the models predict."""
+    def _correct(self, off: Vector, P: Matrix, A: Matrix, slopes: Matrix, wrong: float) -> None:
+        """Update estimate and covariance by a measurement that is `off` what the models predict.
+
+        wrong: share of the change that may be, as slopes are those of another point, or of another contact
+        """
         residual = off - slopes @ (self.theta - self._written)
         R, of_parameters = self._covariance(P, A, slopes)
         R *= max(1.0, self._surprise(off, P, A, slopes) / _OUTLIER)
@@ -216,7 +220,17 @@ class ParameterEstimator:
         low, high = (0.5 * (self.theta + bound) for bound in (self.space.low, self.space.high))
         self.theta = np.clip(self.theta + change, low, high)  # at most half-way to a bound at once
         P = P - gain @ slopes @ P
-        self.covariance = 0.5 * (P + P.T) + np.diag((_CURVED * change) ** 2)
+        P = 0.5 * (P + P.T) + np.diag((wrong * change) ** 2)
+        share = np.sqrt(np.minimum(1.0, self._prior / np.diag(P)))  # no estimate is worse than none
+        self.covariance = share[:, None] * P * share
+
+    def _lands(self, ground: Ground, x: Vector, *ends: Vector) -> bool:
+        """Whether a contact that is in the air at x touches the ground at one of the ends.
+
+        The time of an impact depends on the height of the ground, which is not known as exactly as the states.
+        """
+        before, *after = (ground.gaps(ground.points(state)) for state in (x, *ends))
+        return any(bool(np.any((before > self._near) & (gaps < self._near))) for gaps in after)
 
     def _stand(self, fine: Simulator, ground: Ground, x: Vector) -> None:
         """Put the ground of the model under every contact that stands at x: its height is that of a noisy state."""

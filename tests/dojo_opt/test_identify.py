@@ -177,3 +177,23 @@ def test_windows_of_all_lengths_are_predicted_in_batches():
         slow = predictor.predict(sim, chain, window, start, sim.kappa)
         np.testing.assert_allclose(one.errors, slow.errors, atol=1e-9)
         assert one.solved and slow.solved
+
+
+def test_a_report_has_parameters_residuals_and_both_motions(tmp_path):
+    truth = dojo.Simulator(dojo.models.pendulum(damper=0.3), time_step=0.05)
+    rng, motions = np.random.default_rng(0), []
+    for angle in (0.5, 1.5):
+        path = truth.rollout([angle, 0.0], steps=30)
+        motions.append((path.x + 0.01 * rng.standard_normal(path.x.shape), path.u))
+    found = dojo.identify(truth.with_parameters({"damper": 0.1}), motions, ("damper", "mass:link_0"), noise=0.01)
+    predictions = found.predictions()
+    assert [window.trajectory for window, *_ in predictions] == [0, 1]
+    values = np.concatenate([residuals.ravel() for *_, residuals in predictions])
+    assert np.sqrt(np.mean(values**2)) == pytest.approx(found.rms, rel=1e-6)
+    files = dojo.identification_report(found, tmp_path / "fit")
+    names = {"identification.png", "report.html", "report.md", "report.json", "motion.html"}
+    assert {file.name for file in files} == names
+    page = (tmp_path / "fit" / "report.html").read_text()
+    assert "damper" in page and "v joint_0" in page
+    with pytest.raises(TypeError, match="Identified"):
+        dojo.identification_report(motions, tmp_path)
