@@ -27,49 +27,31 @@ def cube(friction, restitution, side):
 
 
 def tosses(sim):
-    """(states (T + 1, 13), no inputs) of every filmed toss."""
+    """(states (T + 1, 13), no inputs) of every filmed toss that is long enough."""
     film, motions = np.load(Path(__file__).parent / "data" / "tosses.npz"), []
     for poses in np.split(film["poses"].astype(np.float64), np.cumsum(film["lengths"])[:-1]):
         turns = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1)[:, None]
         xs = np.hstack([poses[:, :3], turns, np.zeros((len(poses), 6))])
         xs[1:, 7:] = sim.difference(xs[1:], xs[:-1])[:, :6] / H
         motions.append((xs[1:], np.zeros((len(xs) - 2, 0))))
-    return motions
+    return [toss for toss in motions if len(toss[1]) >= AHEAD]
 
 
-def misses(sim, motions):
-    """Errors of the position `AHEAD` frames after the beginning of a toss [mm]."""
-    ends = [sim.rollout(xs[0], us[:AHEAD], throw=True).x[-1, :3] - xs[AHEAD, :3] for xs, us in motions]
-    return 1e3 * np.linalg.norm(ends, axis=1)
-
-
-def main():
-    """Fit some tosses, judge on the others."""
-    guess = cube(0.4, 0.05, 0.8 * SIDE)  # friction twice too large, sides 20 % too short
-    motions = [toss for toss in tosses(guess) if len(toss[1]) >= AHEAD]
-    seen, unseen = motions[: 12 if QUICK else 20], motions[20:]
-    found = dojo.identify(
-        guess, seen, NAMES, noise=NOISE, window=AHEAD // 2, every=4, kappas=(1e-5, 1e-6), verbose=True,
-    )  # fmt: skip
-    corners = found.values[2:26].reshape(8, 3)
-    side = 2e3 * float(np.abs(corners).mean())
-    print(found.closing_line())
-    print(f"friction {found.values[0]:.3f} +- {found.deviation[0]:.3f}, side {side:.1f} mm, of {1e3 * SIDE:.1f} mm")
-
-    figure = Figure(figsize=(7.0, 4.5), layout="constrained")
-    axes, mean = figure.subplots(), {}
-    for name, sim in {"guess": guess, "published": cube(FRICTION, 0.125, SIDE), "identified": found.simulator}.items():
-        off = misses(sim, unseen)
-        mean[name] = float(off.mean())
-        axes.plot(np.sort(off), np.linspace(0, 100, len(off)), label=f"{name}: mean {mean[name]:.1f} mm")
-    axes.set(xlabel=f"error of the position after {AHEAD} frames [mm]", ylabel="share of tosses not used [%]")
-    figure.legend(loc="outside upper center", ncols=3)
-    assert abs(found.values[0] / FRICTION - 1) < 0.15, found.values[0]
-    assert abs(1e-3 * side / SIDE - 1) < 0.05, side
-    assert mean["identified"] < min(mean["published"], 0.4 * mean["guess"]), mean
-    finish(figure, __file__)
-    dojo.identification_report(found, "identify")
-
-
-if __name__ == "__main__":
-    main()
+guess = cube(0.4, 0.05, 0.8 * SIDE)  # friction twice too large, sides 20 % too short
+seen, unseen = (motions := tosses(guess))[: 12 if QUICK else 20], motions[20:]
+options = {"window": AHEAD // 2, "every": 4, "kappas": (1e-5, 1e-6), "verbose": True}
+found = dojo.identify(guess, seen, NAMES, noise=NOISE, **options)
+side = 2.0 * np.abs(found.values[2:26]).mean()
+print(f"{found.closing_line()}\nfriction {found.values[0]:.3f} +- {found.deviation[0]:.3f}, side {1e3 * side:.1f} mm")
+mean, axes = {}, (figure := Figure(figsize=(7.0, 4.5), layout="constrained")).subplots()
+for name, sim in {"guess": guess, "published": cube(FRICTION, 0.125, SIDE), "identified": found.simulator}.items():
+    ends = [sim.rollout(xs[0], us[:AHEAD], throw=True).x[-1, :3] - xs[AHEAD, :3] for xs, us in unseen]
+    off = 1e3 * np.linalg.norm(ends, axis=1)
+    mean[name] = float(off.mean())
+    axes.plot(np.sort(off), np.linspace(0, 100, len(off)), label=f"{name}: mean {mean[name]:.1f} mm")
+axes.set(xlabel=f"error of the position after {AHEAD} frames [mm]", ylabel="share of tosses not used [%]")
+figure.legend(loc="outside upper center", ncols=3)
+assert abs(found.values[0] / FRICTION - 1) < 0.15 and abs(side / SIDE - 1) < 0.05, (found.values[0], side)
+assert mean["identified"] < min(mean["published"], 0.4 * mean["guess"]), mean
+finish(figure, __file__)
+dojo.identification_report(found, "identify")
