@@ -1,6 +1,6 @@
 """Contact-implicit MPC on published task suites: successes, tick times and penetration, beside the published rates.
 
-    NUMBA_NUM_THREADS=1 python benchmarks/mpc_suites.py [TASK ...] [--runs N]
+    NUMBA_NUM_THREADS=1 python benchmarks/mpc_suites.py [TASK ...] [--runs N] [--first SEED]
 
 Tasks are those of IDTO (arXiv 2309.01813): costs, horizons, rates and the delay of one tick are theirs, contact is
 ours. `free_gait` is the quadruped of `tasks.free_gait_mpc` at .3 m/s, with the horizon and rate of arXiv 2312.08961;
@@ -61,12 +61,12 @@ def walked(wanted: float, loop: ClosedLoop) -> tuple[bool, dict[str, float]]:
     return abs(speed - wanted) < OFF, {"speed [m/s]": speed}
 
 
-def starts(task: Any, kind: str, runs: int) -> list[Any]:
-    """The plant of the given start, and of perturbed ones."""
-    seeds: list[int | None] = [None, *range(runs)]
+def starts(task: Any, kind: str, perturbed: range) -> list[Any]:
+    """The plant of the given start, and of the perturbed ones of these seeds."""
+    seeds: list[int | None] = [None, *perturbed]
     if task.name in DISTURBED:
         sampler = dojo.Disturbances(task.model.nv, **DISTURBANCES)
-        return [task.plant().perturbed(sampler(np.random.default_rng(seed))) for seed in range(runs)]
+        return [task.plant().perturbed(sampler(np.random.default_rng(seed))) for seed in perturbed]
     if kind == OURS:
         return [task.plant(seed) for seed in seeds]
     from benchmarks.engines.mujoco_plant import MujocoPlant
@@ -74,9 +74,9 @@ def starts(task: Any, kind: str, runs: int) -> list[Any]:
     return [MujocoPlant(task.model, task.begin(seed)) for seed in seeds]
 
 
-def line(task: Any, kind: str, runs: int, seconds: float | None) -> tuple[list[Cell], list[Any]]:
+def line(task: Any, kind: str, perturbed: range, seconds: float | None) -> tuple[list[Cell], list[Any]]:
     """One line of a table, and the outcomes behind it."""
-    loops = [task.run(plant=plant, seconds=seconds) for plant in starts(task, kind, runs)]
+    loops = [task.run(plant=plant, seconds=seconds) for plant in starts(task, kind, perturbed)]
     outcomes = [task.outcome(loop) for loop in loops]
     cpu = np.concatenate([milliseconds(loop.log, cpu=True) for loop in loops])
     times = [float(np.median(cpu)), float(np.percentile(cpu, 99))] if cpu.size else [np.nan, np.nan]
@@ -94,6 +94,7 @@ def run(args: argparse.Namespace) -> Report:
     report = Report("MPC on published suites", "")
     kinds = [OURS] + ([MUJOCO] if find_spec("mujoco") is not None else [])
     runs, seconds = (1, QUICK) if args.quick else (args.runs, None)
+    perturbed = range(args.first, args.first + runs)
     tasks = {name: made(name) for name in args.tasks}
     for kind in kinds:
         lines = []
@@ -101,7 +102,7 @@ def run(args: argparse.Namespace) -> Report:
         if not names:
             continue
         for name in progress()([(n, n) for n in names], kind):
-            cells, outcomes = line(tasks[name], kind, runs, seconds)
+            cells, outcomes = line(tasks[name], kind, perturbed, seconds)
             lines.append(cells)
             report.rows += rows(f"{name}, {kind}", cells, tasks[name].rate, bars=not args.quick)
             report.details[f"{name}, {kind}"] = [outcome._asdict() for outcome in outcomes]
@@ -127,6 +128,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser(__doc__)
     arguments.add_argument("tasks", nargs="*", default=list(TASKS), metavar="TASK", help=", ".join(TASKS))
     arguments.add_argument("--runs", type=int, default=10, help="perturbed starts per task")
+    arguments.add_argument("--first", type=int, default=0, help="seed of the first perturbed start")
     return deliver("mpc_suites", run, arguments, argv)
 
 

@@ -51,6 +51,25 @@ def test_an_arm_rolls_a_ball(seed):
     assert np.abs(loop.x[-1, 22]) > 0.05
 
 
+def test_a_puck_is_pushed_towards_its_goal():
+    """Over a gap of .3 m, which no contact reaches at first; its heading is hardly changed by the rim's friction."""
+    task = dojo.tasks.idto.air_hockey()
+    loop = task.run(seed=2, seconds=2.0)
+    assert loop.survived
+    outcome = task.outcome(loop)
+    assert outcome.measures["off [mm]"] < 300.0  # of 583
+    assert outcome.penetration < 1e-4
+
+
+def test_plans_of_the_hand_know_the_friction_of_the_palm():
+    """With more than it has, the ball slides off the palm within a second."""
+    task = dojo.tasks.idto.allegro()
+    palms = [
+        next(c.friction for c in sim.mechanism.collisions if c.name == "palm") for sim in (task.mpc.sim, task.model)
+    ]
+    assert palms == [0.18, 0.18]
+
+
 @pytest.mark.slow
 def test_a_quadruped_finds_its_gait():
     """From a velocity and one pose: it is half a metre on after 2.5 s, and has lifted every foot."""

@@ -1,0 +1,100 @@
+"""A disc pushes another one to a place and a heading, by contact and friction at its rim."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dojo_opt.cost import Effort
+from dojo_opt.mpc.controller import MPC
+from dojo_opt.mpc.moving import Sampled
+from dojo_opt.planning.options import Options, Stage
+from dojo_opt.planning.problem import Problem
+from dojo_opt.plant.loop import ClosedLoop
+from dojo_opt.tasks.suite import SuiteTask, quadratic, timed
+from sim.mechanism.collision import Collision
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Input, Joint
+from sim.mechanism.shapes import Sphere
+from sim.simulator.simulator import Simulator
+
+__all__ = ["air_hockey"]
+
+_KNOT, _HORIZON, _RATE = 0.05, 40, 200.0  # [s], knots, [Hz]
+_NEAR = 0.1  # [m] off the goal at the end
+_KAPPA = 3e-5  # [N s m] at 1e-4 a contact that acts at a distance leaves the puck 9 cm off
+_FRICTION = 0.3  # that plans count on: with all of 1 they turn the puck by its rim, lose it, and end 20 cm off
+_MASS, _RADIUS, _HEIGHT = 0.1, 0.1, 0.05  # [kg], [m], [m] of either disc
+_START, _GOAL = (0.0, 0.5, 0.0), (0.3, 1.0, 1.0)  # [m, m, rad] of the puck
+
+
+def mechanism(friction: float) -> Mechanism:
+    """Pusher and puck in the plane z = 0, where gravity does no work.
+
+        q  (6,) x, y [m] and heading [rad] of the pusher, and of the puck
+
+    Args:
+        friction: coefficient of friction of their rims.
+
+    Returns:
+        The mechanism.
+    """
+    across = _MASS * (3.0 * _RADIUS**2 + _HEIGHT**2) / 12.0
+    inertia = np.diag([across, across, 0.5 * _MASS * _RADIUS**2])
+    joints = [Joint("planar_axis", None, "pusher"), Joint("planar_axis", None, "puck", damper=0.1)]
+    rims = Collision("pusher", "puck", Sphere(_RADIUS), Sphere(_RADIUS), friction=friction, name="rims")
+    return Mechanism(
+        [Body("pusher", _MASS, inertia), Body("puck", _MASS, inertia)],
+        joints,
+        [],
+        [Input("pusher", dof=dof, name=name) for dof, name in enumerate(("x", "y", "heading"))],
+        collisions=[rims],
+        name="air_hockey",
+        neutral={"puck": _START},
+    )
+
+
+def air_hockey(**settings: Any) -> SuiteTask:
+    """Push a puck by .3 and .5 m, and turn it by 1 rad, within 2 s: 40 knots of 50 ms at 200 Hz.
+
+    A run of 4 s is a success when the puck ends within .1 m of its goal. Its heading hardly changes: friction at the
+    rim would have to give .1 N m s against the damper, and a push of 1 N s with it, a hundred times that of the way.
+    The publication plans once, and plays the plan; with hard contact a played plan loses the puck, so it is a closed
+    loop here, at a rate of ours.
+
+    Args:
+        **settings: settings of `dojo.MPC`, instead of the ones of the task.
+
+    Returns:
+        The task.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range.
+    """
+    sim = Simulator(mechanism(1.0), time_step=_KNOT, kappa=_KAPPA)
+    start = sim.neutral()
+    goal = start.copy()
+    goal[3:6] = _GOAL
+    ends = np.array([0.0, _KNOT * _HORIZON])
+    speed = (goal - start)[:6] / ends[1]
+    begin = np.concatenate([start[:6], speed])
+    target = Sampled([*ends, ends[1] + _KNOT], [begin, np.concatenate([goal[:6], speed]), goal], sim)
+    pusher, puck = np.zeros(3), np.ones(3)
+    running = np.concatenate([pusher, 0.1 * puck]), np.concatenate([pusher + 0.5, 0.1 * puck])
+    end = np.concatenate([pusher, 10.0 * puck]), np.ones(6)
+    cost = [quadratic(begin, _KNOT, _HORIZON, running, end), Effort(_KNOT * 0.1)]
+    problem = Problem(sim, start, _HORIZON, cost=cost)
+    given = timed(_RATE) | {"kappa": _KAPPA, "friction": _FRICTION}
+    given |= {"first": Options(stages=(Stage(1e-2, 1e-2), Stage(_KAPPA, _KAPPA)))}
+    mpc = MPC(problem, reference=target, **{**given, **settings})
+    model = Simulator(mechanism(1.0), time_step=1e-3, kappa=1e-8)
+    spread = np.array([0.05, 0.05, 0.1, 0.05, 0.05, 0.1] + [0.05] * 6)
+    return SuiteTask("idto.air_hockey", mpc, model, start, 4.0, spread, _judge, _RATE)
+
+
+def _judge(loop: ClosedLoop) -> tuple[bool, dict[str, float]]:
+    off = loop.x[-1, 3:6] - np.asarray(_GOAL)
+    place, turn = float(np.hypot(*off[:2])), abs(float(off[2]))
+    return place < _NEAR, {"off [mm]": 1e3 * place, "turned off [rad]": turn}
