@@ -11,9 +11,11 @@ from __future__ import annotations
 import argparse
 import ast
 import json
+import os
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -25,7 +27,7 @@ from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report import STUDIES
 from dojo_opt.report.command import CHECKOUT, MOVED, add_arguments, report
 from dojo_opt.viewer.show import add_show, show
-from sim.mechanism.checks import nearest
+from sim.mechanism.checks import nearest, one_of
 
 # names for `run`; the gaits of the quadruped also have the names of their examples, quadruped_trot and so on
 PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap")
@@ -218,23 +220,51 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
 }
 
 
-def _check_folders(args: argparse.Namespace) -> None:
+def _check_files(args: argparse.Namespace) -> None:
     """Refuse output files that cannot be written, before the work begins."""
     for name in ("out", "html"):
         path = getattr(args, name, None)
-        if path is not None and args.command != "report" and not path.parent.is_dir():
+        if path is None or args.command == "report":  # whose --out is a folder
+            continue
+        if not path.parent.is_dir():
             raise ValueError(f"--{name}: there is no folder {str(path.parent)!r}")
+        if path.is_dir():
+            raise ValueError(f"--{name}: expected a file, and {str(path)!r} is a folder")
+        if not os.access(path if path.exists() else path.parent, os.W_OK):
+            raise ValueError(f"--{name}: {str(path)!r} cannot be written")
+        if name == "out":
+            from matplotlib.backend_bases import FigureCanvasBase
+
+            kinds = [f".{kind}" for kind in sorted(FigureCanvasBase.get_supported_filetypes())]
+            one_of("--out: the ending", path.suffix, kinds)
+
+
+def _close_output() -> None:
+    """Send what is left of the output nowhere: Python writes it as it ends, and would fail once more."""
+    with suppress(OSError, ValueError):  # of an output that is no file
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     args = _parser().parse_args(arguments)
     try:
-        _check_folders(args)
-        return _COMMANDS[args.command](args)
+        _check_files(args)
+        status = _COMMANDS[args.command](args)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return status
+    except BrokenPipeError:  # the reader, such as `head`, has enough
+        _close_output()
+        return 1
     except (ValueError, TypeError, OSError, ImportError) as error:
         print(f"dojo-opt {args.command}: {error}", file=sys.stderr)
+        if isinstance(error, OSError):
+            _close_output()
         return 2
+    except (dojo.SimulationError, MemoryError) as error:
+        print(f"dojo-opt {args.command}: {str(error) or 'out of memory'}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         raise KeyboardInterrupt from None  # as such it ends the process by SIGINT, which stops a script around it, too
 

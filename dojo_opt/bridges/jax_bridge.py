@@ -7,6 +7,7 @@ from typing import Any
 from dojo_opt.bridges.jax_call import called
 from dojo_opt.bridges.rollouts import Functions, Rollouts
 from dojo_opt.identification.parameter_space import ParameterSpace
+from sim.mechanism.checks import shown
 from sim.simulator.simulator import Simulator
 
 _CALL = "bridges.to_jax"
@@ -58,20 +59,31 @@ def to_jax(sim: Simulator, kappa: float | None = None, parameters: ParameterSpac
 
     def rollout(x0: Any, us: Any, theta: Any = None) -> Any:
         """States (T + 1, nx) from x0 (nx,) under us (T, nu); see `to_jax`."""
-        _jax()  # which may have been told to use 32 bits since
         n = core.sizes(theta)
-        x0, us = jax.numpy.asarray(x0, "float64"), jax.numpy.asarray(us, "float64")
-        theta = jax.numpy.zeros(0) if theta is None else jax.numpy.asarray(theta, "float64")
+        x0, us = _doubles(jax, "x0", x0), _doubles(jax, "us", us)
+        theta = jax.numpy.zeros(0) if theta is None else _doubles(jax, "theta", theta)
         core.check(x0=(x0.shape, (sim.nx,)), us=(us.shape, ("T", sim.nu)), theta=(theta.shape, (n,)))
         return states(x0, us, theta)
 
     def step(x: Any, u: Any, theta: Any = None) -> Any:
         """The state (nx,) after x (nx,) under u (nu,); see `to_jax`."""
-        u = jax.numpy.asarray(u)
+        u = _doubles(jax, "u", u)
         core.check(u=(u.shape, (sim.nu,)))
         return rollout(x, u[None], theta)[1]
 
     return Functions(step, rollout)
+
+
+def _doubles(jax: Any, name: str, value: Any) -> Any:
+    """The argument as an array of doubles; one that does not hold real numbers is refused."""
+    _jax()  # which may have been told to use 32 bits since
+    try:
+        array = None if isinstance(value, str) else jax.numpy.asarray(value)
+    except (TypeError, ValueError, OverflowError):
+        array = None
+    if array is None or jax.numpy.iscomplexobj(array):
+        raise TypeError(f"{_CALL}: argument {name}: expected real numbers, got {shown(value)}")
+    return array.astype("float64")
 
 
 def _states(jax: Any, core: Rollouts) -> Any:

@@ -30,10 +30,15 @@ _PICTURE = 4.8  # inches, of 100 pixels
 
 
 def _limited(action: Vector, size: int) -> Vector:
-    """An action (size,) within [-1, 1]; a few numbers are faster than arrays."""
+    """An action within [-1, 1]; a few numbers are faster than arrays."""
     if action.shape == (size,) and all(-1.0 <= a <= 1.0 for a in action.tolist()):
         return action
-    return np.clip(checks.array("Environment.step(action)", action, (size,)), -1.0, 1.0)
+    return np.clip(_numbers(action, size), -1.0, 1.0)
+
+
+def _numbers(action: Any, size: int) -> Vector:
+    """An action (size,) of finite numbers."""
+    return checks.array("Environment.step(action)", action, (size,))
 
 
 class _TaskEpisode:
@@ -55,8 +60,9 @@ class _TaskEpisode:
         """One action, held over the time steps of the task."""
         task, before = self.task, self.x
         if self._count >= task.steps:
-            raise RuntimeError("Environment.step: the episode is over; call reset()")
-        given = np.array(action, dtype=np.float64)
+            raise RuntimeError("Environment.step: the episode is over, or has not begun; call reset()")
+        plain = type(action) is np.ndarray and action.dtype.kind == "f"  # which `_limited` looks at
+        given = np.array(action if plain else _numbers(action, task.sim.nu), dtype=np.float64)
         after, message = self._step(before, given)
         self.x = after if task.commands == 0 else np.concatenate([after, before[:, task.sim.nx :]], axis=1)
         self._count += 1
@@ -107,7 +113,7 @@ class _ProblemEpisode:
         self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
         self.edge, self.kind = np.where(bounded, 1.0, np.inf), np.float64
         self._xs, self._us = np.tile(problem.start, (problem.horizon + 1, 1)), np.zeros((problem.horizon, nu))
-        self._knot = 0
+        self._knot = problem.horizon
 
     def reset(self, rng: np.random.Generator) -> Vector:
         """Back to the start, under another perturbation when there is a sampler."""
@@ -123,8 +129,8 @@ class _ProblemEpisode:
         t = self._knot
         info: dict[str, Any] = {}
         if t >= self.problem.horizon:
-            raise RuntimeError("Environment.step: the episode is over; call reset()")
-        chosen = checks.array("Environment.step(action)", action, (self.problem.sim.nu,))
+            raise RuntimeError("Environment.step: the episode is over, or has not begun; call reset()")
+        chosen = _numbers(action, self.problem.sim.nu)
         self._us[t] = self._middle + self._half * chosen
         for _ in range(self._substeps):
             _, result = self.plant.step(self._us[t])

@@ -8,6 +8,7 @@ import threading
 import time as clock
 import warnings
 from collections.abc import Callable
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,8 @@ class Live:
         return f"Live({self._sim.mechanism.name}, {self.url or 'closed'})"
 
     def _repr_html_(self) -> str:
+        if not self.url:
+            return f"<p>{escape(repr(self))}</p>"
         return f'<iframe src="{self.url}" style="width: 100%; height: 420px; border: 0"></iframe>'
 
     def show(self, x: ArrayLike) -> None:
@@ -98,7 +101,12 @@ class Live:
 
         Returns:
             The function, with the same results.
+
+        Raises:
+            TypeError: the controller is no function.
         """
+        if not callable(controller):
+            raise TypeError(f"Live.watch(controller): expected a function of time and state, got {controller!r}")
 
         def watched(time: float, x: Any) -> Any:
             self.show(x)
@@ -201,7 +209,7 @@ def live(sim: Simulator, *, port: int = 0, rate: float = 60.0, open_browser: boo
     """
     if not isinstance(sim, Simulator):
         raise TypeError(f"viewer.live(sim): expected a Simulator, got {sim!r}")
-    if not isinstance(port, int) or not 0 <= port < 65536:
+    if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port < 65536:
         raise ValueError(f"viewer.live(port=...): expected a whole number from 0 to 65535, got {port!r}")
     view = Live(sim, port, checks.number("viewer.live(rate=...)", rate, above=0.0))
     if open_browser:

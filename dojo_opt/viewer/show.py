@@ -14,6 +14,7 @@ import numpy as np
 import dojo_opt as dojo
 from sim.mechanism import checks
 from sim.mechanism.checks import nearest
+from sim.mechanism.memory import check_room
 
 __all__ = ["add_show", "show"]
 
@@ -118,6 +119,8 @@ def show(args: argparse.Namespace) -> int:
     checks.number("--drop", args.drop)
     mechanism = load(args)
     sim = dojo.Simulator(mechanism, time_step=args.time_step)
+    steps = max(1, round(min(args.seconds / args.time_step, 1e300)))
+    check_room("--seconds, --time-step: steps", steps, 8.0 * (sim.nx + sim.nu), "take fewer seconds or longer steps")
     if not args.json:
         print(sim.describe())
         if getattr(mechanism, "report", None) is not None:
@@ -127,7 +130,7 @@ def show(args: argparse.Namespace) -> int:
         raise ValueError(f"--drop requires a floating base; {mechanism.joints[0].name!r} is {mechanism.joints[0].kind}")
     if args.drop:
         x[2] += args.drop
-    motion = sim.rollout(x, np.zeros((max(1, round(args.seconds / args.time_step)), sim.nu)))
+    motion = sim.rollout(x, np.zeros((steps, sim.nu)))
     if args.out:
         dojo.plots.trajectory(motion).savefig(args.out, dpi=150)
     if args.html:
