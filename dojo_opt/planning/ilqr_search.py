@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import Options
 from dojo_opt.planning.problem import Problem
-from sim.simulator.horizon import Horizon
+from sim.simulator.horizon import Horizon, Known
 from solvers.riccati import Promise
 from solvers.status import Status
 
@@ -20,6 +20,9 @@ Stack = NDArray[np.float64]
 __all__ = ["Direction", "Iterate", "Search"]
 
 _LENGTHEN = 4.0  # first trial relative to the last accepted step: a rollout costs as much as a linearisation
+# iterations of a time step in the first trials of a search, which may fail: a wild motion is refused after 500, at the
+# price of ten trials; those of less than _FIRST_TRIALS of the first step size have as many as the simulator
+_FEW_ITERATIONS, _FIRST_TRIALS = 60, 0.5
 
 
 class Iterate(NamedTuple):
@@ -74,11 +77,19 @@ class Search:
         self._first = 1.0
 
     def rollout(
-        self, now: Iterate, K: Stack | None, kappa: float, direction: Direction | None = None, alpha: float = 1.0
+        self,
+        now: Iterate,
+        K: Stack | None,
+        kappa: float,
+        direction: Direction | None = None,
+        alpha: float = 1.0,
+        max_iterations: int | None = None,
     ) -> Any:
         """One rollout around `now` under the gains K; it stops at the first step that the simulator cannot solve.
 
         u_t = us_t + a k_t + K_t (x_t (-) xs_t),  with the share 1 - a of every gap left open; k = 0 without a direction
+
+        max_iterations: of a time step, where the trial may fail sooner than the simulator gives up.
         """
         start = self._problem.start
         k = linear = None
@@ -89,7 +100,16 @@ class Search:
             if self._problem.free_start is not None:
                 start = self._problem.sim.integrate(start, alpha * direction.start)
         return self._horizon.roll(
-            start, now.x, now.u, kappa, k=k, K=K, gaps=now.gaps, alpha=alpha, linear=linear, steps=now.steps
+            start,
+            now.x,
+            now.u,
+            kappa,
+            k=k,
+            K=K,
+            gaps=now.gaps,
+            alpha=alpha,
+            known=Known(linear, now.steps),
+            max_iterations=max_iterations,
         )
 
     def iterate(self, shot: Any, gaps: Matrix | None, kappa: float) -> Iterate:
@@ -105,7 +125,8 @@ class Search:
         """
         options, alpha = self._options, self._first
         while alpha >= 0.5**options.halvings:
-            shot = self.rollout(now, direction.K, kappa, direction, alpha)
+            few = _FEW_ITERATIONS if alpha >= _FIRST_TRIALS * self._first else None
+            shot = self.rollout(now, direction.K, kappa, direction, alpha, few)
             if shot.status == Status.SOLVED:
                 gaps = None if now.gaps is None or alpha == 1.0 else (1.0 - alpha) * now.gaps
                 there, predicted = self.iterate(shot, gaps, kappa), direction.predicted(alpha)

@@ -30,6 +30,8 @@ class Objective:
         self.H = np.zeros((problem.horizon + 1, size, size))
         self._options = options
         self._last: list[Matrix] = []
+        terms = (*self.costs, *self.constraints)
+        self._forces = [term for term in terms if type(term).at_kappa is not Term.at_kappa]
 
     def reset(self, multipliers: Sequence[Matrix] = (), penalties: Sequence[Matrix] = ()) -> None:
         """Start with zero multipliers and the first penalty, or with those of an earlier plan of the same problem.
@@ -69,7 +71,7 @@ class Objective:
     def at_kappa(self, kappa: float | None) -> Objective:
         """Take forces at this central-path parameter from now on: that of the trajectory; None changes nothing."""
         if kappa is not None:
-            for term in (*self.costs, *self.constraints):
+            for term in self._forces:
                 term.at_kappa(kappa)
         return self
 

@@ -308,7 +308,8 @@ class History:
         tock = time.perf_counter()
         record = {"iteration": len(self.records) + 1, **record, "milliseconds": 1e3 * (tock - self._tick)}
         self._tick = tock
-        self._say(table_line(record))
+        if self._options.verbose:
+            self._say(table_line(record))
         self.records.append(record | {"note": self._note} if self._note else record)
         self._note = ""
         if self._options.callback is not None:

@@ -88,7 +88,7 @@ class Subproblem:
         n = self._problem.sim.ndx
         self.linear, self._at = linear, now
         self._objective.at_kappa(now.kappa).expand(now.x, now.u)
-        weight = self._objective.H[:-1].diagonal(axis1=1, axis2=2)[:, n:].mean(axis=0)
+        weight = np.einsum("tii->i", self._objective.H[:-1, n:, n:]) / len(now.u)
         self._unit = np.where(weight > 0.0, weight, 1.0)
 
     def model(self, now: Iterate) -> Quadratic:

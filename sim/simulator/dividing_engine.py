@@ -169,10 +169,11 @@ class DividingEngine(Engine):
         division: Division,
         following: Following | None = None,
         first: int = 0,
+        max_iterations: int | None = None,
     ) -> int:
         """As Engine.take_steps, with division."""
         self._ended.parts = None
-        done = super().take_steps(model, motion, kappa, division, following, first)
+        done = super().take_steps(model, motion, kappa, division, following, first, max_iterations)
         if following is None:
             return self._go_on(model, motion, kappa, division, done)
         steps = len(motion.us) * following.substeps
@@ -180,7 +181,7 @@ class DividingEngine(Engine):
             while done < steps and self._divide_followed(motion, kappa, following, done):
                 done += 1
                 if done < steps:
-                    done = super().take_steps(model, motion, kappa, division, following, done)
+                    done = super().take_steps(model, motion, kappa, division, following, done, max_iterations)
         except KeyboardInterrupt as stop:
             raise (stop if isinstance(stop, Interrupted) else Interrupted(done)) from None
         return done

@@ -1,9 +1,6 @@
 """Engine: the compiled calls of one packed mechanism, as functions of checked arrays.
 
-settings   (7,) as in sim/integrators/rollout.py
-report     (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
-           accuracy of derivatives, 0 where there are none
-contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
+Settings, reports and contacts are those of sim/integrators/rollout.py.
 
 Calls that may take long are made in pieces (pace.py). Ctrl-C between two pieces raises Interrupted with the part of
 the result that is done.
@@ -247,9 +244,10 @@ class Engine:
         """Take anew what Data keeps of the model, after a change in it."""
         self._scratch.turn()
 
-    def _settings_of(self, steps: int, kappa: float | None) -> Vector:
+    def _settings_of(self, steps: int, kappa: float | None, max_iterations: int | None = None) -> Vector:
         """Settings of a call of so many steps: a single one has no deadline, and shares them with others."""
-        return self._settings if steps <= 1 and kappa is None else self.settings.array(kappa)
+        shared = steps <= 1 and kappa is None and max_iterations is None
+        return self._settings if shared else self.settings.array(kappa, max_iterations)
 
     def external(self, wrenches: Cube | None) -> Cube:
         """External wrenches as kernels take them, (T, nbody, 6), or (0, nbody, 6) where there are none."""
@@ -303,15 +301,17 @@ class Engine:
         division: Division,
         following: Following | None = None,
         first: int = 0,
+        max_iterations: int | None = None,
     ) -> int:
         """Steps from the one `first` until the end or the first unsolved one: the number of solved ones, those before
         included, which Interrupted carries, too.
 
         division: of whole steps, where a divided step leaves its numbers, unless the motion follows a law.
+        max_iterations: of a step; None: that of the settings.
         """
         steps, knot = len(motion.us) * (following.substeps if following else 1), first
         data = self._scratch.table()
-        settings = self._settings_of(steps, kappa)
+        settings = self._settings_of(steps, kappa, max_iterations)
         try:
             for _ in pieces(settings, steps):
                 knot = int(rollout.roll(model, data, settings, motion, knot, None, following))
@@ -354,7 +354,7 @@ class Engine:
             np.zeros((knots, self.nu)),
             np.zeros((kept, ncontact, CONE)),
             np.zeros((kept, nlimit, BOUND)),
-            np.zeros(len(StepReport)),
+            np.zeros(StepReport.EARLIER + 1),
         )
 
     def closed_loop(
@@ -367,6 +367,7 @@ class Engine:
         kappa: float | None,
         *,
         keep: bool = False,
+        max_iterations: int | None = None,
     ) -> tuple[int, Path]:
         """(number of solved knots, rollout); with `keep` also the cone variables of its steps."""
         knots = len(policy.us)
@@ -375,7 +376,7 @@ class Engine:
         motion = MotionBuffers(path.xs, path.us, policy.wrenches, path.report[None], *self.unkept)
         following = Following(policy, float(alpha), *limits, substeps, path.cones, path.bounds)
         try:
-            done = self.take_steps(self.step_table(), motion, kappa, _UNDIVIDED, following)
+            done = self.take_steps(self.step_table(), motion, kappa, _UNDIVIDED, following, 0, max_iterations)
         except Interrupted as stop:
             interrupted(path.report[None], 0 if stop.result < steps else 1)
             raise Interrupted((stop.result // substeps, path)) from None

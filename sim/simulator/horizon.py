@@ -20,7 +20,7 @@ from solvers.status import Status
 
 Floats = NDArray[np.float64]
 
-__all__ = ["Horizon", "Steps", "Rollout"]
+__all__ = ["Horizon", "Known", "Rollout", "Steps"]
 
 
 class Steps(NamedTuple):
@@ -28,6 +28,16 @@ class Steps(NamedTuple):
 
     cones: Floats  # (T, ncontact, 12)
     bounds: Floats  # (T, nlimit, 2)
+
+
+class Known(NamedTuple):
+    """Derivatives and steps at a trajectory: they tell where the steps of a rollout nearby may look first."""
+
+    linear: Linearization | None = None
+    steps: Steps | None = None
+
+
+_NOTHING = Known()
 
 
 class Rollout(NamedTuple):
@@ -81,15 +91,16 @@ class Horizon:
         K: Floats | None = None,
         gaps: Floats | None = None,
         alpha: float = 1.0,
-        linear: Linearization | None = None,
-        steps: Steps | None = None,
+        known: Known = _NOTHING,
+        max_iterations: int | None = None,
     ) -> Rollout:
         """Rollout from x0 (nx,) under the gains around (xs, us), as `Simulator.closed_loop`.
 
-        linear: derivatives at (xs, us), steps: those of the rollout (xs, us); they tell where a step may look first.
+        known: of (xs, us).
+        max_iterations: of a step, where it may fail sooner than the simulator's.
         """
-        derivatives = self._engine.unknown[:2] if linear is None else (linear.A, linear.B)
-        cones = self._engine.unknown[2:] if steps is None else steps
+        derivatives = self._engine.unknown[:2] if known.linear is None else (known.linear.A, known.linear.B)
+        cones = self._engine.unknown[2:] if known.steps is None else known.steps
         policy = FeedbackLaw(
             xs,
             us,
@@ -101,7 +112,9 @@ class Horizon:
             *cones,
         )
         keep = self._substeps == 1
-        knot, path = self._engine.closed_loop(x0, policy, alpha, self._limits, self._substeps, kappa, keep=keep)
+        knot, path = self._engine.closed_loop(
+            x0, policy, alpha, self._limits, self._substeps, kappa, keep=keep, max_iterations=max_iterations
+        )
         kept = Steps(path.cones, path.bounds) if keep else None
         return Rollout(path.xs, path.us, Status(int(path.report[StepReport.STATUS])), knot, kept)
 

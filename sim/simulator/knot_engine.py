@@ -46,8 +46,9 @@ class KnotEngine(HighOrderEngine):
         kappa: float | None,
         *,
         keep: bool = False,
+        max_iterations: int | None = None,
     ) -> tuple[int, Path]:
-        """As Engine.closed_loop; the warm starts of the policy are not used."""
+        """As Engine.closed_loop; warm starts of the policy and another limit of iterations are not used."""
         knots = len(policy.us)
         path = self._path(knots, keep=keep, cones=False)
         path.xs[0], total = x, 0.0

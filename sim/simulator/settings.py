@@ -35,12 +35,12 @@ class Settings(NamedTuple):
     loss: float = inf  # largest loss where nothing dissipates, likewise
     accuracy: float = 0.0  # error of coordinates that steps may make [m/s, rad/s]; 0: steps are not divided for it
 
-    def array(self, kappa: float | None = None) -> Vector:
-        """As kernels read it, at another kappa when given, with room for a deadline (pace.py); without those
-        that choose an engine.
+    def array(self, kappa: float | None = None, max_iterations: int | None = None) -> Vector:
+        """As kernels read it, at another kappa or limit of iterations when given, with room for a deadline (pace.py);
+        without those that choose an engine.
         """
         level = self.kappa if kappa is None else kappa
-        limits = self.max_iterations, inf, self.gain, self.loss
+        limits = max_iterations or self.max_iterations, inf, self.gain, self.loss
         return np.array((self.time_step, level, self.tolerance, *limits), dtype=np.float64)
 
 

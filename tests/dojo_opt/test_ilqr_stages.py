@@ -63,6 +63,21 @@ def test_partial_steps_leave_the_rest_of_the_gaps(rng):
         np.testing.assert_allclose(following - shot.x[t + 1], 0.75 * now.gaps[t + 1], atol=1e-12)
 
 
+def test_the_first_trials_of_a_search_give_wild_steps_up_early():
+    """Later trials have all the iterations of the simulator, so that no step size is lost to the limit."""
+    problem = swingup(Stuck())
+    solver = Solver(problem, Options(halvings=4))
+    horizon = problem.sim.horizon(problem.horizon, problem.substeps, problem.control_limits)
+    limits, roll = [], horizon.roll
+    horizon.roll = lambda *given, **named: limits.append(named["max_iterations"]) or roll(*given, **named)
+    search = Search(problem, horizon, solver.objective, solver.options)
+    now = solver.guess(np.zeros((31, 2)), problem.controls0)
+    k, K = np.ones((30, 1)), np.zeros((30, 1, 2))
+    alpha, _ = search.rollouts(now, Direction(k, K, None, None, Promise(Status.SOLVED, 0, -1.0, 0.0, 0.0)), 1e-4)
+    assert alpha == 0.0 and len(limits) == 5
+    assert limits[0] == limits[1] < 100 and limits[2:] == [None] * 3
+
+
 def test_iterations_one_by_one_agree_with_a_solve():
     """Gains and regularisation carry over from one call to the next."""
     problem, (stage,) = swingup(), ONE_STAGE

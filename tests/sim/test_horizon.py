@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from sim.simulator.horizon import Known
+from solvers.status import Status
 
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), time_step=0.05)
 T = 8
@@ -46,8 +48,8 @@ def test_rollouts_agree_with_the_simulator(alpha):
     near = horizon.roll(xs[0], xs, us, 1e-4)
     np.testing.assert_allclose(near.x, xs, atol=2e-6)
     linear = horizon.linearize(xs, us, 1e-4)
-    for known in ({}, {"linear": linear}, {"linear": linear, "steps": near.steps}):
-        trial = horizon.roll(xs[0], xs, us, 1e-4, k=k, K=K, gaps=gaps, alpha=alpha, **known)
+    for known in (Known(), Known(linear), Known(linear, near.steps)):
+        trial = horizon.roll(xs[0], xs, us, 1e-4, k=k, K=K, gaps=gaps, alpha=alpha, known=known)
         assert trial.status == 0 and trial.knot == T
         np.testing.assert_allclose(trial.x, expected.x, atol=1e-5)
         np.testing.assert_allclose(trial.u, expected.u, atol=1e-4)
@@ -59,7 +61,7 @@ def test_known_solutions_save_iterations():
     near, linear = horizon.roll(xs[0], xs, us, 1e-4), horizon.linearize(xs, us, 1e-4)
     k = np.full((T, 3), 0.01)
     _, alone = counted(horizon, xs[0], xs, us, 1e-4, k=k)
-    _, helped = counted(horizon, xs[0], xs, us, 1e-4, k=k, linear=linear, steps=near.steps)
+    _, helped = counted(horizon, xs[0], xs, us, 1e-4, k=k, known=Known(linear, near.steps))
     assert helped <= 2 * T and helped < alone
 
 
@@ -67,9 +69,20 @@ def test_a_rollout_of_no_change_takes_one_iteration_per_step():
     xs, us = trajectory(1e-6)
     horizon = HOPPER.horizon(T)
     near = horizon.roll(xs[0], xs, us, 1e-6)
-    again, iterations = counted(horizon, xs[0], near.x, us, 1e-6, steps=near.steps)
+    again, iterations = counted(horizon, xs[0], near.x, us, 1e-6, known=Known(steps=near.steps))
     assert iterations == T
     np.testing.assert_allclose(again.x, near.x, atol=1e-6)
+
+
+def test_a_limit_of_iterations_holds_for_one_rollout():
+    xs, us = trajectory()
+    horizon = HOPPER.horizon(T)
+    whole, usual = counted(horizon, xs[0], xs, us, 1e-6)
+    stopped, iterations = counted(horizon, xs[0], xs, us, 1e-6, max_iterations=1)
+    again, later = counted(horizon, xs[0], xs, us, 1e-6)
+    assert (stopped.status, iterations) == (Status.MAX_ITERATIONS, 1) and stopped.knot < T
+    assert (again.status, later) == (whole.status, usual) and whole.status == Status.SOLVED
+    np.testing.assert_array_equal(again.x, whole.x)
 
 
 def test_derivatives_and_gaps_agree_with_the_simulator():

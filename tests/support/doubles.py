@@ -144,7 +144,7 @@ class Horizon:
     def states(self, call, xs):
         return np.array(xs)
 
-    def roll(self, x0, xs, us, kappa, *, k=None, K=None, gaps=None, alpha=1.0, linear=None, steps=None):
+    def roll(self, x0, xs, us, kappa, *, k=None, K=None, gaps=None, alpha=1.0, **hints):
         gaps = gaps if alpha < 1.0 else None
         shot = self.system.closed_loop(x0, us, xs, k, K, gaps, alpha, self.limits, self.substeps, kappa)
         return Trial(shot.x, shot.u, shot.status, shot.knot)
