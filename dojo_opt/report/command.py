@@ -32,6 +32,11 @@ def add_arguments(parser: argparse.ArgumentParser, studies: Studies, moved: Sequ
         metavar="LINK[=RADIUS]",
         help="links of ROBOT.urdf that touch the ground, by their shapes or by a ball of RADIUS [m] about their origin",
     )
+    parser.add_argument(
+        "--cold",
+        action="store_true",
+        help="lean: compile every feature from an empty cache, too: seconds and functions, in a quarter of an hour",
+    )
     parser.add_argument("--json", action="store_true", help="print every number as JSON instead of the tables")
     parser.add_argument("--quick", action="store_true", help="run fewer and shorter rounds, as a check")
     parser.add_argument("--out", type=Path, metavar="DIR", help="write report.html, .md, .json and a PNG per study")
@@ -63,7 +68,9 @@ def report(
     if args.robot is not None:
         mechanism = load_urdf(args.robot, floating=not args.fixed, contacts=touching(args.contacts))
     names = list(studies) if args.name == "all" else [args.name]
-    reports = run_reports(names, quick=args.quick, mechanism=mechanism, verbose=True, studies=studies)
+    if args.cold and "lean" not in names:
+        raise ValueError(f"report --cold: it belongs to the report lean, got {args.name}")
+    reports = run_reports(names, quick=args.quick, mechanism=mechanism, cold=args.cold, verbose=True, studies=studies)
     for name, made in reports.items():
         made.command = _command(args, name, program)
     if args.json:
@@ -80,4 +87,5 @@ def _command(args: argparse.Namespace, name: str, program: Sequence[str]) -> str
     """The command that reproduces a study, with all arguments that affect it."""
     robot, fixed = [str(args.robot)] if args.robot else [], ["--fixed"] * args.fixed
     contacts = ["--contacts", *args.contacts] if args.contacts else []
-    return shlex.join([*program, name, *robot, *fixed, *contacts, *["--quick"] * args.quick])
+    cold = ["--cold"] * (args.cold and name in ("all", "lean"))
+    return shlex.join([*program, name, *robot, *fixed, *contacts, *cold, *["--quick"] * args.quick])

@@ -83,7 +83,12 @@ class ReportStudy(Protocol):
 
 
 def study(
-    name: str, *, quick: bool = False, mechanism: Mechanism | None = None, studies: Studies = STUDIES
+    name: str,
+    *,
+    quick: bool = False,
+    mechanism: Mechanism | None = None,
+    cold: bool = False,
+    studies: Studies = STUDIES,
 ) -> ReportStudy:
     """Make a study.
 
@@ -91,6 +96,7 @@ def study(
         name: key of `studies`.
         quick: whether scenes are fewer and shorter.
         mechanism: robot to measure (default None: the scenes of the study, or, in a study of one robot, the quadruped).
+        cold: whether a study that measures cold starts on request does so.
         studies: known studies (default: those of one robot).
 
     Returns:
@@ -104,13 +110,14 @@ def study(
     _, module, kind = studies[name]
     make = getattr(import_module(module), kind)
     field = make.__dataclass_fields__.get("mechanism")
+    settings = {"cold": True} if cold and "cold" in make.__dataclass_fields__ else {}
     if field is None:
         if mechanism is not None:
             raise ValueError(f"report: {name} has its own scenes and takes no mechanism")
-        return make(quick=quick)
+        return make(quick=quick, **settings)
     if mechanism is None and field.default is MISSING:
         mechanism = import_module("dojo_opt.models").quadruped()
-    return make(quick=quick, mechanism=mechanism)
+    return make(quick=quick, mechanism=mechanism, **settings)
 
 
 def run_report(
@@ -118,6 +125,7 @@ def run_report(
     *,
     quick: bool = False,
     mechanism: Mechanism | None = None,
+    cold: bool = False,
     verbose: bool = False,
     studies: Studies = STUDIES,
 ) -> Report:
@@ -127,6 +135,7 @@ def run_report(
         name: key of `studies`.
         quick: whether scenes are fewer and shorter.
         mechanism: robot to measure (default None: as in `study`).
+        cold: whether to measure cold starts, as in `study`.
         verbose: whether to show a progress bar on stderr.
         studies: known studies (default: those of one robot).
 
@@ -136,9 +145,9 @@ def run_report(
     Raises:
         ValueError: the study does not exist, or does not take a mechanism.
     """
-    made = study(name, quick=quick, mechanism=mechanism, studies=studies)
+    made = study(name, quick=quick, mechanism=mechanism, cold=cold, studies=studies)
     report = made.run(Progress(sys.stderr if verbose else None))
-    report.command = f"dojo-opt report {name}{' --quick' if quick else ''}"  # the command line replaces it
+    report.command = f"dojo-opt report {name}{' --cold' * cold}{' --quick' * quick}"  # the command line replaces it
     return report
 
 
@@ -147,6 +156,7 @@ def run_reports(
     *,
     quick: bool = False,
     mechanism: Mechanism | None = None,
+    cold: bool = False,
     verbose: bool = False,
     studies: Studies = STUDIES,
 ) -> dict[str, Report]:
@@ -156,6 +166,7 @@ def run_reports(
         names: keys of `studies`.
         quick: whether scenes are fewer and shorter.
         mechanism: robot to measure (default None: as in `study`).
+        cold: whether to measure cold starts, as in `study`.
         verbose: whether to show a progress bar on stderr.
         studies: known studies (default: those of one robot).
 
@@ -169,7 +180,9 @@ def run_reports(
     reports: dict[str, Report] = {}
     for name in names:
         try:
-            reports[name] = run_report(name, quick=quick, mechanism=mechanism, verbose=verbose, studies=studies)
+            reports[name] = run_report(
+                name, quick=quick, mechanism=mechanism, cold=cold, verbose=verbose, studies=studies
+            )
         except Exception as error:
             if len(names) == 1:
                 raise

@@ -10,8 +10,13 @@ import pytest
 import dojo_opt as dojo
 from benchmarks.studies.lean.lean_scenes import MANY, absent, features, pendulum_scene
 from benchmarks.studies.lean.new_process import new_process
+from dojo_opt import __main__ as cli
+from dojo_opt.report.command import report
 from dojo_opt.report.costs import costs
+from dojo_opt.report.lean import cold_starts, omitted_terms
+from dojo_opt.report.lean.cold_starts import ColdStart
 from dojo_opt.report.lean.variants import without
+from dojo_opt.report.study import Progress, study
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +86,44 @@ def test_the_report_of_a_robot():
 def test_a_simulation_in_a_new_process_imports_no_heavy_library():
     run = new_process("pendulum", cold=False)
     assert run["success"] and run["modules"] == [] and run["kernels"]
+
+
+def test_cold_starts_add_up_along_their_bases(monkeypatch):
+    """A feature's seconds are those beyond its base with a warm cache; functions count those that the base lacks."""
+    seconds = {"pendulum": iter([7.0, 1.0]), "derivatives": iter([3.0, 1.5]), "parameters": iter([5.0])}
+    functions = {"pendulum": 130, "derivatives": 30, "parameters": 100}
+
+    def process(scene, cache):
+        cache.mkdir(exist_ok=True)
+        return next(seconds[scene.name]), functions[scene.name]
+
+    monkeypatch.setattr(cold_starts, "_process", process)
+    scenes = cold_starts.chosen(["parameters"])
+    assert [scene.name for scene in scenes] == ["pendulum", "derivatives", "parameters"]
+    found = cold_starts.measure(scenes, Progress())
+    assert found["pendulum"] == (0.0, 0, 7.0, 130)
+    assert found["derivatives"] == (7.0, 130, 2.0, 30)
+    assert found["parameters"] == (9.0, 160, 3.5, 100) and found["parameters"].seconds == 12.5
+
+
+def test_the_report_lists_cold_starts_on_request_the_worst_first(monkeypatch):
+    cold = {"pendulum": (0.0, 0, 7.0, 130), "spring": (7.0, 130, 0.5, 4)}
+    monkeypatch.setattr(
+        cold_starts, "measure", lambda scenes, progress: {s.name: ColdStart(*cold[s.name]) for s in scenes}
+    )
+    monkeypatch.setattr(omitted_terms, "_robot", lambda report, *_: report.details.update(robot=[]))
+    made = study("lean", quick=True, mechanism=dojo.models.pendulum(), cold=True).run(Progress())
+    (table,) = made.tables
+    assert [line[0] for line in table.rows] == ["spring", "pendulum"]
+    assert (made.rows[-1].name, made.rows[-1].value, made.rows[-1].note) == ("the worst", 7.5, "spring")
+    assert not study("lean", mechanism=dojo.models.pendulum()).run(Progress()).tables
+    with pytest.raises(ValueError, match="--cold: it belongs to the report lean, got timing"):
+        report(cli._parser().parse_args(["report", "timing", "--cold"]))
+
+
+def test_every_cold_scene_is_a_program_beyond_one_before_it():
+    names = [scene.name for scene in cold_starts.SCENES]
+    assert len(set(names)) == len(names)
+    for k, scene in enumerate(cold_starts.SCENES):
+        assert scene.base in ("", *names[:k])
+        compile(cold_starts._HEAD + scene.program + cold_starts._TAIL, scene.name, "exec")

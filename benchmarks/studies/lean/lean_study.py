@@ -26,6 +26,7 @@ from benchmarks.studies.lean.new_process import HEAVY, new_process
 from dojo_opt.report.clock import ratio
 from dojo_opt.report.costs import COST_HEADER, cost_row, costs, median_us, raw_cost
 from dojo_opt.report.lean import OmittedTerms
+from dojo_opt.report.lean.cold_starts import add_cold_starts
 from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.study import Progress
 from sim.mechanism.mechanism import Mechanism
@@ -42,11 +43,12 @@ class LeanStudy:
 
     quick: bool = False
     mechanism: Mechanism | None = None
+    cold: bool = False  # whether to measure cold starts by feature, too
 
     def run(self, progress: Progress) -> Report:
         """Measure."""
         if self.mechanism is not None:
-            return OmittedTerms(self.mechanism, self.quick).run(progress)
+            return OmittedTerms(self.mechanism, self.quick, cold=self.cold).run(progress)
         rounds = 15 if self.quick else 100
         report = Report("Omitted terms")
         report.summary = (
@@ -59,6 +61,8 @@ class LeanStudy:
                 measure(report, rounds)
         _processes(report, progress, cold=not self.quick)
         report.figure = lean_figure.pendulum(report.details)
+        if self.cold:
+            add_cold_starts(report, progress, quick=self.quick)
         return report
 
 

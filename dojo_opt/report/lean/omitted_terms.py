@@ -8,6 +8,7 @@ import numpy as np
 
 from dojo_opt.report.clock import ratio
 from dojo_opt.report.costs import COST_HEADER, Cost, CostScene, cost_row, costs, median_us, raw_cost
+from dojo_opt.report.lean.cold_starts import add_cold_starts
 from dojo_opt.report.lean.cost_figure import cost_figure
 from dojo_opt.report.lean.variants import robot_scene, without
 from dojo_opt.report.result import Report, Row, Table
@@ -18,17 +19,20 @@ from solvers.compiler import threads
 
 @dataclass(frozen=True)
 class OmittedTerms:
-    """A robot as it is, and without each of its features; quick: fewer rounds."""
+    """A robot as it is, and without each of its features; quick: fewer rounds; cold: cold starts by feature, too."""
 
     mechanism: Mechanism
     quick: bool = False
     time_step: float = 0.01  # [s]
+    cold: bool = False
 
     def run(self, progress: Progress) -> Report:
         """Measure."""
         report = Report(f"Cost of each feature of {self.mechanism.name}")
         with threads(1):
             _robot(report, self.mechanism, self.time_step, 15 if self.quick else 100, progress)
+        if self.cold:
+            add_cold_starts(report, progress, quick=self.quick)
         return report
 
 
