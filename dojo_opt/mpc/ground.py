@@ -22,6 +22,8 @@ _LIGHT = 2.0  # a foot that stands may carry so many times less than its share o
 _MEMORY = 0.5  # [s] in which a place where a contact stood loses 63 % of its weight
 _STIFF = 1e-4  # [m^2] weight of the slope known before: less than that of two feet 2 cm apart
 
+_NOTHING: tuple[Vector | None, Stack] = (None, np.zeros(0))
+
 __all__ = ["Ground"]
 
 
@@ -102,6 +104,7 @@ class Ground:
         self.height[:] = self._flat
         if self._slope:
             self._turn(self._level[0])
+        self._seen = _NOTHING  # the state learnt from last, and its points
         self._places = np.zeros((len(self.names), 3))  # where contacts stood last [m]
         self._stood = np.full(len(self.names), -np.inf)  # when [s]
 
@@ -127,15 +130,18 @@ class Ground:
 
     def touching(self, x: Vector) -> tuple[str, ...]:
         """Names of the contacts that touch at x."""
-        gaps = self.gaps(self.points(x))
+        gaps = self.gaps(self._seen[1] if self._seen[0] is x else self.points(x))
         return tuple(name for name, gap in zip(self.names, gaps, strict=True) if gap < _TOUCHING)
 
     def learn(self, policy: Policy, time: float, x: Vector, before: tuple[float, Vector]) -> None:
         """Take the ground from the contacts that stand at x, measured at `time`; before: an earlier sample."""
         then, x0 = before
+        self._seen = _NOTHING
         if time <= then:
             return
         now, earlier, planned = self.points(np.stack([x, x0, policy.state(time)]))
+        if not self._slope:  # points lie on balls, and move as the normal turns
+            self._seen = x, now
         still = ((now - earlier) ** 2).sum(axis=1) < (_STILL * (time - then)) ** 2
         stands = still & (self.gaps(planned) < self._planned)
         if not self._slope:
