@@ -41,7 +41,7 @@ TIME_STEPS = (0.005, 0.001, 0.0002)  # [s]
 CLEARANCE = 0.01  # [m] of a robot on a fixed base
 DEPTH = 1e-6  # [m]
 GROWTH = 0.01  # of the largest kinetic energy
-STILL = ("no joint is free to move", "nothing that moves has a mass")  # reasons of a refusal
+STILL = ("no joint is free to move", "no moving link has a mass")  # reasons of a refusal
 
 
 @dataclass

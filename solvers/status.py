@@ -40,7 +40,7 @@ MESSAGES: dict[Status, str] = {
     Status.MAX_ITERATIONS: "The iteration limit was reached before the tolerance.",
     Status.NO_PROGRESS: "The time step did not converge to its tolerance; try a smaller one.",
     Status.NOT_FINITE: "A number is not finite.",
-    Status.SINGULAR: "A matrix is singular, or not positive definite although it must be.",
+    Status.SINGULAR: "A matrix is singular, or not positive definite as required.",
     Status.ANGULAR_STEP: "A body turns by half a turn or more in one time step; use a smaller time step.",
     Status.LOOP_STEP: "A loop passes a singular configuration too fast for the time step; use a smaller one.",
     Status.COLLISION_STEP: "Shapes pass through one another or gain energy in every solution found; use smaller steps.",
@@ -52,6 +52,6 @@ MESSAGES: dict[Status, str] = {
     Status.SIMULATION_FAILED: "The simulator could not solve the steps of the trajectory.",
     Status.INFEASIBLE: "The constraints are still violated after the last penalty increase.",
     Status.STOPPED: "The callback stopped the solver.",
-    Status.TOLERANCE_STEP: "The shortest step is too long for the requested accuracy; ask for less of it.",
+    Status.TOLERANCE_STEP: "The shortest step is too long for the requested accuracy; request a lower accuracy.",
     Status.INTERRUPTED: "Ctrl-C interrupted the computation.",
 }

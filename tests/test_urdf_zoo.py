@@ -52,7 +52,7 @@ def test_own_files_are_simulated_or_refused(zoo, tmp_path, capsys):
     assert "exceeds the sum of the others" in repaired.reason
     massless = write(tmp_path, link("base", ""), name="massless")
     assert zoo.main([str(massless)]) == 0
-    assert "nothing that moves has a mass" in capsys.readouterr().out
+    assert "no moving link has a mass" in capsys.readouterr().out
     rows = {row.name: row.value for row in zoo.summary(zoo.study([good, flat, massless])).rows}
     assert (rows["files"], rows["fine"], rows["fine, with repair=True"], rows["refused"]) == (3, 2, 1, 1)
     assert rows["refused: nothing in it can move"] == 1 and rows["can touch the ground"] == 1

@@ -111,7 +111,7 @@ def _feet_of(mech: Mechanism, given: Any) -> list[Contact]:
     if given is not None:
         return [contact for name in given for contact in _named(mech, kin, name, given)]
     if not mech.contacts:
-        raise ValueError(f"Legs(robot): {mech.name!r} touches the ground with nothing; name its feet, feet=...")
+        raise ValueError(f"Legs(robot): {mech.name!r} has no contact with the ground; name its feet with feet=...")
     ends = set(mech.body_names) - {joint.parent for joint in mech.joints}
     everything = Feet(sim, mech.contact_names[: len(mech.contacts)]).positions(x)
     low: dict[str, float] = {}
@@ -163,7 +163,7 @@ def _stance(sim: Simulator) -> Array:
         hinges = _pitching(kin, bodies, contact.body, x[: sim.nq])
         if len(hinges) < 2:
             raise ValueError(
-                f"Legs(robot): the leg of {contact.name!r} has no two hinges about y, which bend it; give stance=..."
+                f"Legs(robot): the leg of {contact.name!r} needs two hinges about y to bend; give stance=..."
             )
         hip, knee = (_origin(sim, bodies[name], x) for name in hinges[:2])
         foot = at[k] if len(hinges) == 2 else _origin(sim, bodies[hinges[2]], x)

@@ -1,6 +1,6 @@
 """Learning: tasks, policies, and algorithms that find policies, with and without derivatives of the simulator.
 
-Where Gymnasium is installed, the tasks are registered with it: `gymnasium.make("dojo/HalfCheetah-v0")`.
+If Gymnasium is installed, registration.py registers the tasks with it: `gymnasium.make("dojo/HalfCheetah-v0")`.
 """
 
 from importlib.util import find_spec

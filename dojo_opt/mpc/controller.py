@@ -87,7 +87,7 @@ class MPC:
         if self.settings.computation > self.period + _ROUNDING:
             raise ValueError(
                 f"MPC(computation={self.settings.computation:g}): a plan takes longer than the period of "
-                f"{self.period:g} s in which the next one begins"
+                f"{self.period:g} s of the plans"
             )
         self._delay = Delay(self.sim, self.settings.delay)
         self._predict = Prediction(self.sim, self.settings.computation)

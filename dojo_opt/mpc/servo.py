@@ -134,7 +134,7 @@ def _coordinates(sim: Simulator, dofs: Integers) -> Integers:
     layout = tangent_layout(sim, sim.neutral())
     at = np.asarray(layout)[dofs]
     if np.any(at < 0):
-        raise ValueError(f"{_CALL}: an input drives a rotation of a quaternion joint, which is no single coordinate")
+        raise ValueError(f"{_CALL}: an input drives a rotation of a quaternion joint, which has no single coordinate")
     return at
 
 

@@ -1,4 +1,7 @@
-"""Reports: studies of a robot, shown as tables or as a page; `dojo-opt report NAME ROBOT.urdf`."""
+"""Reports: studies of a robot, shown as tables or as a page; `dojo-opt report NAME ROBOT.urdf`.
+
+Studies of reference scenes, and of other engines, are in benchmarks/studies.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Closed-loop tasks: MPC with a reference, ready to run on a plant; `idto` has the tasks of a published suite."""
+"""Closed-loop tasks: MPC with a reference, ready to run on a plant; `idto` has the tasks of a published suite.
+
+Tasks of reinforcement learning are in dojo_opt/learn.
+"""
 
 from typing import TYPE_CHECKING, Any
 

@@ -74,7 +74,7 @@ def save_video(
         raise ValueError(f"save_video(size=...): expected even numbers for .mp4, got {size!r}")
     m = motion(result, simulator)
     if not m.time[-1] > 0.0:
-        raise ValueError("save_video(result): a motion of no duration; save_picture draws it")
+        raise ValueError("save_video(result): the motion has no duration; use save_picture")
     count = float(m.time[-1]) * rate / speed
     check_room("save_video(rate=..., speed=...): pictures", int(min(count, 1e300)), 3.0 * width * height)
     times = np.arange(0.0, m.time[-1] + 0.5 * speed / rate, speed / rate)

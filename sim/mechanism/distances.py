@@ -122,7 +122,9 @@ def distances_to_mesh(call: str, points: Floats, counts: tuple[int, ...], vertic
     _, same = np.unique(vertices, axis=0, return_inverse=True)  # corners may be listed for each face
     used = np.unique(np.sort(same.ravel()[edges], axis=1), axis=0, return_counts=True)[1]
     if np.any(used % 2):
-        raise ValueError(f"{call}(mesh): the mesh is not closed: {int((used % 2).sum())} edges have a face on one side")
+        raise ValueError(
+            f"{call}(mesh): the mesh is not closed: {int((used % 2).sum())} edges have a face on one side only"
+        )
     spacing = float(np.linalg.norm(points[1] - points[0]))
     out = to_triangles(points, vertices[faces], spacing)[0]
     far = (out > spacing).reshape(counts)  # neighbours along an axis are on one side

@@ -481,7 +481,7 @@ def _with_obstacle(mech: Mechanism, shape: Solid, bodies: Sequence[str] | None, 
     if bodies is None:
         balls = [c for c in mech.contacts if c.radius > 0.0]
         if not balls:
-            raise ValueError(f"{call}: {mech.name!r} has no contact with a radius; say which bodies=[...]")
+            raise ValueError(f"{call}: {mech.name!r} has no contact with a radius; give bodies=[...]")
         found = [
             Collision(c.body, None, Sphere(radius=c.radius, center=c.point), shape, name=f"{name}-{c.name}", **options)
             for c in balls
@@ -506,7 +506,9 @@ def _on_terrain(
     for name in bodies:
         checks.one_of(f"{call}(bodies=...)", name, mech.body_names)
     if options and not bodies:
-        raise ValueError(f"{call}({', '.join(options)}=...): of the contacts of bodies=[...]; none are given")
+        raise ValueError(
+            f"{call}({', '.join(options)}=...): these are options of contacts of bodies=[...], and no bodies are given"
+        )
     shaped = [c for b in mech.bodies if b.name in bodies for c in shape_contacts(f"{call}(bodies=...)", b, **options)]
     level: Any = {"normal": (0.0, 0.0, 1.0), "height": 0.0, "terrain": terrain}
     chosen = [*(names if contacts is None else contacts), *(c.name for c in shaped)]

@@ -63,7 +63,7 @@ def name_inputs(
                 raise ValueError(f"{call}): Input({label!r}, dof={part.dof!r}): the joint has {nv} degrees of freedom")
             label += f"[{part.dof}]" if nv > 1 else ""
             if part.servo is not None and by_name[part.joint].nrot == 3 and part.dof >= by_name[part.joint].ntrans:
-                raise ValueError(f"{call}): Input({label!r}, servo=...): a quaternion is no coordinate to drive")
+                raise ValueError(f"{call}): Input({label!r}, servo=...): a servo cannot drive a quaternion")
         else:
             label = checks.one_of(f"{call}, inputs=...): body", part.body, known)
         out.append(renamed(part, part.name or label))

@@ -379,9 +379,9 @@ def check_servo(call: str, part: Input) -> None:
         raise ValueError(f"{call}, force_limits=...): expected two finite numbers, got {part.force_limits!r}")
     if part.servo is None:
         if np.isfinite(limits[0]):
-            raise ValueError(f"{call}, force_limits=...): they are those of a servo; a force has limits=...")
+            raise ValueError(f"{call}, force_limits=...): for servos only; use limits=... for a force")
         if part.stiffness or part.damping:
-            raise ValueError(f'{call}): stiffness and damping are those of a servo; give servo="position", too')
+            raise ValueError(f'{call}): stiffness and damping are for servos; add servo="position"')
         return
     checks.one_of(f"{call}, servo=...)", part.servo, ("position", "velocity"))
     if part.joint is None:
@@ -432,7 +432,7 @@ def inertia_of(call: str, body: Body) -> tuple[tuple[float, ...], ...]:
 def inertia_of_shapes(call: str, body: Body) -> NDArray[np.float64]:
     """The inertia of one shape at the centre of mass, or of several that have theirs there."""
     if not body.shapes:
-        raise ValueError(f"{call}): give inertia=..., or a shape=... to take it from")
+        raise ValueError(f"{call}): give inertia=..., or shape=... to compute it from")
     if len(body.shapes) == 1:
         if np.any(np.asarray(body.shapes[0].center)):
             raise ValueError(f"{call}): give inertia=...; the shape is not centred at the centre of mass")
@@ -509,7 +509,9 @@ def pitch_of(call: str, joint: Joint) -> float:
     """The pitch, other than zero, of a screw; zero of other kinds."""
     pitch = checks.number(call, joint.pitch)
     if joint.kind == "screw" and pitch == 0.0:
-        raise ValueError(f"{call}: a screw needs the way along its axis per turn [m/rev]; without one it is a revolute")
+        raise ValueError(
+            f"{call}: a screw needs its displacement per turn [m/rev]; without a pitch it is a revolute joint"
+        )
     if joint.kind != "screw" and pitch != 0.0:
         raise ValueError(f"{call}: a {joint.kind} joint has none, got {pitch:g}")
     return pitch

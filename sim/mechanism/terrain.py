@@ -326,7 +326,7 @@ def _lines(call: str, given: ArrayLike) -> Floats:
     """Equally spaced grid lines."""
     lines = checks.array(call, given, (None,))
     if len(lines) == 0 or (len(lines) > 1 and not lines[0] < lines[1]):
-        raise ValueError(f"{call}: expected growing numbers, got {lines.tolist()[:3]}...")
+        raise ValueError(f"{call}: expected increasing numbers, got {lines.tolist()[:3]}...")
     if not np.allclose(np.diff(lines), lines[-1] - lines[-2] if len(lines) > 1 else 0.0, rtol=1e-6, atol=0.0):
         raise ValueError(f"{call}: expected equally spaced grid lines, as of np.linspace")
     return lines

@@ -54,9 +54,7 @@ def sort_tree(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> tup
         hangs_on[j.child] = j.name
     for name in by_name:
         if name not in hangs_on:
-            raise ValueError(
-                f"{call}: body {name!r} hangs on no joint; a free body needs Joint('floating', None, {name!r})"
-            )
+            raise ValueError(f"{call}: body {name!r} has no joint; a free body needs Joint('floating', None, {name!r})")
     below: dict[str | None, list[int]] = {}
     for k, j in enumerate(joints):
         below.setdefault(j.parent, []).append(k)
@@ -80,7 +78,7 @@ def check_masses(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> 
         if joint.parent in carries:
             carries[joint.parent] |= carries[body.name]
         if not carries[body.name]:
-            raise ValueError(f"{call}: body {body.name!r} has no mass, nor has anything that hangs on it")
+            raise ValueError(f"{call}: body {body.name!r} has no mass, and neither has any body that hangs on it")
 
 
 def check_axes(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> None:
@@ -102,5 +100,5 @@ def check_axes(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> No
         if max(np.linalg.norm(np.cross(np.asarray(before.axis, float), d)) for d in along) < _ALONG:
             raise ValueError(
                 f"{call}: joints {before.name!r} and {joint.name!r} move along one axis, and body {joint.parent!r} "
-                "between them has no mass: only the sum of their coordinates would be known"
+                "between them has no mass: only the sum of their coordinates is determined"
             )

@@ -385,7 +385,7 @@ def check_adaptive(mechanism: Mechanism, accuracy: float) -> None:
     if accuracy < _LEAST_PRESSING and held:
         raise ValueError(
             f"Simulator(accuracy=...): expected at least {_LEAST_PRESSING:g} with contacts, collisions, limits of "
-            f"joints, closed loops or gears, whose errors are not seen below that, got {accuracy:g}"
+            f"joints, closed loops or gears, whose errors cannot be estimated below that, got {accuracy:g}"
         )
     names = [("dry friction of", j.name) for j in mechanism.joints if np.any(j.friction)]
     names += [("limited servo", part.name) for _, part in limited_servos(mechanism.inputs or ())]

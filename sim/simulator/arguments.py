@@ -131,7 +131,7 @@ class Arguments:
         )
         if parts[0] is None:
             if parts[2] is not None:
-                raise ValueError(f"{call}(Ks=...): gains need the states xs=... that they are about")
+                raise ValueError(f"{call}(Ks=...): gains need reference states, xs=...")
             xs[:] = start
         external = self._engine.external(wrenches)
         return FeedbackLaw(self.states(f"{call}(xs=...)", xs), us, external, ks, Ks, gaps, *self._engine.unknown)

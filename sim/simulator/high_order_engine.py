@@ -163,5 +163,5 @@ def check(mechanism: Mechanism, settings: Settings) -> None:
             more = f" and {len(names) - 1} more" if len(names) > 1 else ""
             raise ValueError(
                 f"Simulator(order={settings.order}): {mechanism.name!r} has the {feature} {names[0]!r}{more}; steps of "
-                "higher order are for trees without dry friction and limits of servos: use order=2, or leave them out"
+                "higher order are for trees without dry friction and limits of servos: use order=2, or omit them"
             )

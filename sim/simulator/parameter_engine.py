@@ -83,7 +83,7 @@ class ParameterEngine:
         linked = [getattr(self._engine.model, name) for name in _LINKED]
         new_part = [own.any() != after.any() for own, after in changes if any(own is array for array in linked)]
         if any(own.dtype != np.float64 for own, _ in changes) or any(new_part):
-            raise ValueError(f"{call}: expected values that change no structure, as a damper where there was none does")
+            raise ValueError(f"{call}: expected values that keep the structure of the model, such as no new damper")
         for own, after in changes:
             np.copyto(own, after)
         self._packed = new

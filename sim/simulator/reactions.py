@@ -122,7 +122,7 @@ def reactions(
     call = "Simulator.reactions"
     checks.one_of(f"{call}(frame=...)", frame, FRAMES)
     if engine.settings.order != 2:
-        raise ValueError(f"{call}: steps of order 2 have them, got order {engine.settings.order}")
+        raise ValueError(f"{call}: expected a simulator of order 2, got order {engine.settings.order}")
     states, us, wrenches = steps
     loops = [(m, loop) for m, loop in enumerate(mech.loops) if not is_weld(loop)]
     names = (*mech.joint_names, *(loop.name for _, loop in loops))

@@ -167,7 +167,7 @@ def test_a_periodic_centre_of_mass_is_a_constraint_of_a_free_start(walker):
         (cost.ContactForce(knots=T), "knots"),
         (cost.Slip("trunk"), "FR"),
         (cost.Clearance(FOOT, FOOT), "itself"),
-        (cost.JointLimits(margin=9.0), "leaves nothing"),
+        (cost.JointLimits(margin=9.0), "exceeds half the range"),
     ],
 )
 def test_mistakes_are_refused(walker, spec, sentence):

@@ -80,7 +80,7 @@ def test_a_motor_on_a_loop_joint(tmp_path: Path) -> None:
         (('link="rocker"', 'link="coupler"'), "expected two different links, got 'coupler' twice"),
         (('name="pin"', 'name="crank"'), "the name is taken by the <joint> of line 6"),
         (("continuous", "welded"), "type 'welded' is not one of"),
-        (("continuous", "floating"), "a floating joint without damping closes nothing"),
+        (("continuous", "floating"), "a floating joint without damping constrains nothing"),
         (("<link2", "<link3"), "expected a <link2> inside"),
         (('link="rocker"', 'link="ground"'), "'ground' is part of the world; exchange link1 and link2"),
     ],

@@ -15,7 +15,7 @@ from support.mechanisms import BALL, INF, hip, two
 ERRORS: list[tuple[Callable[[], object], str]] = [
     (lambda: Body("", shape=BALL), r"Body\(name=\.\.\.\): expected a name"),
     (lambda: Joint("revolute", None, "x", cone=0.5), r"Joint\('x', cone=\.\.\.\): a revolute joint has no three rot"),
-    (lambda: Joint("screw", None, "x"), r"Joint\('x', pitch=\.\.\.\): a screw needs the way along its axis per turn"),
+    (lambda: Joint("screw", None, "x"), r"Joint\('x', pitch=\.\.\.\): a screw needs its displacement per turn"),
     (
         lambda: Joint("revolute", None, "x", pitch=0.1),
         r"Joint\('x', pitch=\.\.\.\): a revolute joint has none, got 0.1",
@@ -38,7 +38,7 @@ ERRORS: list[tuple[Callable[[], object], str]] = [
     (lambda: Joint("orbital", None, "x", limits=(0, 1)), r"Joint\('x', limits=\.\.\.\): expected 2 pairs"),
     (
         lambda: Mechanism([Body("x", 0.0)], [Joint("revolute", None, "x")]),
-        r"body 'x' has no mass, nor has anything that",
+        r"body 'x' has no mass, and neither has any body that",
     ),
     (lambda: Body("x", 0.0, shape=BALL), r"Body\('x', mass=\.\.\.\): expected a number > 0, got 0"),
     (lambda: Body("x", float("nan"), shape=BALL), r"Body\('x', mass=\.\.\.\): expected finite numbers, got nan"),
@@ -98,7 +98,7 @@ ERRORS: list[tuple[Callable[[], object], str]] = [
     (lambda: two(bodies=[Body("world", shape=BALL)]), r"a body cannot be named 'world'"),
     (lambda: two(joints=[Joint("floating", "pelvis", "torso")]), r"'pelvis' is not one of: world, torso, leg"),
     (lambda: two(joints=[Joint("floating", None, "arm")]), r"child of joint 'arm': 'arm' is not one of: torso, leg"),
-    (lambda: two(joints=[Joint("floating", None, "torso")]), r"body 'leg' hangs on no joint.*Joint\('floating'"),
+    (lambda: two(joints=[Joint("floating", None, "torso")]), r"body 'leg' has no joint.*Joint\('floating'"),
     (
         lambda: two(joints=[Joint("floating", None, "torso"), hip(), Joint("fixed", None, "leg")]),
         r"body 'leg' is the child of two joints, 'hip' and 'leg'; a joint that closes a loop needs close=True",

@@ -61,7 +61,7 @@ def test_the_neutral_state_is_within_limits_and_can_be_chosen(tmp_path: Path) ->
         dojo.load_urdf(path, floating=False, neutral={"floating_base": (0, 0, 5, 1, 0, 0, 0)})
     ball = arm(tmp_path, kind="spherical", inside=("",))
     assert dojo.load_urdf(ball, neutral={"elbow": (0, 1, 0, 0)}).neutral[-4:] == (0.0, 1.0, 0.0, 0.0)
-    with pytest.raises(ValueError, match=r"joint 'elbow' does not move, or is held where all coordinates are zero"):
+    with pytest.raises(ValueError, match=r"joint 'elbow' is fixed, or locked at zero"):
         dojo.load_urdf(ball, neutral={"elbow": (0, 1, 0, 0)}, locked=["elbow"])
 
 

@@ -52,7 +52,7 @@ class JointLimits(Spec):
             first = mech.v_slice(name).start
             for k, pair in enumerate(np.asarray(limited[name].limits, dtype=float)):
                 if pair[0] + margin > pair[1] - margin:
-                    raise ValueError(f"JointLimits(margin=...): {margin:g} leaves nothing of the range of {name!r}")
+                    raise ValueError(f"JointLimits(margin=...): {margin:g} exceeds half the range of {name!r}")
                 for sign, bound in zip((-1.0, 1.0), pair, strict=True):
                     if np.isfinite(bound):
                         columns.append(first + k)

@@ -38,7 +38,7 @@ def chosen(call: str, table: Table, name: str) -> list[Parameter]:
         found = table.get(name, [])
     if not found:
         parts = ", ".join(dict.fromkeys(f"{p.kind}:{p.part}" if p.part else p.name for p in of_kind))
-        raise ValueError(f"{call}: no parameter {name!r}; of this kind there are: {parts or 'none'}")
+        raise ValueError(f"{call}: no parameter {name!r}; parameters of this kind: {parts or 'none'}")
     return found
 
 

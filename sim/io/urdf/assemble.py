@@ -144,9 +144,7 @@ def _neutral(robot: Robot, choices: Choices, name: str, depth: int = 0) -> float
             return follower_value(robot, name, lambda leader: _neutral(robot, choices, leader, depth + 1))
         return resting(robot.joints[name].limits)
     if robot.joints[name].kind not in ("revolute", "prismatic"):
-        raise ValueError(
-            f"load_urdf(neutral=...): joint {name!r} does not move, or is held where all coordinates are zero"
-        )
+        raise ValueError(f"load_urdf(neutral=...): joint {name!r} is fixed, or locked at zero")
     return checks.number(f"load_urdf(neutral=...): joint {name!r}", choices.neutral[name])
 
 
@@ -155,7 +153,7 @@ def _inertias(groups: list[MergedLinks], choices: Choices, notes: Notes) -> dict
     out = {body.name: combined(body.inertias) for body in groups}
     shaped = choices.repair and any(collision_shapes(body, out[body.name].com) for body in groups)
     if groups and not shaped and not any(part.mass for part in out.values()):
-        raise UrdfError(f"load_urdf: {choices.file}: nothing that moves has a mass")
+        raise UrdfError(f"load_urdf: {choices.file}: no moving link has a mass")
     bad: list[str] = []
     for body in groups:
         why = fault(out[body.name])

@@ -49,7 +49,7 @@ def read_loop(element: Element, notes: Notes) -> UrdfLoop:
     if joint.parent == joint.child:
         raise element.error(f"expected two different links, got {joint.parent!r} twice")
     if joint.kind == "floating" and not joint.damping:
-        raise element.error("a floating joint without damping closes nothing")
+        raise element.error("a floating joint without damping constrains nothing")
     return UrdfLoop(joint, poses[1], "rpy" in ends[1].attributes)
 
 

@@ -74,7 +74,7 @@ def ordered(robot: Robot, file: str) -> tuple[str, list[UrdfJoint]]:
         raise UrdfError(f"load_urdf: {file}: every link is the child of a joint, so the joints form a cycle: {names}")
     if len(roots) > 1:
         raise robot.links[roots[1]].element.error(
-            f"expected one root, but {len(roots)} links hang on no joint: {', '.join(roots)}"
+            f"expected one root, but {len(roots)} links have no parent joint: {', '.join(roots)}"
         )
     below: dict[str, list[UrdfJoint]] = {}
     for joint in robot.joints.values():
