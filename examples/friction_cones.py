@@ -53,7 +53,7 @@ for ax, (name, (run, law)) in zip(figure.subplots(1, len(panels)), panels.items(
     circle = np.exp(2.0j * np.pi * np.linspace(0.0, 1.0, 100))
     ax.plot(EXPECTED * circle.real, EXPECTED * circle.imag, "k--", linewidth=0.8)
     ax.plot(*np.array(ends).T, "o", color="C3")
-    ax.set_title(f"{name}: way off by up to {100 * off[name][0]:.1f} %,\nsideways by up to {1e3 * max(slips):.1f} mm")
+    ax.set_title(f"{name}: errors up to {100 * off[name][0]:.1f} % along,\n{1e3 * max(slips):.1f} mm across")
     ax.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
 finish(figure, __file__)
 cone, pyramid = off["dojo-opt, cone"], off["dojo-opt, pyramid"]

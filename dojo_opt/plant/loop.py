@@ -69,7 +69,7 @@ class ClosedLoop:
 
     def _repr_html_(self) -> str:
         rows = [] if self.reference is None else list(self.by_coordinate().items())
-        return brief_table(repr(self), ("coordinate", "rms off the reference [m or rad]"), rows)
+        return brief_table(repr(self), ("coordinate", "rms error [m or rad]"), rows)
 
     @property
     def duration(self) -> float:

@@ -96,7 +96,7 @@ def friction_use(m: Motion, ax: Axes) -> Axes:
         ax.plot(m.contact_time, share, ".-", markersize=4, color=f"C{row}", label=m.mechanism.contact_names[k])
     ax.axhline(1.0, color="0.3", linewidth=1, linestyle="--")
     ax.set_ylim(0.0, 1.1)
-    return finish(ax, "friction / its limit", "time [s]")
+    return finish(ax, "friction force / limit", "time [s]")
 
 
 @panel

@@ -116,7 +116,7 @@ def tracking(result: ClosedLoop, ax: Axes | None = None) -> Axes:
     for name, error in list(zip(mechanism.dof_names, result.error().T, strict=True))[:count]:
         ax.plot(result.time, error, label=name)
     _mark(result.log, ax)
-    return finish(ax, f"off the reference {units(mechanism, 'm', 'rad', range(count))}", "time [s]")
+    return finish(ax, f"error {units(mechanism, 'm', 'rad', range(count))}", "time [s]")
 
 
 def base_path(result: ClosedLoop, ax: Axes | None = None) -> Axes:

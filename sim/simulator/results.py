@@ -317,9 +317,7 @@ class Trajectory(Result):
             ValueError: the simulator has no accuracy, or a time lies outside.
         """
         if self.simulator.accuracy is None:
-            raise ValueError(
-                "Trajectory.at: a simulator with a fixed time step has states at the ends of its steps only"
-            )
+            raise ValueError("Trajectory.at: fixed time steps have states at their ends only; use accuracy=...")
         asked = checks.array("Trajectory.at(times)", times, ("n",))
         if np.any(asked < 0.0) or np.any(asked > self.time[-1] * (1.0 + 1e-12)):
             raise ValueError(f"Trajectory.at(times): expected times from 0 to {self.time[-1]:g} s, got {times!r}")
