@@ -21,7 +21,7 @@ class Visual:
 
     Attributes:
         shape: a solid with its own place (default None: a mesh or triangles).
-        mesh: path of an STL, OBJ or DAE file, read when it is drawn by the extra `meshes` (default none).
+        mesh: path of an STL, OBJ, DAE or glTF file, read when it is drawn by the extra `meshes` (default none).
         triangles: (vertices (n, 3), faces (k, 3)) (default none).
         scale: (3,) factors of a mesh or triangles (default 1).
         center: (3,) origin of a mesh or triangles, from the centre of mass, body axes [m] (default zero).

@@ -13,6 +13,7 @@ import dojo_opt as dojo
 from sim.io.meshes.fit import fit
 from sim.io.meshes.hull import CORNERS, distances, reduced_hull
 from sim.io.meshes.paths import find_mesh
+from sim.io.meshes.triangles import read_mesh
 from support.urdf_files import collision, inertial, link, write
 
 trimesh = pytest.importorskip("trimesh")
@@ -26,6 +27,13 @@ def save(path: Path, part: object) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     part.export(str(path))  # type: ignore[attr-defined]
     return path
+
+
+@pytest.mark.parametrize("ending", ["stl", "obj", "dae", "glb", "ply"])
+def test_every_format_holds_the_same_box(tmp_path: Path, ending: str) -> None:
+    found = read_mesh(save(tmp_path / f"box.{ending}", trimesh.creation.box((0.2, 0.3, 0.4))))
+    assert len(found.faces) == 12
+    assert np.ptp(found.vertices, axis=0) == pytest.approx((0.2, 0.3, 0.4), abs=1e-6)
 
 
 # -- hulls -------------------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""TriangleMesh: the triangles of an STL, OBJ or DAE file with their colours; read by trimesh (the extra `meshes`)."""
+"""TriangleMesh: triangles of an STL, OBJ, DAE, PLY or glTF file and their colours; read by trimesh, an extra."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ class TriangleMesh(NamedTuple):
 def read_mesh(path: Path) -> TriangleMesh:
     """The triangles of a file; kept until the file changes.
 
-    A COLLADA file's unit counts, its `up_axis` does not, as in RViz. Degenerate triangles are left as they are.
+    The unit of a COLLADA file counts, its `up_axis` does not, as in RViz; glTF keeps its own axes. Degenerate triangles
+    are left as they are.
 
     Raises:
         ImportError: trimesh is not installed.
