@@ -1,19 +1,25 @@
 """The animation, looked at in a real browser: the robot is drawn, and it moves."""
 
+import dataclasses
+import json
 import shutil
 import time
 from io import BytesIO
 
+import matplotlib
 import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from dojo_opt.report.page import write_page
+from dojo_opt.report.result import Report, Row, Table
 from dojo_opt.viewer import animation, drawing, overlays
 from dojo_opt.viewer.motion import motion
 from dojo_opt.viewer.page import page as page_of
 from dojo_opt.viewer.page import spacing
 from sim.io.meshes.shading import clustered, shaded
 from sim.io.meshes.triangles import TriangleMesh
+from sim.mechanism.brief import brief_table
 from sim.mechanism.shapes import rotation_matrix
 
 # a browser process that is closed leaves sockets to the garbage collector
@@ -252,6 +258,80 @@ def test_names_of_a_file_are_text_in_the_page_of_show(page, tmp_path):
     assert main(["show", str(tmp_path / "r.urdf"), "--seconds", "0.05", "--html", str(tmp_path / "r.html")]) == 0
     assert opened(page, tmp_path / "r.html") == []
     assert page.title() == NAMES[6]
+
+
+OTHERS = [NAMES[0], NAMES[3], NAMES[-2]]
+
+
+@pytest.fixture(scope="module")
+def hostile_motion():
+    """Balls that touch the ground and a wall, all of whose names are hostile."""
+    mech = hostile(NAMES[-1], OTHERS)
+    sim = dojo.Simulator(mech, time_step=0.01)
+    x = sim.neutral()
+    x[0 : sim.nq : 7], x[1 : sim.nq : 7], x[2 : sim.nq : 7] = 0.81, np.arange(len(mech.bodies)), 0.099
+    return sim.rollout(x, np.zeros((3, sim.nu)))
+
+
+@pytest.mark.slow
+def test_names_are_text_beside_forces_paths_and_ghosts_of_several_motions(page, hostile_motion, tmp_path):
+    m = motion(hostile_motion)
+    assert np.abs(m.force).max() > 1.0
+    goal = np.concatenate([m.position[0], m.quaternion[0]], axis=1)
+    two = [dataclasses.replace(m, goal=goal), dataclasses.replace(m, goal=goal)]
+    shown = {"forces": True, "paths": True, "ghost": True}
+    (tmp_path / "two.html").write_text(animation.html_of(*two, shown=shown), encoding="utf-8")
+    assert opened(page, tmp_path / "two.html") == []
+    for part in overlays_of(page):
+        page.uncheck(f"input[data-part={part}]")
+        page.check(f"input[data-part={part}]")
+    assert overlays_of(page) == ["forces", "paths", "ghost"] and page.evaluate("window.hits") == []
+    count = "Object.keys(viewer.scene_tree.find({}).children).length"
+    for group in (["meshcat"], ["meshcat", "motion1"]):
+        assert page.evaluate(count.format(json.dumps([*group, "bodies"]))) == len(OTHERS)
+        ghosts = f"viewer.scene_tree.find({json.dumps([*group, 'ghost'])}).object.children.length"
+        assert page.evaluate(ghosts) == len(OTHERS)
+
+
+def overlays_of(page):
+    """Parts that the page has boxes for."""
+    return page.eval_on_selector_all("input[data-part]", "boxes => boxes.map(box => box.dataset.part)")
+
+
+@pytest.mark.slow
+def test_names_are_text_in_notebooks_reports_and_figures(page, hostile_motion, tmp_path):
+    name = NAMES[-1]
+    table = brief_table(name, (name, name), [(name, 1.0)])
+    result = hostile_motion._repr_html_()
+    assert "<iframe" in result
+    body = f"<!DOCTYPE html><html><head><meta charset='utf-8'></head><body>{table}{result}</body></html>"
+    (tmp_path / "notebook.html").write_text(body, encoding="utf-8")
+    assert opened(page, tmp_path / "notebook.html") == []
+    page.wait_for_timeout(1500)
+    assert len(page.frames) == 2 and [frame.evaluate("window.hits") for frame in page.frames] == [[], []]
+    assert page.frames[1].title() == " ".join(name.split()) and page.locator("th").first.inner_text() == name
+
+    figure = dojo.plots.trajectory(hostile_motion)
+    figure.suptitle(name.replace("$", ""))
+    report = Report(name, name, [Row(name, 1.0, name, note=name)], summary=name, notes=[name], figure=figure)
+    report.tables.append(Table(name, (name,), [(name,)] * 30, name))
+    write_page({"timing": report}, tmp_path / "report", name)
+    assert opened(page, tmp_path / "report" / "report.html") == []
+    assert page.locator("h2").inner_text() == name
+    with matplotlib.rc_context({"svg.fonttype": "none"}):  # text stays text
+        figure.savefig(tmp_path / "figure.svg", metadata={"Title": name})
+    assert opened(page, tmp_path / "figure.svg") == []
+
+
+@pytest.mark.slow
+def test_names_are_text_in_the_live_page(page, hostile_motion):
+    with dojo.viewer.live(hostile_motion.simulator) as view:
+        wrong = []
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.goto(view.url)
+        view.show(hostile_motion.x[-1])
+        page.wait_for_timeout(500)
+        assert page.locator("#bar b").text_content() == NAMES[-1] and wrong == page.evaluate("window.hits") == []
 
 
 def test_forces_are_bars_as_long_as_the_robot_for_its_weight(quadruped):
