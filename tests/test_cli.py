@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from importlib import import_module
 from pathlib import Path
 
@@ -196,6 +197,28 @@ def test_show_reads_a_file_and_names_unsupported_elements(tmp_path: Path, capsys
 
 
 @pytest.mark.filterwarnings("ignore::sim.io.urdf.report.UrdfWarning")
+def test_show_plays_the_motion_until_it_is_interrupted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    opened, shown, pauses = [], [], []
+
+    def sleep(seconds: float) -> None:
+        pauses.append(seconds)
+        if len(pauses) == 13:  # after 6 states, a pause, and 5 states
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr(time, "sleep", sleep)
+    monkeypatch.setattr(dojo.viewer.Live, "show", lambda view, x: shown.append(np.array(x)))
+    assert (
+        cli.main(["show", "raiberthopper", "--drop", "0.1", "--seconds", "0.1", "--time-step", "0.02", "--live"]) == 0
+    )
+    assert opened[0].startswith("http://127.0.0.1:") and opened[0] in capsys.readouterr().out
+    assert len(shown) == 12 and all(0.0 <= pause <= 1.0 for pause in pauses)  # the neutral state first
+    np.testing.assert_array_equal(shown[1:6], shown[7:])
+    assert shown[1][2] > shown[5][2]
+
+
 def test_show_prints_one_json_object(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = branched(tmp_path)
     assert cli.main(["show", str(path), "--seconds", "0.05", "--json"]) == 0
@@ -212,6 +235,7 @@ def test_show_prints_one_json_object(tmp_path: Path, capsys: pytest.CaptureFixtu
         (["nowhere.urdf"], "nowhere.urdf"),
         (["pendulum", "--seconds", "-1"], "--seconds: expected a number > 0, got -1"),
         (["block", "--drop", "nan"], "--drop: expected finite numbers, got nan"),
+        (["pendulum", "--json", "--live"], "--json, --live: expected one of them"),
         (["pendulum", "--drop", "1"], "--drop requires a floating base; 'joint_0' is revolute"),
     ],
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import time
 from collections.abc import Sequence
 from inspect import signature
 from pathlib import Path
@@ -17,6 +18,8 @@ from sim.mechanism.checks import nearest
 from sim.mechanism.memory import check_room
 
 __all__ = ["add_show", "show"]
+
+_PAUSE = 1.0  # [s] between two plays
 
 
 def add_show(commands: Any) -> None:
@@ -51,6 +54,9 @@ def add_show(commands: Any) -> None:
     parser.add_argument("--out", "--plot", type=Path, metavar="FILE", help="write the figure of the motion")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write an animation that opens in a browser")
     parser.add_argument("--json", action="store_true", help="print sizes and motion as JSON instead of text")
+    parser.add_argument(
+        "--live", action="store_true", help="play the motion in the browser, again and again, until Ctrl-C"
+    )
 
 
 def load(args: argparse.Namespace) -> dojo.Mechanism:
@@ -117,6 +123,8 @@ def show(args: argparse.Namespace) -> int:
     """Print, simulate, draw; returns the exit status."""
     checks.number("--seconds", args.seconds, above=0.0)
     checks.number("--drop", args.drop)
+    if args.json and args.live:
+        raise ValueError("--json, --live: expected one of them")
     mechanism = load(args)
     sim = dojo.Simulator(mechanism, time_step=args.time_step)
     steps = max(1, round(min(args.seconds / args.time_step, 1e300)))
@@ -141,4 +149,21 @@ def show(args: argparse.Namespace) -> int:
     print(f"released for {motion.time[-1]:g} s without inputs: {motion.message}")
     for path in filter(None, (args.out, args.html)):
         print(f"wrote {path}")
+    if args.live:
+        play(motion)
     return 0 if motion.success else 1
+
+
+def play(motion: dojo.Trajectory) -> None:
+    """Play a motion in the browser in real time, with a pause at its end, until Ctrl-C."""
+    with dojo.viewer.live(motion.simulator, open_browser=True) as view:
+        print(f"playing at {view.url}; Ctrl-C ends", flush=True)
+        try:
+            while True:
+                begin = time.monotonic()
+                for moment, x in zip(motion.time, motion.x, strict=True):
+                    time.sleep(max(0.0, begin + moment - time.monotonic()))
+                    view.show(x)
+                time.sleep(_PAUSE)
+        except KeyboardInterrupt:
+            print()
