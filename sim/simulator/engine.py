@@ -27,7 +27,7 @@ from sim.model.pace import pieces, rows
 from sim.model.scratch import Scratch
 from sim.simulator.link import link_gradient, link_nodes, link_planner, link_poses, link_step
 from sim.simulator.results import Interrupted, SimulationError
-from sim.simulator.settings import Settings
+from sim.simulator.settings import Settings, of_call
 from sim.solve import start_velocity
 from solvers.compiler import Table, link
 from solvers.status import MESSAGES, Status
@@ -35,7 +35,8 @@ from solvers.types import Cube, Integers, Vector
 
 Floats = NDArray[np.float64]
 
-REPORT, CONTACT, CONE, BOUND = 6, 11, 12, 2  # numbers of a step, or of one of its contacts or limits
+# numbers of a step, in loops that follow a law one more; and of one of its contacts or limits
+REPORT, CONTACT, CONE, BOUND = 6, 11, 12, 2
 _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 
@@ -247,7 +248,7 @@ class Engine:
     def _settings_of(self, steps: int, kappa: float | None, max_iterations: int | None = None) -> Vector:
         """Settings of a call of so many steps: a single one has no deadline, and shares them with others."""
         shared = steps <= 1 and kappa is None and max_iterations is None
-        return self._settings if shared else self.settings.array(kappa, max_iterations)
+        return self._settings if shared else of_call(self._settings, kappa, max_iterations)
 
     def external(self, wrenches: Cube | None) -> Cube:
         """External wrenches as kernels take them, (T, nbody, 6), or (0, nbody, 6) where there are none."""
@@ -354,7 +355,7 @@ class Engine:
             np.zeros((knots, self.nu)),
             np.zeros((kept, ncontact, CONE)),
             np.zeros((kept, nlimit, BOUND)),
-            np.zeros(StepReport.EARLIER + 1),
+            np.zeros(REPORT + 1),
         )
 
     def closed_loop(

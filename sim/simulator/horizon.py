@@ -15,7 +15,7 @@ from sim.integrators.feedback import FeedbackLaw
 from sim.model.columns import StepReport
 from sim.simulator.arguments import Arguments
 from sim.simulator.engine import Engine
-from sim.simulator.results import Linearization
+from sim.simulator.results import STATUSES, Linearization
 from solvers.status import Status
 
 Floats = NDArray[np.float64]
@@ -116,7 +116,7 @@ class Horizon:
             x0, policy, alpha, self._limits, self._substeps, kappa, keep=keep, max_iterations=max_iterations
         )
         kept = Steps(path.cones, path.bounds) if keep else None
-        return Rollout(path.xs, path.us, Status(int(path.report[StepReport.STATUS])), knot, kept)
+        return Rollout(path.xs, path.us, STATUSES[int(path.report[StepReport.STATUS])], knot, kept)
 
     def linearize(self, xs: Floats, us: Floats, kappa: float, guess: Floats | None = None) -> Linearization:
         """Derivatives of all knots, as `Simulator.linearize_trajectory`.

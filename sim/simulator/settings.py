@@ -10,10 +10,11 @@ import numpy as np
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import WORLD
+from sim.model.columns import StepSetting
 from sim.solve.energy_balance import LARGEST_GAIN
 from solvers.types import Vector
 
-__all__ = ["LEAST_ACCURACY", "Settings", "default_kappa", "free_parts", "with_accuracy"]
+__all__ = ["LEAST_ACCURACY", "Settings", "default_kappa", "free_parts", "of_call", "with_accuracy"]
 
 LEAST_ACCURACY = 1e-12  # [m/s, rad/s]
 _CREEP = 1e-9  # [m/s]
@@ -35,13 +36,23 @@ class Settings(NamedTuple):
     loss: float = inf  # largest loss where nothing dissipates, likewise
     accuracy: float = 0.0  # error of coordinates that steps may make [m/s, rad/s]; 0: steps are not divided for it
 
-    def array(self, kappa: float | None = None, max_iterations: int | None = None) -> Vector:
-        """As kernels read it, at another kappa or limit of iterations when given, with room for a deadline (pace.py);
-        without those that choose an engine.
+    def array(self, kappa: float | None = None) -> Vector:
+        """As kernels read it, at another kappa when given, with room for a deadline (pace.py); without those
+        that choose an engine.
         """
         level = self.kappa if kappa is None else kappa
-        limits = max_iterations or self.max_iterations, inf, self.gain, self.loss
+        limits = self.max_iterations, inf, self.gain, self.loss
         return np.array((self.time_step, level, self.tolerance, *limits), dtype=np.float64)
+
+
+def of_call(settings: Vector, kappa: float | None, max_iterations: int | None) -> Vector:
+    """A copy of `Settings.array` for one call, at another kappa or limit of iterations where it has its own."""
+    out = settings.copy()
+    if kappa is not None:
+        out[StepSetting.KAPPA] = kappa
+    if max_iterations is not None:
+        out[StepSetting.MAX_ITERATIONS] = max_iterations
+    return out
 
 
 def with_accuracy(settings: Settings, accuracy: float | None, mechanism: Mechanism | None) -> Settings:
