@@ -116,7 +116,7 @@ def velocities(m: Motion, ax: Axes) -> Axes:
 
 @panel
 def controls(m: Motion, ax: Axes) -> Axes:
-    """Inputs over time, each held over its knot."""
+    """Inputs over time, each constant over its knot."""
     for k, name in enumerate(m.mechanism.input_names):
         ax.stairs(m.u[:, k], m.time, baseline=None, label=name)
     draw_limits(ax, np.transpose(m.mechanism.input_limits))
@@ -125,7 +125,7 @@ def controls(m: Motion, ax: Axes) -> Axes:
 
 @panel
 def contact_forces(m: Motion, ax: Axes) -> Axes:
-    """Mean normal force over each step of every loaded contact; the size of its friction force is dashed."""
+    """Mean normal force over each step of every loaded contact; the size of its friction force is dotted."""
     edges = np.concatenate([[0.0], m.contact_time])
     peak = m.normal_force.max(axis=0, initial=0.0)
     for i, k in enumerate(np.flatnonzero(peak > 1e-3 * peak.max(initial=0.0))):

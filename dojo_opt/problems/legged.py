@@ -83,7 +83,7 @@ def walk(
     stance: Any = None,
     **settings: Any,
 ) -> Problem:
-    """A robot walks, one foot after the other: the library's quadruped, or any one with two or four legs.
+    """A robot walks, one foot after the other: the library's quadruped, or any robot with two or four legs.
 
     Others walk for two periods of 1 s, 0.7 s on two feet, at 0.1 m/s for a height of 0.29 m, in proportion to the root
     of the height, with 20 knots each; all else is as for `trot`.

@@ -61,7 +61,7 @@ class Table:
         note: a remark (default none).
 
     Raises:
-        ValueError: a row has another number of cells.
+        ValueError: a row has the wrong number of cells.
     """
 
     title: str

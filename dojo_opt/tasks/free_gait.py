@@ -102,9 +102,9 @@ def free_gait_mpc(
     effort: float = 2e-4,
     **settings: Any,
 ) -> MPC:
-    """A quadruped walks at a commanded velocity with no gait, footfall or swing given: 20 knots of 25 ms at 40 Hz.
+    """A quadruped walks at a commanded velocity without a given gait, footholds or swings: 20 knots of 25 ms at 40 Hz.
 
-    The reference is one standing pose that moves on, see `Lead`. Squares of the trunk's position weigh 20, of its
+    The reference is one standing pose that moves forward, see `Lead`. Squares of the trunk's position weigh 20, of its
     height 80, of its rotation 10, of joint angles 1, rates a thirtieth of that, all of them ten times as much at the
     end; torques weigh `effort`, the slip of feet near the ground 3, differences of torques between diagonal legs .01.
     Costs are those of Kim et al. 2023 (arXiv 2312.08961), but for a slip that weighs three times as much, and no term
