@@ -212,8 +212,9 @@ def backward_knots(
     quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: Integers, buffer: Vector,
     until: tuple[int, float, float],
 ) -> tuple[int, int, float, float, float]:  # fmt: skip
-    """`backward` for the first so many knots, those after them done; until: their number, the gradient so far, and the
-    moment to pause [s].
+    """`backward` for a first part of the knots, once the others are done.
+
+    until: the number of these knots, the gradient so far, and the moment to pause [s].
 
     Returns the fields of the Promise, with the number of knots that are left in the place of the knot.
     """

@@ -256,7 +256,7 @@ class IdentifyOptions:
         every: number of steps from one compared state to the next (default 1).
         kappas: smoothing of contacts, one after the other [N s m]: a smooth one is felt from afar (default None: that
             of the simulator).
-        outlier: states whose errors have a root mean square above so many deviations count linearly (default 3).
+        outlier: number of deviations; states whose errors have a larger root mean square count linearly (default 3).
         tolerance: share of the cost; a smoothing ends when an iteration brings less (default 1e-4).
         max_iterations: limit per smoothing (default 30).
         verbose: whether to print a line per iteration (default False).

@@ -109,7 +109,7 @@ class Predictor:
         return self._found
 
     def steps(self, window: Window) -> Integers:
-        """The compared steps: the start, every so many, and the last one."""
+        """The compared steps: the start, steps at regular intervals, and the last one."""
         last = len(window.u)
         return np.unique(np.r_[0 : last + 1 : self._every, last])
 

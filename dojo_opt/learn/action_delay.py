@@ -19,7 +19,7 @@ class ActionDelay:
     """The last actions of every row; an episode begins with actions of 0, in the middle of their range.
 
     Args:
-        longest: delay that may be asked for [control steps].
+        longest: longest possible delay [control steps].
         rows: number of rows.
         nu: size of an action.
     """

@@ -3,7 +3,7 @@
     J_t = r_t + gamma s(x_t+1) J_t+1,      J = V of the state where a row is cut off, or the rollout ends,
     dJ_t/dx_t+1 = dr_t/dx_t+1 + gamma s dJ_t+1/dx_t+1 + gamma ds/dx_t+1 J_t+1
 
-s is the probability that an episode goes on: 1 or 0, or smooth, if the task tells it.
+s is the probability that an episode continues: 1 or 0, or smooth, if the task defines it.
 """
 
 from __future__ import annotations

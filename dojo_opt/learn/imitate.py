@@ -5,7 +5,7 @@
 
 To first order in d this is the error of actions plus spread^2 times that of the derivatives of actions by states, so a
 policy learns the gains of a plan from the same number of plans (Mordatch and Todorov 2014 use the gains, too). Targets
-are limited to [-1, 1], as inputs are. `shac(..., start=policy)` goes on from there.
+are limited to [-1, 1], as inputs are. `shac(..., start=policy)` continues from there.
 """
 
 from __future__ import annotations

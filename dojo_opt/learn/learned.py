@@ -115,7 +115,7 @@ class Learned:
 
     @classmethod
     def load(cls, path: str | Path, task: Task | None = None) -> Learned:
-        """Read a file that `save` wrote; with its task, the policy can be asked for inputs.
+        """Read a file that `save` wrote; with its task, the policy can return inputs.
 
         Args:
             path: of the file.

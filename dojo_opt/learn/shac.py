@@ -2,7 +2,7 @@
 
     L(weights) = -1/(n H) sum_i [ sum_t gamma^t r_t + gamma^H V(x_H) ],   V trained on TD(lambda) returns
 
-A row of the batch goes on where the last epoch left it; the sums start anew where its episode ends. The end of an
+A row of the batch continues where the last epoch ended; the sums start anew where its episode ends. The end of an
 episode has no derivative, so that a policy would learn to lunge into it. Where a task tells a smooth
 `survival_probability` s(x), the discount of all that follows a state is gamma s(x) instead of gamma, and is
 differentiated.

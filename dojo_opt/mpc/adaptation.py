@@ -81,7 +81,7 @@ class ParameterEstimator:
         nominal: simulator of the robot; its kappa is not used.
         planner: simulator of the plans, of the same mechanism, which takes the estimate.
         settings: what to estimate.
-        friction: largest friction that plans count on.
+        friction: largest friction that plans assume.
 
     Raises:
         ValueError: for an unknown parameter, or noise of the wrong shape.

@@ -73,7 +73,7 @@ class Delay:
             self._issued.popleft()
 
     def ahead(self, now: float, measured: Measurement) -> Vector:
-        """State (nx,) of the model when an input sent at `now` arrives: the measured one, moved on by the delay."""
+        """State (nx,) of the model when an input sent at `now` arrives: the measured one, advanced by the delay."""
         return self._predict(now, measured, self._acting)
 
     def acting(self, now: float, u: Vector) -> Vector:

@@ -27,7 +27,7 @@ def results_in_order(
     Args:
         function: at module level, so that other processes can import it.
         calls: its arguments.
-        executor: whose workers run all calls; None: each is run here when its result is asked for.
+        executor: whose workers run all calls; None: each is run here when its result is requested.
 
     Yields:
         One result per call.

@@ -104,7 +104,7 @@ def _pendulum(calls: Callable[[Any], None], order: int = 2) -> None:
 
 
 def _divisions() -> None:
-    """Divided steps without dampers, and with those whose impulses are handed on."""
+    """Divided steps without dampers, and with dampers whose impulses carry over."""
     for damper in (0.0, 0.01):
         divisions(dojo.Simulator(dojo.models.pendulum(damper=damper), time_step=0.01))
 

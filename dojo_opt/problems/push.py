@@ -206,7 +206,7 @@ def _states(sim: Simulator, hands: Array, places: Array) -> Array:
 
 
 def _weights(arm: int, far: float) -> Array:
-    """(ndx,) weights of squares of a scene with so many degrees of freedom of the arm."""
+    """(ndx,) weights of squares of a scene with a given number of degrees of freedom of the arm."""
     place = [*[_PLACE / far**2] * 3, *[_TURN] * 3]
     return np.array([_ANGLE] * arm + place + [_RATE] * arm + [_RATE * w for w in place])
 

@@ -103,7 +103,7 @@ def clocked(run: Callable[[], Any], rounds: int = 3, idle: Callable[[], Any] | N
 
 
 def _median(run: Callable[[], Any], count: int) -> float:
-    """Median processor time of so many calls, half a second of them at most [s]."""
+    """Median processor time of a given number of calls, within half a second [s]."""
     seconds: list[float] = []
     while len(seconds) < count and (not seconds or sum(seconds) < 0.5):
         start = time.process_time()

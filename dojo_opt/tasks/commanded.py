@@ -75,7 +75,7 @@ class _Place:
         return other.back().then(self)
 
     def times(self, count: float) -> _Place:
-        """This motion so many times."""
+        """This motion, repeated."""
         turn = np.exp(1j * self.heading)
         straight = abs(turn - 1.0) < 1e-12
         far = count if straight else (1.0 - np.exp(1j * self.heading * count)) / (1.0 - turn)

@@ -33,12 +33,12 @@ _SLIP, _NEAR = 3.0, 0.03  # [1/(m/s)^2], [m]
 _SERVO = 40.0, 1.0  # [N m/rad], [N m s/rad]
 _DIAGONAL = ((0, 3), (1, 2))  # legs in the order of the inputs
 _LEAD, _AHEAD = 0.35, 1.0  # [m], [s] with .35 m a robot that is asked for .6 m/s walks at .45 to .5
-_CAREFUL = 0.75  # share of the friction that plans count on: with half of it a robot on a slope expects to creep
+_CAREFUL = 0.75  # share of the friction that plans assume: with half of it a robot on a slope expects to creep
 _LEG = 3  # inputs of a leg: hip, thigh and calf
 
 
 class Lead:
-    """One pose that moves on at a commanded velocity, and waits for a robot that falls behind.
+    """One pose that moves at a commanded velocity, and waits for a robot that falls behind.
 
     It is the same at all knots of a horizon, and at most `lead` ahead of where the robot is measured.
 

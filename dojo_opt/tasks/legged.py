@@ -30,7 +30,7 @@ _GAITS = ("trot", "walk", "pace", "bound", "hop")
 _KNOT, _KNOTS, _HORIZON = 0.04, 12, 20  # [s], of a period, of a plan
 _SPEED, _LIFT, _KAPPA = 0.2, 0.05, 1e-3  # [m/s], [m], [N s m]
 _BASE, _ANGLE, _VELOCITY, _RATE, _EFFORT = 10.0, 1.0, 0.1, 0.01, 1e-4
-_CAREFUL = 0.5  # share of the friction that plans count on
+_CAREFUL = 0.5  # share of the friction that plans assume
 
 
 def legged_mpc(

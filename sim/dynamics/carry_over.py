@@ -94,7 +94,7 @@ def advance(model: Model, data: Data, h: float, q: Vector, v: Vector, before: Ve
     Columns stay those of the same poses, about the new O; but for quaternion joints, whose axes are those of the new
     configuration 2: R2 of the body itself, and R1 exp(h w).
 
-    Configuration 3 is 2 and a displacement, rounded: every so many steps, 2 comes from its coordinates anew.
+    Configuration 3 is 2 and a displacement, rounded: at regular intervals, 2 is computed from its coordinates anew.
     """
     _hand_on(model, data)
     x, y, z = before[0] - data.origin[0], before[1] - data.origin[1], before[2] - data.origin[2]

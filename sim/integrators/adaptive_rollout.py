@@ -1,6 +1,6 @@
 """The loop over time of steps with an accuracy: each is a stretch of sub-steps (adaptive.py) under its own input.
 
-A motion that has to go back to Python within a stretch goes on there: the stretch keeps where it stands (Clock).
+A motion that returns to Python within a stretch continues from there: the stretch keeps its state (Clock).
 """
 
 from __future__ import annotations

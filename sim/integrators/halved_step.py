@@ -73,7 +73,7 @@ def _difference(
 
     v, v': after an impact, as means of another step, in which the ground has acted. Without an impact these do not
     count: they are as different as the gap of a contact is, over the length of the step.
-    t: the rest of the stretch, at least half a second: for so long an error of the velocity goes on.
+    t: the rest of the stretch, at least half a second: the time over which an error of the velocity counts.
     """
     model, data = model_view(model_at), data_view(data_at)
     nq, hits = data.theta1.shape[0], line.clock[Clock.HIT] > 0.0

@@ -9,7 +9,7 @@ half of their impulse at a node belongs to each of its steps.
 
 f: generalized forces of inputs and external wrenches. The step lets all their impulse h f act at its first node; half
 of it belongs to its last, as of the impulse of dampers. So steps of different lengths follow one another at second
-order, and without these forces momentum is handed on as it is.
+order, and without these forces momentum carries over unchanged.
 
 Impulses of contacts are not shared: p(q3, v25; h) is the momentum before the ground acts at the node. The step that
 begins there makes up for the gravity of both its halves, whatever their lengths.

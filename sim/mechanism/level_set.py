@@ -144,7 +144,7 @@ class LevelSet:
         return float(volume), first, second
 
     def _parts(self, cells: Integers) -> Iterator[Floats]:
-        """Centres of the parts of cells, so many at once as memory takes."""
+        """Centres of the parts of cells, in portions that fit the memory."""
         steps = (np.array(list(product(range(_PARTS), repeat=3))) + 0.5) / _PARTS
         for start in range(0, len(cells), _CHUNK // 64):
             some = cells[start : start + _CHUNK // 64]

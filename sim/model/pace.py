@@ -28,7 +28,7 @@ _DEADLINE = int(StepSetting.DEADLINE)  # NumPy takes three times as long with th
 
 
 def pieces(settings: Vector, steps: int) -> Iterable[None]:
-    """A deadline for each piece of a call of so many steps, as many as it takes; a single step has none."""
+    """Deadlines for the pieces of a call with a given number of steps; a single step has none."""
     return _ONE if steps <= 1 else _pieces(settings)
 
 

@@ -81,7 +81,7 @@ class Arguments:
         return rows[0], rows[1], lead
 
     def inputs(self, method: str, name: str, u: ArrayLike, shape: tuple[int | str | None, ...]) -> Floats:
-        """Inputs of the given shape; refused where the results of so many rows do not fit the memory."""
+        """Inputs of the given shape; refused if the results of all rows do not fit the memory."""
         rows = checks.shape(f"Simulator.{method}({name})", u)[:-1]
         if prod(rows) > _MANY:
             slopes = self._engine.ndx * (self._engine.ndx + self.nu) if method.startswith("linearize") else 0

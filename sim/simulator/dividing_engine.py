@@ -1,7 +1,7 @@
 """Engine that divides steps: one that cannot be solved, or turns a body too far, becomes 2, 4, ... steps of order 2.
 
 The parts are steps of h/n at kappa/n, so contacts press with the same force kappa/(n h/n gap) at the same gap. The
-momentum of the node is handed on at both ends, to rounding (intervals.py): the mean velocity of a state over its
+momentum of the node is conserved at both ends, to rounding (intervals.py): the mean velocity of a state over its
 interval becomes that over h/n which has the same momentum, and after n steps the other way round.
 
 A divided step depends on its state and input alone, never on the steps before it, and neither does the next one. Its
@@ -121,7 +121,7 @@ class DividingEngine(Engine):
         *,
         derivatives: bool = False,
     ) -> Divided | None:
-        """The step in so many parts; None where one of them is not solved. given: input, external wrenches."""
+        """The step in the given number of parts; None if one of them is not solved. given: input, external wrenches."""
         engine = self.part(parts)
         part, (u, wrench) = engine.settings.time_step, given
         first = self.intervals.to_part(x, part)

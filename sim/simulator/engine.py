@@ -95,7 +95,7 @@ class Divided(NamedTuple):
 
 
 class Division(NamedTuple):
-    """Where a motion has divided steps, and how much of their momentum they handed on."""
+    """The divided steps of a motion, and the share of the momentum that each conserved."""
 
     substeps: Integers  # (T,) steps that each was divided into, 1 for whole ones
     shares: Floats  # (T,) of the momentum of bodies against each other, 1 where all was handed on
@@ -103,7 +103,7 @@ class Division(NamedTuple):
 
     @classmethod
     def none(cls, steps: int) -> Division:
-        """That of so many whole steps."""
+        """The division of a given number of undivided steps."""
         substeps, shares = np.empty(steps, dtype=np.int64), np.empty(steps)
         substeps.fill(1)  # np.ones takes ten times as long, a tenth of the Python of a step
         shares.fill(1.0)
@@ -246,7 +246,7 @@ class Engine:
         self._scratch.turn()
 
     def _settings_of(self, steps: int, kappa: float | None, max_iterations: int | None = None) -> Vector:
-        """Settings of a call of so many steps: a single one has no deadline, and shares them with others."""
+        """Settings of a call with a given number of steps; those of a single step have no deadline, and are shared."""
         shared = steps <= 1 and kappa is None and max_iterations is None
         return self._settings if shared else of_call(self._settings, kappa, max_iterations)
 
@@ -347,7 +347,7 @@ class Engine:
         raise NotImplementedError
 
     def _path(self, knots: int, *, keep: bool, cones: bool = True) -> Path:
-        """Buffers of a rollout of so many knots; without `cones`, those of contacts and limits are empty."""
+        """Buffers of a rollout with a given number of knots; without `cones`, none of contacts and limits."""
         kept = knots if keep else 0
         ncontact, nlimit = (self.sizes.ncontact, self.sizes.nlimit) if cones else (0, 0)
         return Path(

@@ -3,7 +3,7 @@
 P(q, v'; h') = P(q, v; tau),      tau: interval of the state (start_velocity.py),  h': time step of the parts
 
 P = M (M + C)^-1 p is the momentum of the node: that which arrives, p, after half the impulse of the dampers, C
-(dynamics/joints/damper.py). Both states have the same velocity at the node, so the energy is handed on as well.
+(dynamics/joints/damper.py). Both states have the same velocity at the node, so the energy carries over as well.
 """
 
 from __future__ import annotations

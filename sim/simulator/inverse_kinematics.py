@@ -257,7 +257,7 @@ def _room(kin: Kinematics, q: Floats, low: Floats, high: Floats) -> tuple[Floats
 
 
 def _inside(kin: Kinematics, q: Floats, low: Floats, high: Floats) -> Floats:
-    """q with its coordinates moved to their limits where they are beyond."""
+    """q with coordinates beyond their limits moved to them."""
     at = _coordinates(kin, q)
     return kin.moved(q, np.clip(at, low, high) - at)
 

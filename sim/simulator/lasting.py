@@ -11,7 +11,7 @@ from sim.mechanism.checks import whole_number
 
 
 def lasting(sim: Any, kappa: float | None, us: Any, steps: int | None, duration: float) -> tuple[Any, int]:
-    """(simulator, number of its steps) of a rollout of so many seconds: of one step for each input, or of `steps`.
+    """(simulator, number of its steps) of a rollout of a given duration: of one step for each input, or of `steps`.
 
     sim: a Simulator; kappa: the one it was given, None for that of its time step.
     Contacts press with the same force kappa/(h gap), whatever the step h.

@@ -254,8 +254,8 @@ def ship(base: Path, folder: Path, target: str) -> tuple[Path, int]:
         The file, and the number of its entries.
 
     Raises:
-        RuntimeError: sources were edited since this process began, so nobody knows which of them was compiled; or there
-            is nothing compiled with the flags of this process.
+        RuntimeError: sources were edited since this process began, so the compiled version is unknown; or there is
+            nothing compiled with the flags of this process.
     """
     if stamp.__wrapped__() != stamp():
         raise RuntimeError("sources of kernels were edited during the build; build again")

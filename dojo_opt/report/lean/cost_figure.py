@@ -7,7 +7,7 @@ from typing import Any
 
 
 def cost_figure(name: str, rows: Sequence[dict[str, Any]]) -> Any:
-    """Time of a robot as it is and without each feature.  A matplotlib Figure."""
+    """Time of a robot with all features and without each of them.  A matplotlib Figure."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.0, 0.5 * len(rows) + 1.6), layout="constrained")

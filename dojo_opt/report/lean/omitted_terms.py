@@ -19,7 +19,7 @@ from solvers.compiler import threads
 
 @dataclass(frozen=True)
 class OmittedTerms:
-    """A robot as it is, and without each of its features; quick: fewer rounds; cold: cold starts by feature, too."""
+    """A robot with all features, and without each of them; quick: fewer rounds; cold: cold starts by feature, too."""
 
     mechanism: Mechanism
     quick: bool = False
@@ -37,7 +37,7 @@ class OmittedTerms:
 
 
 def _robot(report: Report, mechanism: Mechanism, time_step: float, rounds: int, progress: Progress) -> None:
-    """A robot as it is, and without each of its features."""
+    """A robot with all of its features, and without each of them."""
     report.summary = (
         f"{mechanism.name}, moving freely from its neutral state with {1e3 * time_step:g} ms steps; then without each "
         "of its features. The cost of a feature is the time saved without it: processor time on one core, medians "

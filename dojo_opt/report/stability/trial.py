@@ -72,7 +72,7 @@ class StabilityTrial:
     def judge(self, run: Run, *, ours: bool) -> TrialVerdict:
         """The rule applied.
 
-        Only dojo-opt must refuse states that cannot be represented; an engine that goes on is measured.
+        Only dojo-opt must refuse states that cannot be represented; an engine that continues is measured.
         """
         if self.refusal and ours:
             refused = self.refusal in run.message

@@ -24,7 +24,7 @@ __all__ = ["air_hockey"]
 _KNOT, _HORIZON, _RATE = 0.05, 40, 200.0  # [s], knots, [Hz]
 _NEAR = 0.1  # [m] off the goal at the end
 _KAPPA = 3e-5  # [N s m] at 1e-4 a contact that acts at a distance leaves the puck 9 cm off
-_FRICTION = 0.3  # that plans count on: with all of 1 they turn the puck by its rim, lose it, and end 20 cm off
+_FRICTION = 0.3  # assumed by plans: with all of 1 they turn the puck by its rim, lose it, and end 20 cm off
 _MASS, _RADIUS, _HEIGHT = 0.1, 0.1, 0.05  # [kg], [m], [m] of either disc
 _START, _GOAL = (0.0, 0.5, 0.0), (0.3, 1.0, 1.0)  # [m, m, rad] of the puck
 

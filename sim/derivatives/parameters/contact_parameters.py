@@ -87,7 +87,7 @@ def shape_of(mech: Mechanism, collision: Collision, letter: str) -> Solid:
 def _sizes(
     collision: Collision, letter: str, shape: Solid, side: int, touches: dict[int, Touch]
 ) -> Iterator[tuple[str, float, tuple[Term, ...]]]:
-    """(component, value, terms) of the sizes of a shape; a polytope has a factor of its corners, 1 as it is."""
+    """(component, value, terms) of the sizes of a shape; a polytope has one factor of its corners, 1 by default."""
     if isinstance(shape, String):
         if letter == "a":  # that of b has no meaning
             ends = [(Effect.SHAPE_SIZE, j, SIDE * s + Size.STRING, 1.0) for j in touches for s in (0, 1)]
