@@ -115,7 +115,7 @@ def test_the_report_lists_cold_starts_on_request_the_worst_first(monkeypatch):
     made = study("lean", quick=True, mechanism=dojo.models.pendulum(), cold=True).run(Progress())
     (table,) = made.tables
     assert [line[0] for line in table.rows] == ["spring", "pendulum"]
-    assert (made.rows[-1].name, made.rows[-1].value, made.rows[-1].note) == ("the worst", 7.5, "spring")
+    assert (made.rows[-1].name, made.rows[-1].value, made.rows[-1].note) == ("the worst cold start", 7.5, "spring")
     assert not study("lean", mechanism=dojo.models.pendulum()).run(Progress()).tables
     with pytest.raises(ValueError, match="--cold: it belongs to the report lean, got timing"):
         report(cli._parser().parse_args(["report", "timing", "--cold"]))

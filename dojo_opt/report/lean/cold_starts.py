@@ -253,5 +253,5 @@ def add_cold_starts(report: Report, progress: Progress, *, quick: bool = False) 
     header = ("", "beyond", "without [s]", "it adds [s]", "with [s]", "functions without", "it adds")
     report.tables.append(Table("Processor time to the first step, empty cache", header, lines))
     worst = str(lines[0][0])
-    report.rows.append(Row("the worst", found[worst].seconds, "s", note=worst))
+    report.rows.append(Row("the worst cold start", found[worst].seconds, "s", note=worst))
     return found
