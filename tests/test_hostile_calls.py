@@ -127,6 +127,28 @@ def test_jax_refuses_what_are_no_real_numbers() -> None:
         jax.config.update("jax_enable_x64", before)
 
 
+NAMELESS = {
+    "Body(name=...)": lambda: dojo.Body("\ud800", 1.0),
+    "Joint(name=...)": lambda: dojo.Joint("floating", None, "a", "\udcff"),
+    "Kinematics(sim)": lambda: dojo.Kinematics(None),
+    "Kinematics.moved(q)": lambda: dojo.Kinematics(SIM).moved(None, np.zeros(1)),
+    "Kinematics.moved(dq)": lambda: dojo.Kinematics(SIM).moved(np.zeros(1), np.nan),
+    "gaits.step(sim)": lambda: dojo.gaits.step(SIM.mechanism),
+    "JointLimits(joints=...)": lambda: dojo.Problem(
+        SIM,
+        SIM.neutral(),
+        horizon=3,
+        cost=[dojo.cost.Effort(1.0)],
+        constraints=[dojo.constraint.JointLimits(joints=3.0)],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", NAMELESS)
+def test_constructors_refuse_by_name(name: str) -> None:
+    check_refused(NAMELESS[name], name)
+
+
 # -- the command line --------------------------------------------------------------------------------------------------
 
 COMMANDS: dict[str, tuple[list[str], str]] = {

@@ -58,10 +58,12 @@ def step(
         The gait: that of `after`, then the step.
 
     Raises:
-        TypeError: `after` is not a Gait.
+        TypeError: `sim` is not a Simulator, or `after` not a Gait.
         ValueError: for an argument out of range, a robot that has not two feet, a foot that cannot reach its place, or
             an `after` of another robot or time step.
     """
+    if not isinstance(sim, Simulator):
+        raise TypeError(f"gaits.step(sim): expected a Simulator, got {checks.shown(sim)}")
     for name, value in (("length", length), ("step_height", step_height), ("lower", lower)):
         checks.number(f"gaits.step({name}=...)", value)
     feet = Feet(sim)

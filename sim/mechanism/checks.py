@@ -163,6 +163,10 @@ def name(call: str, value: Any) -> str:
     """`value` as a name that is not empty."""
     if not isinstance(value, str) or not value:
         raise ValueError(f"{call}: expected a name, got {shown(value)}")
+    try:
+        value.encode()
+    except UnicodeEncodeError:  # half a character, as of bytes that are not UTF-8
+        raise ValueError(f"{call}: expected a name of whole characters, got {shown(value)}") from None
     return value
 
 

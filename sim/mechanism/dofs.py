@@ -44,7 +44,7 @@ def components(call: str, joints: Sequence[Joint], names: str | Iterable[str]) -
         spans[joint.name] = list(range(stop, stop := stop + joint.nv))
     rates = {"v" if name == "q" else _RATE + name: [len(parts) + i for i in span] for name, span in spans.items()}
     known = spans | rates
-    chosen = [names] if isinstance(names, str) else list(names)
+    chosen = (names,) if isinstance(names, str) else checks.names(call, names)
     return np.array([i for name in chosen for i in known[_known(call, name, known)]], dtype=np.int64)
 
 

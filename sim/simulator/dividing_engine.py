@@ -102,13 +102,14 @@ class DividingEngine(Engine):
     ) -> Divided | None:
         """The step from x (nx,) under u (nu,) and external wrenches (1 or 0, nbody, 6) in as few parts as possible.
 
-        None where LARGEST_DIVISION parts are not enough.
+        None where LARGEST_DIVISION parts are not enough; with derivatives also where the end loses momentum, which has
+        none. More parts might keep it, but they would be another step.
         """
         parts = 2
         while parts <= LARGEST_DIVISION:
             found = self.in_parts(parts, x, (u, wrench), kappa, derivatives=derivatives)
             if found is not None:
-                return found
+                return None if derivatives and found.share < 1.0 else found
             parts *= 2
         return None
 
@@ -136,7 +137,7 @@ class DividingEngine(Engine):
         end = self.intervals.from_part(last, part)
         if end is not None:
             return Divided(engine, rolled, end, 1.0)
-        slowed = None if derivatives else self.intervals.slowed(last, part)
+        slowed = self.intervals.slowed(last, part)
         return None if slowed is None else Divided(engine, rolled, *slowed)
 
     def interval(self, x: Vector) -> float:

@@ -34,9 +34,14 @@ class Kinematics:
 
     Args:
         sim: the simulator.
+
+    Raises:
+        TypeError: `sim` is not a Simulator.
     """
 
     def __init__(self, sim: Simulator) -> None:
+        if not isinstance(sim, Simulator):
+            raise TypeError(f"Kinematics(sim): expected a Simulator, got {checks.shown(sim)}")
         self.sim = sim
         mech = self.mechanism = sim.mechanism
         self._bodies = {name: i for i, name in enumerate(mech.body_names)}
@@ -279,7 +284,7 @@ class Kinematics:
     def _q(self, call: str, q: ArrayLike) -> Floats:
         return _rows(call, q, self.sim.nq)
 
-    def moved(self, q: Floats, dq: Floats) -> Floats:
+    def moved(self, q: ArrayLike, dq: ArrayLike) -> Floats:
         """Coordinates moved by a perturbation, as in `Simulator.integrate`.
 
         Args:
@@ -288,7 +293,11 @@ class Kinematics:
 
         Returns:
             (..., nq) coordinates.
+
+        Raises:
+            ValueError: a shape is wrong, or a number not finite.
         """
+        q, dq = self._q("Kinematics.moved(q)", q), _rows("Kinematics.moved(dq)", dq, self.sim.nv)
         still = np.zeros((*q.shape[:-1], self.sim.nv))
         x = np.concatenate([q, still], axis=-1)
         return np.asarray(self.sim.integrate(x, np.concatenate([dq, np.zeros_like(dq)], axis=-1)))[..., : self.sim.nq]

@@ -265,6 +265,25 @@ def test_steps_that_division_cannot_solve_keep_their_reason() -> None:
         dojo.Simulator(models.quadruped(), divide=3)  # type: ignore[arg-type]
 
 
+def test_a_step_that_loses_momentum_has_no_derivatives_of_another_division(
+    whip: tuple[dojo.Simulator, Floats], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the fewest parts end without a state of their momentum, more parts may have one: that is another step."""
+    sim, x = whip
+    before = sim.rollout(x, steps=20)
+    knot = int(np.flatnonzero(before.substeps > 1)[0])
+    x = before.x[knot]
+    intervals, parts = engine(sim).intervals, before.substeps[knot]
+    real = intervals.from_part
+    fewest = sim.time_step / parts
+    monkeypatch.setattr(intervals, "from_part", lambda y, part: real(y, part) if part < 0.9 * fewest else None)
+    monkeypatch.setattr(intervals, "slowed", lambda y, part: (real(y, part), 0.5))
+    ended = sim.step(x)
+    assert (ended.substeps, ended.share) == (parts, 0.5)
+    assert not sim.linearize(x, np.zeros(sim.nu)).success
+    assert not sim.linearize_rollout(x, np.zeros((1, sim.nu)))[1].success
+
+
 def test_ctrl_c_inside_a_division_keeps_the_steps_before(
     whip: tuple[dojo.Simulator, Floats], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -43,8 +43,9 @@ class JointLimits(Spec):
         weight = checks.number("JointLimits(weight=...)", self.weight, at_least=0.0)
         mech = sim.mechanism
         limited = {j.name: j for j in mech.joints if j.limits and np.isfinite(j.limits).any()}
-        wanted = [self.joints] if isinstance(self.joints, str) else self.joints
-        names = list(limited) if wanted is None else [checks.one_of("JointLimits(joints)", n, limited) for n in wanted]
+        wanted = (self.joints,) if isinstance(self.joints, str) else self.joints
+        words = limited if wanted is None else checks.names("JointLimits(joints=...)", wanted)
+        names = [checks.one_of("JointLimits(joints=...)", name, limited) for name in words]
         if not names:
             raise ValueError(f"JointLimits(): no joint of {mech.name!r} has limits")
         columns, signs, bounds = [], [], []
