@@ -26,6 +26,7 @@ import dojo_opt as dojo
 from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report import STUDIES
 from dojo_opt.report.command import CHECKOUT, MOVED, add_arguments, report
+from dojo_opt.tasks.plan_task import PlanTask
 from dojo_opt.viewer.show import add_show, show
 from sim.mechanism.checks import nearest, one_of
 
@@ -33,7 +34,7 @@ from sim.mechanism.checks import nearest, one_of
 PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap")
 GAITS = ("trot", "bound", "pace", "walk", "turn", "jump", "leap")
 LOOPS = ("free_gait_mpc", "hopper_mpc", "quadruped_mpc")  # run in closed loop with a plant
-SUITES = ("idto",)  # of tasks that are run by SUITE.TASK, such as idto.spinner
+SUITES = ("crisp", "idto")  # of tasks that are run by SUITE.TASK, such as idto.spinner
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -43,7 +44,9 @@ def _parser() -> argparse.ArgumentParser:
 
     text = "Plan a reference problem, or run a closed-loop task."
     run = commands.add_parser("run", help="plan a reference problem, or run a closed-loop task", description=text)
-    run.add_argument("name", metavar="NAME", help=", ".join([*PROBLEMS, *LOOPS, "idto.TASK"]))
+    run.add_argument(
+        "name", metavar="NAME", help=", ".join([*PROBLEMS, *LOOPS, *(f"{suite}.TASK" for suite in SUITES)])
+    )
     run.add_argument(
         "--set",
         action="append",
@@ -158,6 +161,8 @@ def _run_suite(args: argparse.Namespace) -> int:
     given = _arguments(args.set)
     seed = given.pop("seed", None)
     task = getattr(there, name)(**given)
+    if isinstance(task, PlanTask):
+        return _plan_task(args, task)
     loop = task.run(seed, task.plant(seed, **_arguments(args.perturb)), args.seconds)
     outcome = task.outcome(loop)
     if args.out:
@@ -175,6 +180,27 @@ def _run_suite(args: argparse.Namespace) -> int:
         print("  " + ", ".join(f"{measure} {value:.3g}" for measure, value in outcome.measures.items()))
         ticks = "ticks at {rate_hz:g} Hz: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms of the processor"
         print((ticks + ", {fallbacks} fallbacks; penetration {penetration_mm:.2g} mm").format(**numbers))
+    return 0 if outcome.success else 1
+
+
+def _plan_task(args: argparse.Namespace, task: PlanTask) -> int:
+    if args.perturb or args.seconds is not None or "seed" in _arguments(args.set):
+        raise ValueError(f"--perturb, --seconds and seed apply to closed loops; {args.name} is a plan")
+    begin = time.process_time()
+    plan = task.run()
+    seconds = time.process_time() - begin
+    outcome = task.outcome(plan)
+    if args.out:
+        dojo.plots.trajectory(plan).savefig(args.out, dpi=150)
+    if args.html:
+        dojo.viewer.save_html(plan, args.html)
+    numbers = {"task": args.name, "message": plan.message, "seconds": seconds, **outcome._asdict()}
+    if args.json:
+        print(json.dumps(numbers | {"x": plan.x.tolist(), "u": plan.u.tolist()}))
+    else:
+        print(f"{'success' if outcome.success else 'no success'}: {plan.message}")
+        print("  " + ", ".join(f"{measure} {value:.3g}" for measure, value in outcome.measures.items()))
+        print("cost {cost:.4g}, {iterations} iterations, {seconds:.2f} s of the processor".format(**numbers))
     return 0 if outcome.success else 1
 
 
