@@ -133,22 +133,24 @@ class Plant:
         Raises:
             ValueError: the shape of the command is wrong, or a number is not finite.
         """
-        checks.array("Plant.step(command)", command, (self.sim.nu,))
-        self._waiting.append(np.array(command, dtype=np.float64))  # its owner may write into it meanwhile
-        if len(self._waiting) > self._late:
-            acting = self._waiting.popleft()
-        else:
-            acting = self._waiting[0]  # the first command also acted before
-        u = np.clip(acting, *self._limits)
+        given = checks.array("Plant.step(command)", command, (self.sim.nu,))
+        lowest, highest = self._limits
+        u = np.maximum(given, lowest)  # a copy: its owner may write into the command meanwhile
+        np.minimum(u, highest, out=u)
+        if self._late:
+            self._waiting.append(u)
+            late = len(self._waiting) > self._late
+            u = self._waiting.popleft() if late else self._waiting[0].copy()  # the first command also acted before
         if self.perturbation.pushes:
             end = self.time + self.sim.time_step
             u = np.concatenate([u, self.perturbation.push_forces(self.sim.mechanism, self.time, end)])
         result = self.simulator.step(self.x, u)
         if not result.success:
             result = self._soften(u, result)
-        if result.success:
-            self.x = result.x
-            self.steps += 1
+            if not result.success:
+                return u, result
+        self.x = result.x
+        self.steps += 1
         return u, result
 
     def _soften(self, u: Vector, result: StepResult) -> StepResult:
