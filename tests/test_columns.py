@@ -107,3 +107,29 @@ def test_no_setting_and_no_column_of_a_report_is_a_number() -> None:
     rooms = ("integrators", "simulator", "solve", "model")
     files = [SIM / "step.py", *(file for room in rooms for file in (SIM / room).rglob("*.py"))]
     assert [text for file in files for text in loop_numbers_of(file.read_text())] == []
+
+
+def state_numbers_of(source: str) -> list[str]:
+    """Subscripts of states by numbers beyond the first four: columns that state_columns.py names."""
+    found = []
+    for node in (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Subscript)):
+        name, last = ast.unparse(node.value).split(".")[-1], node.slice
+        last = last.elts[-1] if isinstance(last, ast.Tuple) else last
+        ends = (last.lower, last.upper) if isinstance(last, ast.Slice) else (last,)
+        numbers = [end.value for end in ends if isinstance(end, ast.Constant) and isinstance(end.value, int)]
+        if re.fullmatch(r"z|zs|x|xs|after|states?|start|goal|begin|home|now|first|back|change|contacts", name):
+            found += [ast.unparse(node)] * any(number > 3 for number in numbers)
+    return found
+
+
+def test_no_part_of_a_state_is_a_number() -> None:
+    found = state_numbers_of("z[..., 6:10] + loop.x[:, 7] + x[3:7] + after[13] + x[:3] + x[nq] + x[2] + goal[JOINTS:]")
+    assert sorted(found) == ["after[13]", "loop.x[:, 7]", "x[3:7]", "z[..., 6:10]"]
+    files = [file for package in ("sim", "dojo_opt") for file in (SIM.parent / package).rglob("*.py")]
+    assert {f"{file.name}: {text}" for file in files for text in state_numbers_of(file.read_text())} == set()
+
+
+def test_no_size_of_the_second_shape_of_a_pair_is_a_number() -> None:
+    """PairSize.B is where they begin."""
+    texts = [file.read_text() for file in (SIM / "contact").rglob("*.py")]
+    assert [found for text in texts for found in re.findall(r"\bsizes\[[4-7]\]", text)] == []

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.gait import Gait, assemble
 from sim.mechanism import checks
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -149,4 +150,4 @@ def balanced(feet: Feet, x: Array, path: Array, goal: Array) -> Array:
         if np.abs(goal - centre).max() < _CLOSE:
             break
         x[:, :2] += goal - centre
-    return np.asarray(x[:, :7])
+    return np.asarray(x[:, BaseState.POSE])

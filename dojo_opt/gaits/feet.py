@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.planning.manifold import cross
 from sim.mechanism import checks
+from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -70,9 +71,9 @@ class Feet:
             (..., k, 3) centres, world axes [m].
         """
         z = self.sim.maximal(x)[..., self._body, :]
-        w, v = z[..., 6:7], z[..., 7:10]
+        w, v = z[..., BodyState.SCALAR], z[..., BodyState.VECTOR]
         side = cross(v, self._point)
-        return np.asarray(z[..., :3] + self._point + 2.0 * (w * side + cross(v, side)))
+        return np.asarray(z[..., BodyState.POSITION] + self._point + 2.0 * (w * side + cross(v, side)))
 
     def gaps(self, x: ArrayLike) -> Array:
         """Distances of the balls from the ground.
@@ -124,7 +125,7 @@ class Feet:
             The points, fixed on their bodies.
         """
         z = self.sim.maximal(x)[self._body]
-        w, v, arm = z[:, 6:7], -z[:, 7:10], -self.radius[:, None] * self.normals(x)
+        w, v, arm = z[:, BodyState.SCALAR], -z[:, BodyState.VECTOR], -self.radius[:, None] * self.normals(x)
         side = cross(v, arm)
         other = copy.copy(self)
         other._point = self._point + arm + 2.0 * (w * side + cross(v, side))

@@ -12,6 +12,7 @@ from dojo_opt.gaits.feet import Feet
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.parts import Input, Joint
 from sim.mechanism.servos import passive
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -138,7 +139,7 @@ def _pyramid(feet: Feet) -> Array:
 def assemble(sim: Simulator, name: str, base: Array, feet: Array, contact: Booleans, *, names: tuple[str, ...]) -> Gait:
     """Gait from the pose of the base (T + 2, 7) and the feet (T + 2, k, 3) at times -h, 0, ..., T h."""
     x = np.tile(sim.neutral(), (len(base), 1))
-    x[:, :7] = base
+    x[:, BaseState.POSE] = base
     x = Feet(sim, names).place(x, feet)
     steps = sim.difference(x[1:], x[:-1])[:, : sim.nv]
     x = x[1:]

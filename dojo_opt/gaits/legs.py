@@ -13,6 +13,7 @@ from dojo_opt.gaits.feet import Feet
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Contact, Joint
+from sim.model.state_columns import BodyState
 from sim.simulator.inverse_kinematics import ik
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
@@ -220,7 +221,7 @@ def _origin(sim: Simulator, joint: Joint, x: Array) -> Array:
     """Place of the joint point on the child of a joint."""
     i = sim.mechanism.body_names.index(joint.child)
     z = sim.bodies(x[: sim.nq], np.zeros(sim.nv))[i]
-    w, v = z[6], z[7:10]
+    w, v = z[BodyState.SCALAR], z[BodyState.VECTOR]
     point = np.asarray(joint.child_point, dtype=float)
     side = np.cross(v, point)
-    return np.asarray(z[:3] + point + 2.0 * (w * side + np.cross(v, side)))
+    return np.asarray(z[BodyState.POSITION] + point + 2.0 * (w * side + np.cross(v, side)))

@@ -19,6 +19,7 @@ from dojo_opt.gaits.footfall import Footfall
 from dojo_opt.gaits.gait import Gait, assemble
 from sim.mechanism import checks
 from sim.mechanism.memory import room_for
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -185,7 +186,7 @@ def stand(sim: Simulator, *, duration: float = 1.0, height: float | None = None)
     _check_legs("gaits.stand", sim)
     steps = _whole("gaits.stand(duration=...)", duration, sim.time_step)
     feet, ground = Feet(sim), _ground(sim)
-    base = np.tile(sim.neutral()[:7], (steps + 2, 1))
+    base = np.tile(sim.neutral()[BaseState.POSE], (steps + 2, 1))
     if height is not None:
         base[:, 2] = checks.number("gaits.stand(height=...)", height)
     places = np.tile(ground, (steps + 2, 1, 1))
@@ -236,7 +237,7 @@ def jump(
     ends = np.cumsum([0, sink, push, fly, push, rest]) * h
     t = h * np.arange(-1, round(ends[-1] / h) + 1)
     forward, up = _jump_path(np.clip(t, 0.0, None), ends, distance, crouch, height)
-    base = np.tile(sim.neutral()[:7], (len(t), 1))
+    base = np.tile(sim.neutral()[BaseState.POSE], (len(t), 1))
     base[:, 0] += forward
     base[:, 2] += up
     share = np.clip((t - ends[2]) / (ends[3] - ends[2]), 0.0, 1.0)
@@ -247,7 +248,7 @@ def jump(
     soles = Feet(sim)
     if soles.flat:  # nothing but the feet keeps the robot from falling forward
         x = np.tile(sim.neutral(), (len(t), 1))
-        x[:, :7] = base
+        x[:, BaseState.POSE] = base
         middle = feet[0, :, :2].mean(axis=0)
         base = balanced(soles, x, feet, middle + np.stack([forward, np.zeros_like(forward)], axis=1))
     return assemble(sim, "jump", base, feet, contact, names=soles.names)

@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 SIZE = 10
 LABELS = ("a", "d0", "d1", "d2", "s0", "s1", "s2", "t0", "t1", "t2")
 _ABOVE = ((0, 1), (1, 2), (0, 2))  # of s
+_DIAGONAL, _OFF_DIAGONAL, _CENTER = slice(1, 4), slice(4, 7), slice(7, 10)  # of the coordinates, after the mass
+_CENTER_OF_BODY, INERTIA = slice(1, 4), slice(4, 10)  # of a body, after the mass
 _ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # xx, yy, zz, xy, xz, yz
 
 
@@ -40,24 +42,24 @@ def coordinates(call: str, mass: float, inertia: Floats) -> Floats:
         raise ValueError(f"{call}: the body is flat (least second moment {least:g} kg m^2); give it a thickness")
     L = np.linalg.cholesky(C[::-1, ::-1] / mass)[::-1, ::-1]
     out = np.zeros(SIZE)
-    out[0], out[1:4], out[4:7] = 0.5 * np.log(mass), np.log(np.diag(L)), [L[r, c] for r, c in _ABOVE]
+    out[0], out[_DIAGONAL], out[_OFF_DIAGONAL] = 0.5 * np.log(mass), np.log(np.diag(L)), [L[r, c] for r, c in _ABOVE]
     return out
 
 
 def body_of(theta: Floats) -> tuple[Floats, Floats]:
     """Mass, centre (3) and inertia (6) in a row, (10,), and their derivative by the coordinates (10, 10)."""
     m = np.exp(2.0 * theta[0])
-    L = np.diag(np.exp(theta[1:4]))
-    for (r, c), s in zip(_ABOVE, theta[4:7], strict=True):
+    L = np.diag(np.exp(theta[_DIAGONAL]))
+    for (r, c), s in zip(_ABOVE, theta[_OFF_DIAGONAL], strict=True):
         L[r, c] = s
     C = m * L @ L.T
-    values, J = np.concatenate([[m], theta[7:], _inertia(C)]), np.zeros((SIZE, SIZE))
-    J[0, 0], J[4:, 0] = 2.0 * m, 2.0 * values[4:]
-    J[1:4, 7:] = np.eye(3)
+    values, J = np.concatenate([[m], theta[_CENTER], _inertia(C)]), np.zeros((SIZE, SIZE))
+    J[0, 0], J[INERTIA, 0] = 2.0 * m, 2.0 * values[INERTIA]
+    J[_CENTER_OF_BODY, _CENTER] = np.eye(3)
     for k, (r, c) in enumerate((*((i, i) for i in range(3)), *_ABOVE), start=1):
         D = np.zeros((3, 3))
         D[r, c] = L[r, c] if r == c else 1.0
-        J[4:, k] = _inertia(m * (D @ L.T + L @ D.T))
+        J[INERTIA, k] = _inertia(m * (D @ L.T + L @ D.T))
     return values, J
 
 

@@ -207,7 +207,9 @@ class ParameterSpace:
         """The ten coordinates of the mass, centre and inertia of a body."""
         names = (f"mass:{body}", f"com:{body}", f"inertia:{body}")
         values = self._sim.parameters(names).values  # mass, centre (3), inertia (6)
-        start = inertia_coordinates.coordinates(f"{call}: body {body!r}", float(values[0]), values[4:])
+        start = inertia_coordinates.coordinates(
+            f"{call}: body {body!r}", float(values[0]), values[inertia_coordinates.INERTIA]
+        )
         labels = [f"{body}.{label}" for label in inertia_coordinates.LABELS]
         free = {label: (float(x), -np.inf, np.inf) for label, x in zip(labels, start, strict=True)}
         self._append(names, inertia_coordinates.body_of, free)

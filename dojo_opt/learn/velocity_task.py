@@ -16,6 +16,7 @@ from dojo_opt.planning.residual import kernel
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Input
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
@@ -26,6 +27,7 @@ _TIME_STEP, _SUBSTEPS = 0.01, 2  # [s], per action
 _KAPPA = 1e-4  # [N s m]
 _HOLD = 100  # actions of 20 ms: a new command every 2 s
 _PUSH = (0.3, 0.3, 0.1, 0.3, 0.3, 0.3)  # of a floating base [m/s, rad/s]
+_TURN, _JOINTS = BaseState.QUATERNION.start, BaseState.JOINTS  # columns of a state, for kernels
 _WIDTH = 0.1  # [m/s, rad/s] errors beyond count linearly
 
 # Models on which policies of quadrupeds learn: slippery and rough ground, heavier and lighter bodies, pushes.
@@ -49,6 +51,13 @@ def in_body(q, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def upright(x):  # type: ignore[no-untyped-def]
+    """Cosine of the angle between the vertical axis of a floating base and the vertical."""
+    q = x[_TURN:_JOINTS]
+    return 1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2)
+
+
+@kernel
 def distance(error, width):  # type: ignore[no-untyped-def]
     """|error|, smooth within the width, and 0 at 0."""
     return np.sqrt(error * error + width * width) - width
@@ -56,17 +65,17 @@ def distance(error, width):  # type: ignore[no-untyped-def]
 
 def _observation(nq: int, home: tuple[float, ...]) -> Callable[..., Any]:
     """Direction of gravity and velocities as the trunk sees them, angles from the stance, their rates, the command."""
-    joints = nq - 7
+    joints = nq - BaseState.JOINTS
 
     def observation(x, out):  # type: ignore[no-untyped-def]
-        q = x[3:7]
+        q = x[_TURN:_JOINTS]
         out[0], out[1], out[2] = in_body(q, 0.0, 0.0, 1.0)
         out[3], out[4], out[5] = in_body(q, x[nq], x[nq + 1], x[nq + 2])
         for k in range(3):
             out[6 + k] = x[nq + 3 + k]
             out[9 + k] = x[2 * nq - 1 + k]
         for k in range(joints):
-            out[12 + k] = x[7 + k] - home[k]
+            out[12 + k] = x[_JOINTS + k] - home[k]
             out[12 + joints + k] = x[nq + 6 + k]
 
     return observation
@@ -77,7 +86,7 @@ def _reward(nq: int, height: float) -> Callable[..., Any]:
     width = _WIDTH
 
     def reward(x, a, after):  # type: ignore[no-untyped-def]
-        q = after[3:7]
+        q = after[_TURN:_JOINTS]
         vx, vy, vz = in_body(q, after[nq], after[nq + 1], after[nq + 2])
         command = after[2 * nq - 1 :]
         total = -distance(np.hypot(vx - command[0], vy - command[1]), width)
@@ -99,11 +108,10 @@ def _ends(height: float) -> tuple[Callable[..., Any], Callable[..., Any]]:
     low = 0.5 * height
 
     def terminated(x):  # type: ignore[no-untyped-def]
-        return not (x[2] > low and 1.0 - 2.0 * (x[4] ** 2 + x[5] ** 2) > 0.5)
+        return not (x[2] > low and upright(x) > 0.5)
 
     def survival_probability(x):  # type: ignore[no-untyped-def]
-        up = 1.0 - 2.0 * (x[4] ** 2 + x[5] ** 2)
-        return 1.0 / ((1.0 + np.exp((low - x[2]) / 0.02)) * (1.0 + np.exp((0.5 - up) / 0.06)))
+        return 1.0 / ((1.0 + np.exp((low - x[2]) / 0.02)) * (1.0 + np.exp((0.5 - upright(x)) / 0.06)))
 
     return terminated, survival_probability
 
@@ -120,7 +128,7 @@ def velocity_error(x: ArrayLike, command: ArrayLike) -> Floats:
     """
     states = np.asarray(x, dtype=np.float64)
     nq = (states.shape[-1] + 1) // 2
-    w, a = states[..., 3:4], -states[..., 4:7]
+    w, a = states[..., BaseState.SCALAR], -states[..., BaseState.VECTOR]
     v = states[..., nq : nq + 3]
     t = 2.0 * np.cross(a, v)
     own = v + w * t + np.cross(a, t)
@@ -165,19 +173,20 @@ def quadruped(
     servos = [Input(joint.name, servo="position", stiffness=stiffness, damping=damping) for joint in legs]
     mech = replace(mech, inputs=servos)
     home, nq = np.array(mech.neutral, dtype=np.float64), mech.nq
+    angles = home[_JOINTS:]
     terminated, survival_probability = _ends(float(home[2]))
 
     def start(rng: np.random.Generator) -> Floats:
         q = home.copy()
         q[2] += 0.01
         angle = rng.uniform(-np.pi, np.pi)
-        q[3:7] = np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)
-        q[7:] += rng.uniform(-0.05, 0.05, nq - 7)
+        q[BaseState.QUATERNION] = np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)
+        q[_JOINTS:] += rng.uniform(-0.05, 0.05, nq - _JOINTS)
         return np.concatenate([q, 0.1 * rng.standard_normal(mech.nv)])
 
     return Task(
-        Simulator(mech, time_step=_TIME_STEP, kappa=_KAPPA), _SUBSTEPS, _observation(nq, tuple(home[7:])), 2 * nq - 2,
-        _reward(nq, float(home[2])), home[7:] - reach, home[7:] + reach, start, terminated, survival=1.0, steps=500,
+        Simulator(mech, time_step=_TIME_STEP, kappa=_KAPPA), _SUBSTEPS, _observation(nq, tuple(angles)), 2 * nq - 2,
+        _reward(nq, float(home[2])), angles - reach, angles + reach, start, terminated, survival=1.0, steps=500,
         name=mech.name, survival_probability=survival_probability, commands=3,
         command=lambda rng: rng.uniform(-limits, limits), hold=_HOLD,
         settings={

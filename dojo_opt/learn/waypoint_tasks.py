@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.learn.task import Task
-from dojo_opt.learn.velocity_task import distance, in_body
+from dojo_opt.learn.velocity_task import distance, in_body, upright
 from dojo_opt.models.quadrotor import quadrotor as quadrotor_model
 from dojo_opt.models.uuv import uuv as uuv_model
 from dojo_opt.models.youbot import youbot as youbot_model
@@ -23,6 +23,7 @@ Floats = NDArray[np.float64]
 
 __all__ = ["quadrotor", "uuv", "youbot"]
 
+_TURN, _VELOCITY, _SPIN, _GOAL = 3, 7, 10, 13  # first columns of a rigid body's state with its waypoint
 _WIDTH = 0.1  # [m] distances beyond count linearly
 _ROLLING = 20.0  # of the platform [N s/m, N m s/rad]
 _SURVIVAL = 3.0  # per action: more than the way to any waypoint costs
@@ -37,13 +38,20 @@ def way(x, y, z):  # type: ignore[no-untyped-def]
     return np.sqrt(x * x + y * y + z * z)
 
 
+@kernel
+def _rest_of_way(x):  # type: ignore[no-untyped-def]
+    """Distance of a rigid body from its waypoint."""
+    goal = x[_GOAL:]
+    return way(x[0] - goal[0], x[1] - goal[1], x[2] - goal[2])
+
+
 def _seen(x, out):  # type: ignore[no-untyped-def]
     """As a rigid body sees them: the way to the waypoint, the vertical, its velocity, its angular velocity."""
-    q = x[3:7]
-    out[0], out[1], out[2] = in_body(q, x[13] - x[0], x[14] - x[1], x[15] - x[2])
+    q, v, w, goal = x[_TURN:_VELOCITY], x[_VELOCITY:_SPIN], x[_SPIN:_GOAL], x[_GOAL:]
+    out[0], out[1], out[2] = in_body(q, goal[0] - x[0], goal[1] - x[1], goal[2] - x[2])
     out[3], out[4], out[5] = in_body(q, 0.0, 0.0, 1.0)
-    out[6], out[7], out[8] = in_body(q, x[7], x[8], x[9])
-    out[9], out[10], out[11] = x[10], x[11], x[12]
+    out[6], out[7], out[8] = in_body(q, v[0], v[1], v[2])
+    out[9], out[10], out[11] = w[0], w[1], w[2]
 
 
 def _arrives(rest: float, effort: float) -> Callable[..., Any]:
@@ -51,8 +59,8 @@ def _arrives(rest: float, effort: float) -> Callable[..., Any]:
     width = _WIDTH
 
     def reward(x, a, after):  # type: ignore[no-untyped-def]
-        total = -distance(way(after[0] - after[13], after[1] - after[14], after[2] - after[15]), width)
-        total -= 0.02 * (after[10] ** 2 + after[11] ** 2 + after[12] ** 2)
+        w = after[_SPIN:_GOAL]
+        total = -distance(_rest_of_way(after), width) - 0.02 * (w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
         for i in range(a.shape[0]):
             total -= effort * (a[i] - rest) ** 2
         return total
@@ -94,8 +102,7 @@ def quadrotor() -> Task:
     weight = 9.81 * sum(body.mass for body in mech.bodies)
 
     def terminated(x):  # type: ignore[no-untyped-def]
-        far = way(x[0] - x[13], x[1] - x[14], x[2] - x[15]) > 5.0
-        return far or x[2] < 0.1 or 1.0 - 2.0 * (x[4] ** 2 + x[5] ** 2) < 0.0
+        return _rest_of_way(x) > 5.0 or x[2] < 0.1 or upright(x) < 0.0
 
     return _body(
         mech, 2.0, 0.01, 0.0, 0.5 * weight, reward=_arrives(0.0, 0.02), terminated=terminated, survival=_SURVIVAL,

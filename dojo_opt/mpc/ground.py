@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.planning.manifold import cross
 from dojo_opt.plant.ground_plane import GroundPlane
+from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -116,9 +117,11 @@ class Ground:
     def points(self, xs: ArrayLike) -> Stack:
         """Lowest points of the contacts at the states xs (..., nx), (..., ncontact, 3) [m]."""
         z = self._sim.maximal(xs)[..., self._body, :]
-        w, r = z[..., 6:7], z[..., 7:10]
+        w, r = z[..., BodyState.SCALAR], z[..., BodyState.VECTOR]
         twice = 2.0 * cross(r, self._point)
-        return np.asarray(z[..., :3] + self._point + w * twice + cross(r, twice) - self._radius * self._normal)
+        return np.asarray(
+            z[..., BodyState.POSITION] + self._point + w * twice + cross(r, twice) - self._radius * self._normal
+        )
 
     def gaps(self, points: Stack) -> Matrix:
         """Distances of the points (..., ncontact, 3) of the contacts from their ground, (..., ncontact) [m]."""

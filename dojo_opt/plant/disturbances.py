@@ -68,14 +68,14 @@ class Disturbances:
         Returns:
             The perturbation.
         """
-        unit = rng.uniform(size=8)
-        within = [lo + (hi - lo) * r for (lo, hi), r in zip(self._ranges(), unit[2:6], strict=True)]
+        along, across, *parts, heading, grip = rng.uniform(size=8)
+        within = [lo + (hi - lo) * r for (lo, hi), r in zip(self._ranges(), parts, strict=True)]
         push, push_time, payload, slope = within
         offset = np.zeros(2 * self.nv)
-        offset[self.nv : self.nv + 2] = self.velocity * (2.0 * unit[:2] - 1.0)
-        angle = 2.0 * np.pi * unit[6]
+        offset[self.nv : self.nv + 2] = self.velocity * (2.0 * np.array([along, across]) - 1.0)
+        angle = 2.0 * np.pi * heading
         impulse = push * np.array([np.cos(angle), np.sin(angle), 0.0])
-        friction = None if self.friction is None else self.friction[0] + (self.friction[1] - self.friction[0]) * unit[7]
+        friction = None if self.friction is None else self.friction[0] + (self.friction[1] - self.friction[0]) * grip
         return Perturbation(
             offset=offset,
             pushes=[Push(push_time, impulse)] if push else [],

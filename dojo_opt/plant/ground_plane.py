@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim.model.state_columns import BaseState
+
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
@@ -53,7 +55,7 @@ class GroundPlane(NamedTuple):
         if self.level:
             return out
         turn = _upright(n)
-        out[:, 3:7] = _product(turn, out[:, 3:7])
+        out[:, BaseState.QUATERNION] = _product(turn, out[:, BaseState.QUATERNION])
         out[:, nq : nq + 3] = _turned(turn, out[:, nq : nq + 3])
         return out
 

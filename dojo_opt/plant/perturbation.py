@@ -15,6 +15,7 @@ from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Input
 from sim.mechanism.terrain import Terrain
+from sim.model.state_columns import BaseState
 from sim.simulator.contact_settings import with_contacts
 
 Vector = NDArray[np.float64]
@@ -225,7 +226,9 @@ class Perturbation:
         half = 0.5 * self.slope
         out, v = x.copy(), mechanism.nq
         out[:3] = turn @ x[:3] + self.ground_height * turn[:, 2]
-        out[3:7] = _product(np.concatenate([[np.cos(half)], np.sin(half) * axis]), x[3:7])
+        out[BaseState.QUATERNION] = _product(
+            np.concatenate([[np.cos(half)], np.sin(half) * axis]), x[BaseState.QUATERNION]
+        )
         out[v : v + 3] = turn @ x[v : v + 3]
         return out
 

@@ -14,6 +14,7 @@ from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Joint
 from sim.mechanism.shapes import rotation_matrix
+from sim.model.state_columns import BodyState
 from sim.simulator.results import StepResult
 from sim.simulator.simulator import Simulator
 
@@ -175,7 +176,7 @@ class Plant:
             return False
         now, first = self._base(x), self._base(self._x0)
         low = self._above(now[:3]) < _LOW * self._above(first[:3])
-        up = rotation_matrix(now[6:10]) @ rotation_matrix(first[6:10]).T @ self.normal
+        up = rotation_matrix(now[BodyState.QUATERNION]) @ rotation_matrix(first[BodyState.QUATERNION]).T @ self.normal
         return bool(low or up @ self.normal < _TILTED)
 
     def _above(self, place: Vector) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 import dojo_opt as dojo
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
+from sim.model.state_columns import BaseState
 from solvers.compiler.optional import OptionalKernel, optional_kernels
 
 __all__ = ["CONTENTS", "run", "tasks"]
@@ -214,7 +215,8 @@ def _task_space() -> None:
     box, ball = dojo.Box(0.1, 0.1, 0.1), dojo.Sphere(0.1, center=(1.0, 0.0, 1.0))
     cost = dojo.cost
     tasks = (
-        *(cost.Frame(name, x[:3], x[3:7]), cost.Velocity(name), cost.CenterOfMass(), cost.Momentum(), cost.Slip()),
+        *(cost.Frame(name, x[:3], x[BaseState.QUATERNION]), cost.Velocity(name), cost.CenterOfMass()),
+        *(cost.Momentum(), cost.Slip()),
         *(cost.ContactForce(), cost.FrictionUse(), cost.Clearance(name, ball, 0.1, box)),
     )
     problem = dojo.Problem(sim, x, 2, cost=tasks)

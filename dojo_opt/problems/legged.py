@@ -19,6 +19,7 @@ from dojo_opt.problems import locomotion
 from dojo_opt.problems.locomotion import EFFORT, PLACE, follow
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -252,7 +253,7 @@ def _lowered(sim: Simulator, by: Array) -> tuple[Array, Array]:
     where = np.tile(places, (len(by), 1, 1))
     if feet.flat:
         return balanced(feet, x, where, places[:, :2].mean(axis=0)), where
-    return feet.place(x, where)[:, :7], where
+    return feet.place(x, where)[:, BaseState.POSE], where
 
 
 def _rise(sim: Simulator, steps: int, by: float) -> Gait:

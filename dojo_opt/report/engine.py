@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.dynamics import bodies
 from sim.mechanism.mechanism import Mechanism
+from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
@@ -125,10 +126,11 @@ def observe_bodies(
     sim: Simulator, times: Floats, z: Floats, potential: Floats, seconds: float, steps: int, message: str = ""
 ) -> Run:
     """The run of maximal states z (n, nbody, 13) with velocities at the nodes, and their potential energies (n,)."""
-    velocity = np.concatenate([z[..., 3:6], z[..., 10:]], axis=2)
+    velocity = np.concatenate([z[..., BodyState.VELOCITY], z[..., BodyState.SPIN]], axis=2)
     energy = bodies.kinetic_energy(sim.model, z) + potential
     momentum = bodies.momentum(sim.model, z)
-    return Run(times, z[..., :3], z[..., 6:10], velocity, energy, momentum, seconds, steps, message)
+    place, turn = z[..., BodyState.POSITION], z[..., BodyState.QUATERNION]
+    return Run(times, place, turn, velocity, energy, momentum, seconds, steps, message)
 
 
 def potential(sim: Simulator, q: Floats) -> Floats:

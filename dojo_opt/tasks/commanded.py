@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.gaits.gait import Gait
 from dojo_opt.mpc.moving import Sampled
 from sim.mechanism import checks
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -59,7 +60,7 @@ class _Place:
     @classmethod
     def of(cls, x: Vector) -> _Place:
         """That of the base of a state (nx,)."""
-        w, a, b, d = x[3:7]
+        w, a, b, d = x[BaseState.QUATERNION]
         return cls(complex(*x[:2]), float(np.arctan2(2.0 * (w * d + a * b), 1.0 - 2.0 * (b * b + d * d))))
 
     def then(self, other: _Place) -> _Place:
@@ -88,8 +89,8 @@ class _Place:
             place = (x[:, first] + 1j * x[:, first + 1]) * turn + moved
             out[:, first], out[:, first + 1] = place.real, place.imag
         c, s = np.cos(0.5 * self.heading), np.sin(0.5 * self.heading)
-        w, a, b, d = x[:, 3:7].T
-        out[:, 3:7] = np.stack([c * w - s * d, c * a - s * b, c * b + s * a, c * d + s * w], axis=1)
+        w, a, b, d = x[:, BaseState.QUATERNION].T
+        out[:, BaseState.QUATERNION] = np.stack([c * w - s * d, c * a - s * b, c * b + s * a, c * d + s * w], axis=1)
         return out
 
 

@@ -16,6 +16,7 @@ from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -60,7 +61,8 @@ class Lead:
     def _begin(self, x: Vector) -> None:
         """Begin where the base of the state x (nx,) is."""
         self._place = np.array(x[:2])
-        self._heading = float(2.0 * np.arctan2(x[6], x[3]))
+        w, _, _, z = x[BaseState.QUATERNION]
+        self._heading = float(2.0 * np.arctan2(z, w))
 
     def anchor(self, time: float, x: Vector) -> None:
         """Move on.
@@ -90,7 +92,7 @@ class Lead:
         """
         row = self._pose.copy()
         row[:2] = self._place
-        row[3], row[6] = np.cos(0.5 * self._heading), np.sin(0.5 * self._heading)
+        row[BaseState.QUATERNION] = np.cos(0.5 * self._heading), *row[BaseState.VECTOR][:2], np.sin(0.5 * self._heading)
         return np.tile(row, (np.size(times), 1))
 
 

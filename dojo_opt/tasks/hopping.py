@@ -16,6 +16,7 @@ from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -24,6 +25,8 @@ Matrix = NDArray[np.float64]
 __all__ = ["Hopping", "hopper_mpc"]
 
 _GRAVITY = 9.81  # [m/s^2]
+_LEG = BaseState.JOINTS  # its length
+_ACROSS, _UPWARD, _SPIN, _LEG_RATE = slice(8, 10), 10, slice(11, 14), 14  # columns of velocities
 _HOPPER = replace(OPTIONS, shooting=1.0)  # after a push most rollouts are lost, and gaps would stay open for ticks
 
 
@@ -48,8 +51,9 @@ class Hopping:
 
     def __init__(self, start: ArrayLike, velocity: ArrayLike, height: float, stance: float) -> None:
         self.start = checks.array("Hopping(start)", start, (15,))
-        if np.abs(self.start[3:7] - (1.0, 0.0, 0.0, 0.0)).max() > 1e-9:
-            raise ValueError(f"Hopping(start): expected an upright body that heads along x, got {self.start[3:7]}")
+        turn = self.start[BaseState.QUATERNION]
+        if np.abs(turn - (1.0, 0.0, 0.0, 0.0)).max() > 1e-9:
+            raise ValueError(f"Hopping(start): expected an upright body that heads along x, got {turn}")
         self.velocity = np.array(checks.vector("Hopping(velocity)", velocity, 2))
         self.height = checks.number("Hopping(height)", height, above=0.0)
         self.stance = checks.number("Hopping(stance)", stance, above=0.0)
@@ -69,18 +73,18 @@ class Hopping:
         flight = phase - self.stance
         rise = np.where(stands, dip, self.speed * flight - 0.5 * _GRAVITY * flight**2)
         vertical = np.where(stands, -self.speed * np.cos(np.pi * phase / self.stance), self.speed - _GRAVITY * flight)
-        above, upward = self.start[7] + np.where(stands, rise, 0.0), np.where(stands, vertical, 0.0)
+        above, upward = self.start[_LEG] + np.where(stands, rise, 0.0), np.where(stands, vertical, 0.0)
         ahead, forward = np.where(stands, self._carried(phase), self._swung(flight))
         leg = np.hypot(above, ahead)
         lean = 0.5 * np.arctan2(ahead, above)
         x[:, :2] += self.velocity * times[:, None]
         x[:, 2] += rise
-        x[:, 3], x[:, 4:7] = np.cos(lean), np.outer(np.sin(lean), self._axis)
-        x[:, 7] = leg
-        x[:, 8:10] = self.velocity
-        x[:, 10] = vertical
-        x[:, 11:14] = np.outer((forward * above - ahead * upward) / leg**2, self._axis)
-        x[:, 14] = (above * upward + ahead * forward) / leg
+        x[:, 3], x[:, BaseState.VECTOR] = np.cos(lean), np.outer(np.sin(lean), self._axis)
+        x[:, _LEG] = leg
+        x[:, _ACROSS] = self.velocity
+        x[:, _UPWARD] = vertical
+        x[:, _SPIN] = np.outer((forward * above - ahead * upward) / leg**2, self._axis)
+        x[:, _LEG_RATE] = (above * upward + ahead * forward) / leg
         return x
 
     def _carried(self, phase: Vector) -> Matrix:

@@ -18,6 +18,7 @@ from dojo_opt.viewer import drawing
 from dojo_opt.viewer.animation import html_of, node_of
 from dojo_opt.viewer.motion import motion
 from sim.mechanism import checks
+from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
 
 __all__ = ["Live", "live"]
@@ -129,7 +130,10 @@ class Live:
 
         z = self._sim.maximal(state)
         names = self._sim.mechanism.body_names
-        places = ((node_of("bodies", k, name), drawing.matrix(z[k, :3], z[k, 6:10])) for k, name in enumerate(names))
+        places = (
+            (node_of("bodies", k, name), drawing.matrix(z[k, BodyState.POSITION], z[k, BodyState.QUATERNION]))
+            for k, name in enumerate(names)
+        )
         return [packb(SetTransform(place, node).lower()) for node, place in places]
 
     def _send(self, commands: list[bytes]) -> None:

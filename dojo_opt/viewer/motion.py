@@ -16,6 +16,7 @@ from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.poses import poses
 from sim.mechanism.shapes import rotation_matrix
+from sim.model.state_columns import BodyState
 from sim.simulator.results import Trajectory
 from sim.simulator.simulator import Simulator
 from solvers.types import Vector
@@ -126,8 +127,8 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
         time=sim.time_step * substeps * np.arange(len(x), dtype=np.float64),
         x=x,
         u=u,
-        position=z[:, :, 0:3],
-        quaternion=z[:, :, 6:10],
+        position=z[:, :, BodyState.POSITION],
+        quaternion=z[:, :, BodyState.QUATERNION],
         contact_time=sim.time_step * np.arange(1, len(normal) + 1, dtype=np.float64),
         normal_force=normal,
         friction_force=friction,

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.model.model import Model
+from sim.model.state_columns import BodyState
 
 Floats = NDArray[np.float64]
 
 
 def kinetic_energy(model: Model, z: Floats) -> Floats:
     """Sum of m v.v/2 + w.J w/2 of each row [J].   z: (n, nbody, 13)."""
-    vel, omega = z[..., 3:6], z[..., 10:]
+    vel, omega = z[..., BodyState.VELOCITY], z[..., BodyState.SPIN]
     kinetic = np.einsum("b,nbk,nbk->n", model.body_mass, vel, vel) + np.einsum("nbk,nbk->n", omega, _spin(model, z))
     return np.asarray(0.5 * kinetic)
 
@@ -22,8 +23,8 @@ def momentum(model: Model, z: Floats) -> Floats:
 
     z: (n, nbody, 13); returns (n, 6).
     """
-    p = model.body_mass[:, None] * z[..., 3:6]
-    angular = np.cross(z[..., :3], p) + rotated(z[..., 6:10], _spin(model, z))
+    p = model.body_mass[:, None] * z[..., BodyState.VELOCITY]
+    angular = np.cross(z[..., BodyState.POSITION], p) + rotated(z[..., BodyState.QUATERNION], _spin(model, z))
     return np.concatenate([p.sum(axis=1), angular.sum(axis=1)], axis=1)
 
 
@@ -35,4 +36,4 @@ def rotated(quat: Floats, vector: Floats) -> Floats:
 
 def _spin(model: Model, z: Floats) -> Floats:
     """J w of every body, body axes."""
-    return np.einsum("bij,nbj->nbi", model.body_inertia.reshape(-1, 3, 3), z[..., 10:])
+    return np.einsum("bij,nbj->nbi", model.body_inertia.reshape(-1, 3, 3), z[..., BodyState.SPIN])

@@ -13,6 +13,7 @@ from sim.dynamics.kinematics import tree_poses
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
+from sim.model.state_columns import BodyColumn
 from solvers.compiler import Table, kernel
 from solvers.rotation import Vec3, quat_exp, quat_log, quat_matrix, quat_mul, transposed_times
 from solvers.types import Matrix, Vector
@@ -57,13 +58,14 @@ def poses_of_maximal(data: Data, h: float, z: Matrix) -> None:
     for i in range(z.shape[0]):
         for k in range(3):
             data.pos2[i, k] = z[i, k]
-            data.pos1[i, k] = z[i, k] - h * z[i, 3 + k]
-        e = quat_exp(-h * z[i, 10], -h * z[i, 11], -h * z[i, 12])
-        r = quat_mul(z[i, 6], z[i, 7], z[i, 8], z[i, 9], e[0], e[1], e[2], e[3])
-        R2 = quat_matrix(z[i, 6], z[i, 7], z[i, 8], z[i, 9])
+            data.pos1[i, k] = z[i, k] - h * z[i, BodyColumn.VELOCITY + k]
+        q, w = z[i, BodyColumn.QUATERNION : BodyColumn.SPIN], z[i, BodyColumn.SPIN :]
+        e = quat_exp(-h * w[0], -h * w[1], -h * w[2])
+        r = quat_mul(q[0], q[1], q[2], q[3], e[0], e[1], e[2], e[3])
+        R2 = quat_matrix(q[0], q[1], q[2], q[3])
         R1 = quat_matrix(r[0], r[1], r[2], r[3])
         for k in range(4):
-            data.quat2[i, k] = z[i, 6 + k]
+            data.quat2[i, k] = q[k]
             data.quat1[i, k] = r[k]
         for k in range(9):
             data.rot2[i, k] = R2[k]

@@ -13,6 +13,7 @@ from sim.dynamics.kinematics import velocity_columns
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
+from sim.model.state_columns import BodyColumn
 from solvers.compiler import Table, kernel
 from solvers.rotation import (
     Mat3,
@@ -118,7 +119,8 @@ def _minimal_row(data: Data, h: float, z: Matrix, d: int, first: int, b: int, ou
     """
     nv = data.F.shape[0]
     R = rows_of(data.rot2, b)
-    L = left_jacobian(h * z[b, 10], h * z[b, 11], h * z[b, 12])
+    w = z[b, BodyColumn.SPIN :]
+    L = left_jacobian(h * w[0], h * w[1], h * w[2])
     f, g, o = data.F[d], data.G[d], first
     turn = transposed_times(R, f[o + 3] - g[o + 3], f[o + 4] - g[o + 4], f[o + 5] - g[o + 5])
     spin = transposed_times(R, g[o + 3], g[o + 4], g[o + 5])

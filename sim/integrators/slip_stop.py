@@ -23,9 +23,9 @@ def _first_stop(model: Model, parts: Cube, c: int, h: float) -> float:
     """
     f, n = (0.0, 0.0), (0.0, 0.0)
     for half in range(2):
-        row = parts[half, c]
-        normal = row[0] * row[8] + row[1] * row[9] + row[2] * row[10]
-        size = row[0] * row[0] + row[1] * row[1] + row[2] * row[2] - normal * normal
+        p, m = parts[half, c, ContactRow.IMPULSE : ContactRow.POINT], parts[half, c, ContactRow.NORMAL :]
+        normal = p[0] * m[0] + p[1] * m[1] + p[2] * m[2]
+        size = p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - normal * normal
         f, n = (f[1], sqrt(max(size, 0.0))), (n[1], normal)
     mass, mu = model.body_mass[model.contact_body[c]], model.contact_friction[c]
     if not (0.0 < n[0] < 10.0 * n[1]) or mass == 0.0 or mu == 0.0:

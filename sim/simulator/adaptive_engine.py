@@ -26,7 +26,7 @@ from sim.integrators.stretch import Clock, Embedded, Stretch
 from sim.integrators.tableau import embedded
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.servos import limited_servos
-from sim.model.columns import StepReport, StepSetting
+from sim.model.columns import ContactRow, StepReport, StepSetting
 from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, refuse
@@ -362,7 +362,8 @@ class AdaptiveEngine(KnotEngine):
     def inactive(self) -> NDArray[np.bool_]:
         """As Engine.inactive: contacts that carried nothing in the last step of this thread."""
         carried: Floats = self._kept.contacts
-        return np.asarray(np.linalg.norm(carried[:, :3], axis=1) <= self.settings.tolerance)
+        impulses = carried[:, ContactRow.IMPULSE : ContactRow.POINT]
+        return np.asarray(np.linalg.norm(impulses, axis=1) <= self.settings.tolerance)
 
     def _refuse(self, feature: str) -> NoReturn:
         raise ValueError(f"Simulator(accuracy=...): {feature} those of steps of order 2; use replace(accuracy=None)")

@@ -14,6 +14,7 @@ from sim.integrators.rollout import UNIT
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory import check_room
+from sim.model.state_columns import BodyState
 from sim.simulator.engine import CONTACT, REPORT, Engine
 from solvers.status import MESSAGES, Status
 
@@ -174,8 +175,8 @@ class Arguments:
     def check_maximal(self, method: str, zs: Floats) -> None:
         """Quaternions of length one, and less than half a turn per step."""
         with np.errstate(over="ignore"):
-            length = np.linalg.norm(zs[..., 6:10], axis=-1)
-            turn = np.linalg.norm(zs[..., 10:], axis=-1) * self.time_step
+            length = np.linalg.norm(zs[..., BodyState.QUATERNION], axis=-1)
+            turn = np.linalg.norm(zs[..., BodyState.SPIN], axis=-1) * self.time_step
         for bad, why in (
             (np.abs(length - 1.0) > UNIT, "expected a unit quaternion"),
             (turn >= np.pi, MESSAGES[Status.ANGULAR_STEP]),
@@ -184,14 +185,15 @@ class Arguments:
                 raise ValueError(
                     f"Simulator.{method}(z): body {self.mechanism.body_names[np.argwhere(bad)[0, 1]]!r}: {why}"
                 )
-        zs[..., 6:10] /= length[..., None]
+        zs[..., BodyState.QUATERNION] /= length[..., None]
 
     def check_joints(self, zs: Floats, back: Floats, tolerance: float) -> None:
         """Refuse maximal states that their own minimal states do not reproduce."""
-        dot = np.clip(np.abs(np.einsum("...i,...i->...", zs[..., 6:10], back[..., 6:10])), 0.0, 1.0)
+        turn, before = zs[..., BodyState.QUATERNION], back[..., BodyState.QUATERNION]
+        dot = np.clip(np.abs(np.einsum("...i,...i->...", turn, before)), 0.0, 1.0)
         now = np.linalg.norm(zs[..., :3] - back[..., :3], axis=-1)
         change = self.time_step * (zs - back)
-        moved = np.linalg.norm(change[..., 3:6], axis=-1) + np.linalg.norm(change[..., 10:], axis=-1)
+        moved = sum(np.linalg.norm(change[..., part], axis=-1) for part in (BodyState.VELOCITY, BodyState.SPIN))
         error = np.maximum(now + 2.0 * np.sqrt(2.0 * (1.0 - dot)), moved)
         if (error > tolerance).any():
             body = int(np.argwhere(error > tolerance)[0, 1])

@@ -21,6 +21,7 @@ from sim.integrators.rollout import MotionBuffers
 from sim.model.columns import StepReport
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.state_columns import BodyState
 from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, chained, knot_inputs, refuse
 from sim.simulator.intervals import Intervals
 from sim.simulator.link import link_step
@@ -326,7 +327,7 @@ class DividingEngine(Engine):
         if h:
             return super().minimal(zs, h)
         out, step = super().minimal(zs), self.settings.time_step
-        spins = np.linalg.norm(zs[..., 10:], axis=-1).max(axis=1)
+        spins = np.linalg.norm(zs[..., BodyState.SPIN], axis=-1).max(axis=1)
         for t in np.flatnonzero(step * spins >= math.pi):
             out[t] = super().minimal(zs[t : t + 1], SHORTEST * step)[0]
         return out

@@ -19,7 +19,7 @@ from sim.dynamics import coordinates, coordinates_jacobian, energy, state, veloc
 from sim.integrators import batch, rollout
 from sim.integrators.feedback import FeedbackLaw, Following, Path
 from sim.integrators.rollout import MotionBuffers
-from sim.model.columns import Inactive, StepReport
+from sim.model.columns import ContactRow, Inactive, StepReport
 from sim.model.data import Data
 from sim.model.layout import data_view, sizes_of, table
 from sim.model.model import Model
@@ -37,6 +37,9 @@ Floats = NDArray[np.float64]
 
 # numbers of a step, in loops that follow a law one more; and of one of its contacts or limits
 REPORT, CONTACT, CONE, BOUND = 6, 11, 12, 2
+_IMPULSE = slice(ContactRow.IMPULSE, ContactRow.POINT)
+_POINT = slice(ContactRow.POINT, ContactRow.GAP)
+_NORMAL = slice(ContactRow.NORMAL, CONTACT)
 _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 
@@ -82,15 +85,15 @@ class Divided(NamedTuple):
         """
         parts = self.rolled.contacts
         out = parts[-1].copy()
-        out[:, :3] = parts[..., :3].sum(axis=0)
-        share = np.linalg.norm(parts[..., :3], axis=2)
+        out[:, _IMPULSE] = parts[..., _IMPULSE].sum(axis=0)
+        share = np.linalg.norm(parts[..., _IMPULSE], axis=2)
         total = share.sum(axis=0)
         pressed = total > 0.0
-        points, normals = (np.einsum("tc,tcj->cj", share, parts[..., k : k + 3]) for k in (3, 8))
-        out[pressed, 3:6] = points[pressed] / total[pressed, None]
+        points, normals = (np.einsum("tc,tcj->cj", share, parts[..., part]) for part in (_POINT, _NORMAL))
+        out[pressed, _POINT] = points[pressed] / total[pressed, None]
         length = np.linalg.norm(normals, axis=1)
-        turned = (length > 0.0) & out[:, 8:11].any(axis=1)  # without a normal, it is beyond its reach at the end
-        out[turned, 8:11] = normals[turned] / length[turned, None]
+        turned = (length > 0.0) & out[:, _NORMAL].any(axis=1)  # without a normal, it is beyond its reach at the end
+        out[turned, _NORMAL] = normals[turned] / length[turned, None]
         return np.asarray(out)
 
 

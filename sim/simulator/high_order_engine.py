@@ -13,6 +13,7 @@ from sim.integrators.tableau import stable, tableau
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.servos import limited_servos
 from sim.model.model import InputKind, Model
+from sim.model.state_columns import BodyState
 from sim.simulator.engine import Engine, Floats
 from sim.simulator.link import link_curvature, link_planner
 from sim.simulator.settings import Settings
@@ -93,12 +94,12 @@ class HighOrderEngine(Engine):
     def minimal(self, zs: Floats, h: float | None = None) -> Floats:
         """x of every z; of velocities that violate a joint, the part of least kinetic energy off them is dropped."""
         still = zs.copy()
-        still[..., 3:6] = still[..., 10:] = 0.0
+        still[..., BodyState.VELOCITY] = still[..., BodyState.SPIN] = 0.0
         xs = np.zeros((len(zs), self.nx))
         coordinates.minimal_states(self._model, self._scratch.table(), 1.0, still.reshape(-1, 13), xs)
         for x, z in zip(xs, zs, strict=True):
             columns, weighted = self._columns(x)
-            rates = np.concatenate([z[:, 3:6], z[:, 10:]], axis=1).ravel()
+            rates = np.concatenate([z[:, BodyState.VELOCITY], z[:, BodyState.SPIN]], axis=1).ravel()
             x[self.sizes.nq :] = np.linalg.solve(weighted @ columns.T, weighted @ rates)
         return xs
 
@@ -113,9 +114,9 @@ class HighOrderEngine(Engine):
         xs[:, self.sizes.nq :] = np.eye(self.sizes.nv)
         z = self.bodies(xs)
         inertia = self.model.body_inertia.reshape(-1, 3, 3)
-        linear = self.model.body_mass[:, None] * z[..., 3:6]
-        angular = np.einsum("bij,nbj->nbi", inertia, z[..., 10:])
-        columns = np.concatenate([z[..., 3:6], z[..., 10:]], axis=2)
+        linear = self.model.body_mass[:, None] * z[..., BodyState.VELOCITY]
+        angular = np.einsum("bij,nbj->nbi", inertia, z[..., BodyState.SPIN])
+        columns = np.concatenate([z[..., BodyState.VELOCITY], z[..., BodyState.SPIN]], axis=2)
         return columns.reshape(len(z), -1), np.concatenate([linear, angular], axis=2).reshape(len(z), -1)
 
     def maximal_jacobian(self, x: Vector, nbody: int, h: float | None = None) -> Floats:

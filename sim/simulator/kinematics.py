@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.mechanism import checks
 from sim.mechanism.parts import WORLD
 from sim.mechanism.shapes import rotation_matrices, rotation_matrix
+from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
@@ -113,8 +114,8 @@ class Kinematics:
         if body < 0:
             return np.broadcast_to(point, (*q.shape[:-1], 3)), np.broadcast_to(turn, (*q.shape[:-1], 3, 3))
         z = self.sim.bodies(q, np.zeros((*q.shape[:-1], self.sim.nv)))[..., body, :]
-        R = _rotations(z[..., 6:10])
-        return z[..., :3] + R @ point, R @ turn
+        R = _rotations(z[..., BodyState.QUATERNION])
+        return z[..., BodyState.POSITION] + R @ point, R @ turn
 
     @np.errstate(over="ignore", invalid="ignore")  # an overflow is refused at the end
     def velocity(self, frame: str, q: ArrayLike, v: ArrayLike) -> Floats:
@@ -160,7 +161,7 @@ class Kinematics:
         """
         q = self._q("Kinematics.center_of_mass(q)", q)
         z = self.sim.bodies(q, np.zeros((*q.shape[:-1], self.sim.nv)))
-        return np.asarray(self._mass @ z[..., :3] / self._mass.sum())
+        return np.asarray(self._mass @ z[..., BodyState.POSITION] / self._mass.sum())
 
     def com_jacobian(self, q: ArrayLike) -> Floats:
         """Jacobian of the velocity of the centre of mass by joint velocities.
@@ -192,7 +193,7 @@ class Kinematics:
         twist = (J @ v[..., None, :, None])[..., 0]
         p = self._mass[:, None] * twist[..., :3]
         spin = (self._world_inertia(R) @ twist[..., 3:, None])[..., 0]
-        arm = z[..., :3] - self.center_of_mass(q)[..., None, :]
+        arm = z[..., BodyState.POSITION] - self.center_of_mass(q)[..., None, :]
         momentum = np.concatenate([p.sum(axis=-2), (spin + np.cross(arm, p)).sum(axis=-2)], axis=-1)
         return checks.within_range("Kinematics.centroidal_momentum", momentum)
 
@@ -314,7 +315,7 @@ class Kinematics:
         many = np.broadcast_to(q[..., None, :], (*q.shape[:-1], nv, q.shape[-1]))
         z = self.sim.bodies(many, np.broadcast_to(np.eye(nv), (*q.shape[:-1], nv, nv)))
         checks.within_range("Kinematics", z)
-        R = _rotations(z[..., 0, :, 6:10])
+        R = _rotations(z[..., 0, :, BodyState.QUATERNION])
         columns = np.moveaxis(z, -3, -1)  # (..., nbody, 13, nv)
         return np.concatenate([columns[..., 3:6, :], R @ columns[..., 10:13, :]], axis=-2), R
 

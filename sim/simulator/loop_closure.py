@@ -15,6 +15,7 @@ from sim.mechanism.closing import is_weld
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import WORLD, Joint
 from sim.mechanism.shapes import rotation_matrices, rotation_matrix
+from sim.model.state_columns import BodyState
 from sim.simulator.engine import Engine
 
 Floats = NDArray[np.float64]
@@ -73,11 +74,11 @@ class Closure:
     def _gap(self, joint: Joint, z: Floats) -> Floats:
         names, fixed = self._mechanism.body_names, self._frames[joint.name]
         a = z[:, names.index(joint.child)]
-        Ra = rotation_matrices(a[:, 6:10])
+        Ra = rotation_matrices(a[:, BodyState.QUATERNION])
         apart, Q = a[:, :3] + Ra @ np.asarray(joint.child_point) - np.asarray(joint.parent_point), fixed.turn
         if joint.parent != WORLD:
             b = z[:, names.index(joint.parent or "")]
-            Rb = rotation_matrices(b[:, 6:10])
+            Rb = rotation_matrices(b[:, BodyState.QUATERNION])
             apart = a[:, :3] + Ra @ np.asarray(joint.child_point) - b[:, :3] - Rb @ np.asarray(joint.parent_point)
             Q = Rb @ fixed.turn
         back = np.swapaxes(Q, -1, -2)

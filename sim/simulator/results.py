@@ -23,13 +23,13 @@ from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr, drawn
 from sim.mechanism.mechanism import Mechanism
 from sim.model.columns import ContactRow, StepReport
+from sim.model.state_columns import BodyState
 from sim.simulator.motion_file import archived, contact_rows, export, opened, restored
 from sim.simulator.npz_file import reading, write_npz
 from solvers.status import MESSAGES, Status
 from solvers.types import Integers
 
 Floats = NDArray[np.float64]
-
 
 STATUSES = tuple(Status)  # by number: twice as fast as Status(number)
 
@@ -596,5 +596,5 @@ def missed(errors: Floats) -> str:
 
 def fastest(mech: Mechanism, z: Floats) -> str:
     """The body that turns fastest in a maximal state (nbody, 13), as a sentence; for short steps, else turns wrap."""
-    spin = np.linalg.norm(z[:, 10:], axis=1)
-    return f"The fastest is {mech.body_names[int(spin.argmax())]!r}, with {spin.max():.3g} rad/s before the step."
+    w = np.linalg.norm(z[:, BodyState.SPIN], axis=1)
+    return f"The fastest is {mech.body_names[int(w.argmax())]!r}, with {w.max():.3g} rad/s before the step."

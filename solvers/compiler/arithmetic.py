@@ -15,8 +15,9 @@ from numba import types
 from numba.core.typing.templates import Signature, signature
 
 from solvers.compiler.index_typing import IndexTyping
+from solvers.compiler.operators import OPERATORS
 
-__all__ = ["ARITHMETIC", "OPERATORS", "KernelTyping", "choice"]
+__all__ = ["ARITHMETIC", "KernelTyping", "choice"]
 
 _COMPARED = (operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne)
 
@@ -37,7 +38,6 @@ def _arithmetic() -> dict[Any, Callable[..., Any]]:
 
 
 ARITHMETIC = _arithmetic()
-OPERATORS: dict[tuple[Any, types.Type, types.Type], tuple[types.Type, Callable[..., Any]]] = {}  # of other types
 _CHOICES = {min: operator.lt, max: operator.gt}
 
 

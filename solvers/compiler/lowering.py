@@ -25,8 +25,9 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
-from solvers.compiler.arithmetic import ARITHMETIC, OPERATORS, choice
+from solvers.compiler.arithmetic import ARITHMETIC, choice
 from solvers.compiler.array_words import DATA, SHAPE, STRIDES, WORD, ArrayWords
+from solvers.compiler.operators import OPERATORS
 from solvers.compiler.records import RecordType, field_words
 
 __all__ = ["KernelLowering"]

@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 import numba
 from numba.core.compiler import Compiler, CompileResult
 
-from solvers.compiler.index_typing import OLD, IndexTyping
+from solvers.compiler.index_typing import IndexTyping
 from solvers.compiler.notice import compiling
+from solvers.compiler.operators import OPERATORS, with_our_cases
 
 __all__ = [
     "FAST",
@@ -32,13 +33,25 @@ __all__ = [
 _KNOWN = ("0.66", "0.67", "0.68")  # versions of Numba that the fast pipeline was tested with
 
 
+class _PlainTyping(IndexTyping):
+    """Numba's typing context, with the operators of types of our own."""
+
+    __slots__ = ()
+
+    def resolve_value_type(self, val: Any) -> Any:
+        """The type of a constant."""
+        found = super().resolve_value_type(val)
+        return with_our_cases(val, found) if any(val is op for op, *_ in OPERATORS) else found
+
+
 class PlainCompiler(Compiler):
     """Numba's own pipeline."""
 
     own = True
 
     def __init__(self, typingctx: Any, *others: Any) -> None:
-        super().__init__(IndexTyping(typingctx) if OLD else typingctx, *others)
+        super().__init__(_PlainTyping(typingctx), *others)
+        self.state.targetctx.typing_context = self.state.typingctx  # of a copy that is this compilation's own
 
     def compile_extra(self, func: Any) -> Any:
         """Compile one function."""

@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from support.programs import python
 
@@ -81,14 +82,21 @@ def product(a, i, n):
     return a[i] / 2.0
 product = local_kernel(product)
 product(np.zeros(3), 1, 2)
+from solvers.lanes import load, store
+def lanes(A):
+    store(A, 0, 0, 2.0 * load(A, 1, 0) + load(A, 0, 0))
+A = np.ones((2, 8))
+local_kernel(lanes)(A)
+assert A[0, 7] == 3.0
 """
 
 
-def test_numba_compiles_others_functions_as_it_does_without_us():
-    """Nothing is registered with an operator, not even lanes."""
+@pytest.mark.parametrize("plain", ["0", "1"], ids=["fast", "plain"])
+def test_numba_compiles_others_functions_as_it_does_without_us(plain: str):
+    """No type is registered with an operator, not even lanes, by either pipeline."""
     alone = python(GUEST.format(first=""))
     for first in ("import dojo_opt, sim.integrators.rollout", "import dojo_opt, sim.integrators.rollout" + COMPILE):
-        assert python(GUEST.format(first=first)) == alone, first
+        assert python(GUEST.format(first=first), DOJO_OPT_PLAIN_NUMBA=plain) == alone, first
 
 
 INDEXED = """

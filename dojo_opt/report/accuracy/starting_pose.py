@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from sim.dynamics.bodies import rotated
 from sim.mechanism.mechanism import Mechanism
+from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
@@ -74,6 +75,6 @@ def gaps(sim: Simulator, q: Floats) -> list[float]:
     z, model = sim.bodies(q, np.zeros(sim.nv)), sim.model
     out = []
     for c, body in enumerate(model.contact_body):
-        centre = z[body, :3] + rotated(z[body, 6:10], model.contact_point[c])
+        centre = z[body, BodyState.POSITION] + rotated(z[body, BodyState.QUATERNION], model.contact_point[c])
         out.append(float(centre @ model.contact_frame[c, :3] - model.contact_radius[c] - model.contact_height[c]))
     return out

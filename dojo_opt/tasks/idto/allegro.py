@@ -27,6 +27,7 @@ __all__ = ["allegro"]
 _KNOT, _HORIZON, _RATE = 0.05, 40, 10.0  # [s], knots, [Hz]
 _ANGLE, _LOW = np.radians(15.0), 0.05  # [rad] off the goal at the end, [m] of the ball
 _SERVO = 0.5, 1e-3  # [N m/rad], [N m s/rad]
+_JOINTS, _HEIGHT, _QUATERNION = 16, 18, slice(19, 23)  # of the fingers; of the ball, columns of a state
 _EFFORT = 0.7  # [N m]
 _REACH = 0.02  # [m] of contacts in plans, of which those further away would cost most of the time
 _PALM = 0.18  # friction of palm and ball; plans that assume 1, as the publication's do, let the ball slide off
@@ -176,10 +177,10 @@ def allegro(**settings: Any) -> SuiteTask:
     own = mechanism(1.0, _PALM)
     start = sim.neutral()
     goal = start.copy()
-    goal[:16] = np.concatenate(list(_NOMINAL.values()))
-    goal[19:23] = 0.5**0.5 * np.array([1.0, 0.0, 0.0, -1.0])
+    goal[:_JOINTS] = np.concatenate(list(_NOMINAL.values()))
+    goal[_QUATERNION] = 0.5**0.5 * np.array([1.0, 0.0, 0.0, -1.0])
     quat = 0.25  # squares of four numbers are a quarter of those of the rotation vector
-    fingers = np.ones(16)
+    fingers = np.ones(_JOINTS)
     running = np.concatenate([0.01 * fingers, np.full(3, 10.0), np.full(3, 10.0 * quat)])
     end = np.concatenate([fingers, np.full(3, 100.0), np.full(3, 100.0 * quat)])
     rates = np.concatenate([1e-3 * fingers, np.ones(6)]), np.full(22, 10.0)
@@ -187,13 +188,13 @@ def allegro(**settings: Any) -> SuiteTask:
         quadratic(goal, _KNOT, _HORIZON, (running, rates[0]), (end, rates[1])),
         servo_effort(sim, own, _KNOT * 0.1, _HORIZON),
     ]
-    problem = Problem(sim, start, _HORIZON, cost=cost, controls0=_SERVO[0] * start[:16])
+    problem = Problem(sim, start, _HORIZON, cost=cost, controls0=_SERVO[0] * start[:_JOINTS])
     given = timed(_RATE) | {"servo": own, "gain_scale": 0.0}
     given |= {"kappa": 1e-5, "first": Options(stages=(Stage(1e-4, 1e-4), Stage(1e-5, 1e-5)))}
     mpc = MPC(problem, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)
-    spread = np.concatenate([np.full(16, 0.03), np.full(3, 1e-3), np.full(3, 0.1), np.full(22, 0.02)])
-    return SuiteTask("idto.allegro", mpc, model, start, 10.0, spread, _Turned(goal[19:23]), _RATE)
+    spread = np.concatenate([np.full(_JOINTS, 0.03), np.full(3, 1e-3), np.full(3, 0.1), np.full(22, 0.02)])
+    return SuiteTask("idto.allegro", mpc, model, start, 10.0, spread, _Turned(goal[_QUATERNION]), _RATE)
 
 
 class _Turned:
@@ -203,6 +204,6 @@ class _Turned:
         self._goal = goal
 
     def __call__(self, loop: ClosedLoop) -> tuple[bool, dict[str, float]]:
-        off = 2.0 * float(np.arccos(min(1.0, abs(float(loop.x[-1, 19:23] @ self._goal)))))
-        low = float(loop.x[:, 18].min())
+        off = 2.0 * float(np.arccos(min(1.0, abs(float(loop.x[-1, _QUATERNION] @ self._goal)))))
+        low = float(loop.x[:, _HEIGHT].min())
         return off < _ANGLE and low > _LOW, {"angle off [deg]": float(np.degrees(off)), "lowest [m]": low}

@@ -23,6 +23,7 @@ from sim.simulator.simulator import Simulator
 __all__ = ["jaco_ball"]
 
 _KNOT, _HORIZON, _RATE = 0.05, 20, 100.0  # [s], knots, [Hz]
+_JOINTS, _BALL = 7, slice(7, 10)  # of the arm; place of the ball in a state
 _NEAR, _HELD = 0.02, 0.5  # [m], [s]
 _KAPPA = 2e-5  # [N s m] at 1e-3 friction is viscous and hardly rolls the ball, at 1e-6 the arm does not find it
 _KAPPA_GRAD = 5e-5  # [N s m] with derivatives at _KAPPA, plans lose the ball as the arm touches it
@@ -159,7 +160,7 @@ def jaco_ball(**settings: Any) -> SuiteTask:
     own = mechanism(0.5)
     start = sim.neutral()
     goal = start.copy()
-    goal[7:10] = _GOAL
+    goal[_BALL] = _GOAL
     free, turn = np.zeros(7), 0.25e-4 * np.ones(3)  # of squares of four numbers of a quaternion, a quarter
     rates = np.concatenate([np.full(3, 0.1), np.full(3, _SPIN)])
     running = np.concatenate([free, np.ones(3), turn]), np.concatenate([np.full(7, 0.1), rates])
@@ -170,7 +171,7 @@ def jaco_ball(**settings: Any) -> SuiteTask:
         servo_effort(sim, own, _KNOT * 0.01, _HORIZON),
         Clearance("ball", touch.b, target=0.0, shape_a=touch.shape_a, shape_b=touch.shape_b, weight=_TOUCH),
     ]
-    problem = Problem(sim, start, _HORIZON, cost=cost, controls0=_KP * start[:7])
+    problem = Problem(sim, start, _HORIZON, cost=cost, controls0=_KP * start[:_JOINTS])
     given = timed(_RATE) | {"iterations": 2, "servo": own, "gain_scale": 0.0}
     given |= {"kappa": _KAPPA, "kappa_grad": _KAPPA_GRAD, "friction": _FRICTION}
     given |= {"first": Options(stages=(Stage(_KAPPA, _KAPPA),))}
@@ -181,6 +182,6 @@ def jaco_ball(**settings: Any) -> SuiteTask:
 
 
 def _judge(loop: ClosedLoop) -> tuple[bool, dict[str, float]]:
-    off = np.linalg.norm(loop.x[:, 7:10] - np.asarray(_GOAL), axis=1)
+    off = np.linalg.norm(loop.x[:, _BALL] - np.asarray(_GOAL), axis=1)
     time = held(loop, off < _NEAR)
     return time >= _HELD, {"at the goal [s]": time, "off at the end [mm]": 1e3 * float(off[-1])}

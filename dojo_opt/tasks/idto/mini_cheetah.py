@@ -13,6 +13,7 @@ from dojo_opt.tasks.suite import SuiteTask
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Contact, Input
 from sim.mechanism.terrain import Terrain
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
 __all__ = ["mini_cheetah"]
@@ -145,7 +146,7 @@ class _Walked:
         self._far = far
 
     def __call__(self, loop: ClosedLoop) -> tuple[bool, dict[str, float]]:
-        w, x, y, z = loop.x[:, 3:7].T
+        w, x, y, z = loop.x[:, BaseState.QUATERNION].T
         roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x**2 + y**2))
         pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
         way, low = float(loop.x[-1, 0] - loop.x[0, 0]), float(loop.x[:, 2].min())

@@ -84,7 +84,7 @@ def hopper(**settings: Any) -> SuiteTask:
     start = lifted(sim, begin, 1)
     goal = begin.copy()
     goal[0] = 0.5
-    begin[5] = goal[5] = 0.5 / (_KNOT * _HORIZON)
+    begin[sim.nq] = goal[sim.nq] = 0.5 / (_KNOT * _HORIZON)
     target = Onward(sim, begin, goal, _KNOT * _HORIZON)
     cost = [
         quadratic(begin, _KNOT, _HORIZON, (np.ones(5), 0.1), (10.0 * np.ones(5), 1.0)),

@@ -22,6 +22,7 @@ __all__ = ["spinner"]
 
 _KNOT, _HORIZON, _RATE = 0.05, 40, 200.0  # [s], knots, [Hz]
 _SPEED = (0.8, 1.2)  # [rad/s] mean of a success
+_RATE_OF_DISC = 5  # column of a state
 _LAST = 3.0  # [s] of the run that count
 
 
@@ -71,9 +72,9 @@ def spinner(**settings: Any) -> SuiteTask:
     sim = Simulator(mechanism(0.5), time_step=_KNOT, kappa=1e-4)
     start = sim.neutral()
     goal = start.copy()
-    goal[2], goal[5] = 2.0, 1.0
+    goal[2], goal[_RATE_OF_DISC] = 2.0, 1.0
     begin = start.copy()
-    begin[5] = 1.0
+    begin[_RATE_OF_DISC] = 1.0
     target = Onward(sim, begin, goal, _KNOT * _HORIZON, anchored=[2])
     cost = [
         quadratic(begin, _KNOT, _HORIZON, ([1.0, 1.0, 1.0], 0.1), ([10.0, 10.0, 10.0], 0.1)),
@@ -89,5 +90,5 @@ def spinner(**settings: Any) -> SuiteTask:
 
 def _judge(loop: ClosedLoop) -> tuple[bool, dict[str, float]]:
     count = round(_LAST / loop.simulator.time_step)
-    speed = float(np.mean(loop.x[-count:, 5]))
+    speed = float(np.mean(loop.x[-count:, _RATE_OF_DISC]))
     return _SPEED[0] <= speed <= _SPEED[1], {"mean speed [rad/s]": speed}

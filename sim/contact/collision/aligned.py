@@ -16,8 +16,9 @@ from sim.contact.collision.box import column, to_b
 from sim.contact.collision.rim import line_minimum
 from sim.contact.collision.rim_rim import opposite, point_of, rim_minimum
 from sim.contact.collision.witness import along, dot
+from sim.model.columns import PairSize
 from solvers.compiler import inner_kernel
-from solvers.rotation import Vec3
+from solvers.rotation import Vec3, three
 from solvers.types import Matrix, Vector
 
 _APART = 1e-9  # [m] between points that say a direction
@@ -48,7 +49,9 @@ def from_polytope(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> float:
     for i in range(int(hull[int(sizes[0]), 1])):
         x, u, _ = polytopes.edge_of(hull, int(sizes[0]), i, R, r)
         for part in range(4):
-            found, n, e = line_and_rim(part & 1, x, u, sizes[4], sizes[5] if part < 2 else -sizes[5])
+            found, n, e = line_and_rim(
+                part & 1, x, u, sizes[PairSize.B], sizes[PairSize.B + 1] if part < 2 else -sizes[PairSize.B + 1]
+            )
             if found:
                 best = max(best, polytopes.separation_along(n, sizes, hull, R, r))
                 best = max(best, polytopes.separation_along(e, sizes, hull, R, r))
@@ -59,10 +62,12 @@ def from_polytope(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> float:
 def from_cylinder(sizes: Vector, R: Vector, r: Vector, turned: Vector) -> float:
     """Largest separation of two cylinders where a rim runs along the axis or a rim of the other; `turned` as there."""
     best = -1e300
-    x, axis_b = (turned[9], turned[10], turned[11]), (R[6], R[7], R[8])
+    x, axis_b = three(turned, 9), (R[6], R[7], R[8])
     for part in range(4):
         side = 1.0 if part < 2 else -1.0
-        found, n, e = line_and_rim(part & 1, (r[0], r[1], r[2]), column(R, 2), sizes[4], side * sizes[5])
+        found, n, e = line_and_rim(
+            part & 1, (r[0], r[1], r[2]), column(R, 2), sizes[PairSize.B], side * sizes[PairSize.B + 1]
+        )
         if found:
             best = max(best, cylinders.separation_along(n, sizes, R, r), cylinders.separation_along(e, sizes, R, r))
         found, n, e = line_and_rim(part & 1, x, axis_b, sizes[0], side * sizes[1])
@@ -70,12 +75,12 @@ def from_cylinder(sizes: Vector, R: Vector, r: Vector, turned: Vector) -> float:
             n, e = to_b(R, (-n[0], -n[1], -n[2])), to_b(R, (-e[0], -e[1], -e[2]))
             best = max(best, cylinders.separation_along(n, sizes, R, r), cylinders.separation_along(e, sizes, R, r))
     for part in range(8):
-        z = sizes[5] if part & 4 else -sizes[5]
+        z = sizes[PairSize.B + 1] if part & 4 else -sizes[PairSize.B + 1]
         rim = cylinders.rim_of(1.0 if part & 2 else -1.0, sizes, R, r)
-        angle = rim_minimum(part & 1, rim, (sizes[0], sizes[4]), z)
+        angle = rim_minimum(part & 1, rim, (sizes[0], sizes[PairSize.B]), z)
         if angle >= 0.0:
             p, ea, _ = point_of(rim, sizes[0], angle)
-            y, e, _, _ = opposite(p, sizes[4], z)
+            y, e, _, _ = opposite(p, sizes[PairSize.B], z)
             n, into = unit_between(p, y, e), (-ea[0], -ea[1], -ea[2])
             best = max(best, cylinders.separation_along(n, sizes, R, r), cylinders.separation_along(e, sizes, R, r))
             best = max(best, cylinders.separation_along(into, sizes, R, r))

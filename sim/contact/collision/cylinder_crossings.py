@@ -22,8 +22,9 @@ from sim.contact.collision.rim import (
 )
 from sim.contact.collision.rim_rim import point_of, rim_minimum, rim_rim
 from sim.contact.collision.witness import Z, along, dot, edges
+from sim.model.columns import PairSize
 from solvers.compiler import inner_kernel
-from solvers.rotation import Vec3
+from solvers.rotation import Vec3, three
 from solvers.types import Vector
 
 _CROSSING = 1e-2  # sine of the angle from which on two lines cross
@@ -44,7 +45,11 @@ def turn_around(R: Vector, r: Vector, turned: Vector) -> None:
 @inner_kernel
 def separation_along(n: Vec3, sizes: Vector, R: Vector, r: Vector) -> float:
     """Distance of the two along n, out of b."""
-    return dot(n, (r[0], r[1], r[2])) - reach(to_a(R, n), sizes[0], sizes[1]) - reach(n, sizes[4], sizes[5])
+    return (
+        dot(n, (r[0], r[1], r[2]))
+        - reach(to_a(R, n), sizes[0], sizes[1])
+        - reach(n, sizes[PairSize.B], sizes[PairSize.B + 1])
+    )
 
 
 @inner_kernel
@@ -88,8 +93,8 @@ def axis_and_rim(x: Vec3, u: Vec3, l: float, rho: float, z: float, place: int, r
 @inner_kernel
 def two_rims(rim: int, place: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> int:
     """Code of two rims where they touch; 0 for nowhere."""
-    top, z = (1.0 if rim & 1 else -1.0), (sizes[5] if rim & 2 else -sizes[5])
-    circle, radii = rim_of(top, sizes, R, r), (sizes[0], sizes[4])
+    top, z = (1.0 if rim & 1 else -1.0), (sizes[PairSize.B + 1] if rim & 2 else -sizes[PairSize.B + 1])
+    circle, radii = rim_of(top, sizes, R, r), (sizes[0], sizes[PairSize.B])
     angle = rim_minimum(place, circle, radii, z)
     if angle < 0.0:
         return 0
@@ -117,20 +122,20 @@ def crossing(part: int, sizes: Vector, R: Vector, r: Vector, turned: Vector, out
     if part == 0:
         x = (r[0], r[1], r[2])
         if u[0] * u[0] + u[1] * u[1] > _CROSSING * _CROSSING and on_edges(
-            x, u, sizes[1], _ORIGIN, Z, sizes[5], PASSING
+            x, u, sizes[1], _ORIGIN, Z, sizes[PairSize.B + 1], PASSING
         ):
             code = code_of(AXES, dot(edge_normal(Z, u, 1.0), x) >= 0.0, 0, 0)
     elif part < 5:
         top = (part - 1) // 2
-        z = sizes[5] if top == 1 else -sizes[5]
-        k = axis_and_rim((r[0], r[1], r[2]), u, sizes[1], sizes[4], z, part & 1, sizes[0], out)
+        z = sizes[PairSize.B + 1] if top == 1 else -sizes[PairSize.B + 1]
+        k = axis_and_rim((r[0], r[1], r[2]), u, sizes[1], sizes[PairSize.B], z, part & 1, sizes[0], out)
         if k > 0:
             code = code_of(AXIS_RIM, True, 2 * top, k - 1)
     elif part < 9:
         top = (part - 5) // 2
         z = sizes[1] if top == 1 else -sizes[1]
-        x = (turned[9], turned[10], turned[11])
-        k = axis_and_rim(x, (R[6], R[7], R[8]), sizes[5], sizes[0], z, part & 1, sizes[4], out)
+        x = three(turned, 9)
+        k = axis_and_rim(x, (R[6], R[7], R[8]), sizes[PairSize.B + 1], sizes[0], z, part & 1, sizes[PairSize.B], out)
         if k > 0:
             code = code_of(RIM_AXIS, True, top, k - 1)
     else:
@@ -146,21 +151,21 @@ def put_crossing(code: int, sizes: Vector, R: Vector, r: Vector, turned: Vector,
     kind, k = (code - 16) & 7, (code - 16) >> 3
     over, rim, angle = (1.0 if k & 1 else -1.0), (k >> 1) & 3, angle_of(k >> 3)
     u = column(R, 2)
-    top, z = (1.0 if rim & 1 else -1.0), (sizes[5] if rim & 2 else -sizes[5])
+    top, z = (1.0 if rim & 1 else -1.0), (sizes[PairSize.B + 1] if rim & 2 else -sizes[PairSize.B + 1])
     if kind == AXES:
         n = edge_normal(Z, u, over)
-        edges((r[0], r[1], r[2]), u, _ORIGIN, Z, n, (sizes[0], sizes[4]), out)
+        edges((r[0], r[1], r[2]), u, _ORIGIN, Z, n, (sizes[0], sizes[PairSize.B]), out)
     elif kind == AXIS_RIM:
-        line_rim((r[0], r[1], r[2]), u, angle, sizes[4], z, sizes[0], out)
+        line_rim((r[0], r[1], r[2]), u, angle, sizes[PairSize.B], z, sizes[0], out)
     elif kind == RIM_AXIS:
-        x = (turned[9], turned[10], turned[11])
-        line_rim(x, (R[6], R[7], R[8]), angle, sizes[0], top * sizes[1], sizes[4], out)
+        x = three(turned, 9)
+        line_rim(x, (R[6], R[7], R[8]), angle, sizes[0], top * sizes[1], sizes[PairSize.B], out)
         exchange(turned[:9], turned[9:], out)
     elif kind == RIMS:
-        rim_rim(rim_of(top, sizes, R, r), top, angle, (sizes[0], sizes[4]), z, out)
+        rim_rim(rim_of(top, sizes, R, r), top, angle, (sizes[0], sizes[PairSize.B]), z, out)
     else:
         x, _, _ = point_of(rim_of(top, sizes, R, r), sizes[0], angle_of((k >> 3) % SECTORS))
-        vertex_on_cylinder((k >> 3) // SECTORS, x, 0.0, sizes[4], sizes[5], out)
+        vertex_on_cylinder((k >> 3) // SECTORS, x, 0.0, sizes[PairSize.B], sizes[PairSize.B + 1], out)
 
 
 @inner_kernel
@@ -173,7 +178,7 @@ def nearest_rim_point(sizes: Vector, R: Vector, r: Vector, turned: Vector, out: 
         circle = rim_of(1.0 if rim == 1 else -1.0, sizes, R, r)
         for sector in range(SECTORS):
             x, _, _ = point_of(circle, sizes[0], angle_of(sector))
-            where = nearest(x, sizes[4], sizes[5])
+            where = nearest(x, sizes[PairSize.B], sizes[PairSize.B + 1])
             trial = code_of(POINT, True, rim, sector + SECTORS * where)
             put_crossing(trial, sizes, R, r, turned, out)
             if out[0] < best:

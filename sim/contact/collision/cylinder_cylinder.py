@@ -30,6 +30,7 @@ from sim.contact.collision.rim import (
     rim_below,
 )
 from sim.contact.collision.witness import TIE, absent, dot
+from sim.model.columns import PairSize
 from sim.model.shape_kinds import CROSSINGS, RIM_POINTS
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
@@ -64,14 +65,14 @@ def survey(
         if code == 0:
             continue
         s = separation_along((out[1], out[2], out[3]), sizes, R, r)
-        if s > best + TIE * sizes[4]:
+        if s > best + TIE * sizes[PairSize.B]:
             best, which = s, code
         if found < room:
             codes[first + found] = code
             found += 1
     if best < 0.0:
         s = from_cylinder(sizes, R, r, turned)
-        if s > best + TIE * sizes[4]:
+        if s > best + TIE * sizes[PairSize.B]:
             best, which = s, 0
     return best, which, up, down
 
@@ -105,8 +106,8 @@ def choose_elements(
     for k in range(CROSSINGS):
         codes[begin + k] = 0
     s, which, up, down = survey(sizes, R, r, turned, out, codes, begin + 1, CROSSINGS - 1)
-    deepest = min(s, 0.0) - TIE * (sizes[4] + sizes[5])
-    a, b = (sizes[0], sizes[1]), (sizes[4], sizes[5])
+    deepest = min(s, 0.0) - TIE * (sizes[PairSize.B] + sizes[PairSize.B + 1])
+    a, b = (sizes[0], sizes[1]), (sizes[PairSize.B], sizes[PairSize.B + 1])
     for k in range(RIM_POINTS):
         codes[first + k] = rim_at_end(k, up, deepest, b, a, R, r)
         codes[first + RIM_POINTS + k] = rim_at_end(k, down, deepest, a, b, turned[:9], turned[9:])
@@ -122,7 +123,7 @@ def choose_elements(
     for k in range(first, begin + CROSSINGS):
         put_elements(k - first, codes[k], sizes, R, r, turned, out)
         least = min(least, out[0])
-    if least > s + MISSED * sizes[4]:
+    if least > s + MISSED * sizes[PairSize.B]:
         codes[begin] = nearest_rim_point(sizes, R, r, turned, out)
 
 
@@ -137,9 +138,14 @@ def put_elements(feature: int, code: int, sizes: Vector, R: Vector, r: Vector, t
     end = 1.0 if code & 8 else -1.0
     if feature < RIM_POINTS:
         n, s = end_plane(end, (sizes[0], sizes[1]), R, r)
-        plane_rim(feature, n, s, sizes[4], sizes[5], out)
+        plane_rim(feature, n, s, sizes[PairSize.B], sizes[PairSize.B + 1], out)
     elif feature < 2 * RIM_POINTS:
-        n, s = end_plane(end, (sizes[4], sizes[5]), turned[:9], turned[9:])
+        n, s = end_plane(
+            end,
+            (sizes[PairSize.B], sizes[PairSize.B + 1]),
+            turned[:9],
+            turned[9:],
+        )
         plane_rim(feature - RIM_POINTS, n, s, sizes[0], sizes[1], out)
         exchange(turned[:9], turned[9:], out)
     else:

@@ -32,8 +32,9 @@ from sim.contact.collision.support import (
     stiffness,
 )
 from sim.contact.collision.witness import NOWHERE, Z, along, axis, dot, put
+from sim.model.columns import PairSize
 from solvers.compiler import inner_kernel
-from solvers.rotation import Vec3
+from solvers.rotation import Vec3, three
 from solvers.types import Matrix, Vector
 
 _TIE = 1e-12  # by which an element that is as near as another may seem farther, relative to the sizes
@@ -106,7 +107,7 @@ def put_plane(n: Vec3, phi: float, db: Vec3, out: Vector) -> None:
 @inner_kernel
 def ellipsoid_halfspace(sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Lowest point of a: phi = r_z - sigma,   x = r - y,   dx = delta + H (w x z),   p = x - phi z/2."""
-    d = (sizes[0], sizes[1], sizes[2])
+    d = three(sizes, PairSize.A)
     sigma, y = farthest(to_a(R, Z), d)
     y = to_b(R, y)
     x = (r[0] - y[0], r[1] - y[1], r[2] - y[2])
@@ -122,7 +123,7 @@ def ellipsoid_halfspace(sizes: Vector, R: Vector, r: Vector, out: Vector) -> Non
 @inner_kernel
 def ellipsoid_ellipsoid(sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """The largest s on the sphere."""
-    c, da, db = (r[0], r[1], r[2]), (sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6])
+    c, da, db = (r[0], r[1], r[2]), three(sizes, PairSize.A), three(sizes, PairSize.B)
     put_round(farthest_apart(c, da, R, db), c, da, R, 0.0, db, out)
 
 
@@ -132,7 +133,7 @@ def ellipsoid_ellipsoid(sizes: Vector, R: Vector, r: Vector, out: Vector) -> Non
 @inner_kernel
 def _apart(n: Vec3, sizes: Vector, R: Vector, r: Vector) -> float:
     """s of a cylinder a."""
-    db = (sizes[4], sizes[5], sizes[6])
+    db = three(sizes, PairSize.B)
     return dot(n, (r[0], r[1], r[2])) - reach(to_a(R, n), sizes[0], sizes[1]) - farthest(n, db)[0]
 
 
@@ -145,7 +146,7 @@ def best_end(sizes: Vector, R: Vector, r: Vector) -> tuple[float, Vec3, bool]:
     s = _apart(m, sizes, R, r)
     if s > best:
         n, best = m, s
-    y = farthest(n, (sizes[4], sizes[5], sizes[6]))[1]
+    y = farthest(n, three(sizes, PairSize.B))[1]
     y = to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2]))
     above_it = y[0] * y[0] + y[1] * y[1] <= sizes[0] * sizes[0]
     return best, n, above_it and dot(n, (r[0], r[1], r[2])) > sizes[1]
@@ -154,7 +155,7 @@ def best_end(sizes: Vector, R: Vector, r: Vector) -> tuple[float, Vec3, bool]:
 @inner_kernel
 def cylinder_ellipsoid(sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """The element of a with the largest s: an end, the side or a rim."""
-    c, u, db = (r[0], r[1], r[2]), column(R, 2), (sizes[4], sizes[5], sizes[6])
+    c, u, db = (r[0], r[1], r[2]), column(R, 2), three(sizes, PairSize.B)
     tie = _TIE * (sizes[0] + sizes[1])
     best, n, above_it = best_end(sizes, R, r)
     if above_it:
@@ -190,7 +191,7 @@ def separation(n: Vec3, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> fl
     o, m, least = int(sizes[0]), to_a(R, n), 1e300
     for k in range(int(hull[o, 0])):
         least = min(least, dot(m, row(hull, o + 1 + k)))
-    return least + dot(n, (r[0], r[1], r[2])) - farthest(n, (sizes[4], sizes[5], sizes[6]))[0]
+    return least + dot(n, (r[0], r[1], r[2])) - farthest(n, three(sizes, PairSize.B))[0]
 
 
 @inner_kernel
@@ -209,7 +210,7 @@ def best_face(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Found:
     for k in range(first, first + int(hull[o, 2])):
         m = to_b(R, row(hull, o + k))
         m = (-m[0], -m[1], -m[2])
-        s = dot(m, (r[0], r[1], r[2])) - hull[o + k, 3] - farthest(m, (sizes[4], sizes[5], sizes[6]))[0]
+        s = dot(m, (r[0], r[1], r[2])) - hull[o + k, 3] - farthest(m, three(sizes, PairSize.B))[0]
         if s > best:
             best, element, n = s, k, m
     return best, element, n
@@ -220,7 +221,7 @@ def along_element(k: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> 
     """s, along the direction that corner or edge k has the largest one of its own; whether it is the nearest element:
     no corner is nearer, and the point of an edge is on it.
     """
-    o, db = int(sizes[0]), (sizes[4], sizes[5], sizes[6])
+    o, db = int(sizes[0]), three(sizes, PairSize.B)
     if k <= int(hull[o, 0]):
         x = placed(row(hull, o + k), R, r)
         n = farthest_apart(x, NOWHERE, R, db)
@@ -241,7 +242,7 @@ def farthest_element(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Found
     """The element of a with the largest s. Outside of a face that the ellipsoid is above, it is that one; apart, the
     first that is the nearest one.
     """
-    o, db = int(sizes[0]), (sizes[4], sizes[5], sizes[6])
+    o, db = int(sizes[0]), three(sizes, PairSize.B)
     found = best_face(sizes, hull, R, r)
     y = farthest(found[2], db)[1] if found[1] > 0 else NOWHERE
     y = to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2]))
@@ -258,7 +259,7 @@ def farthest_element(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Found
         other, nearest = along_element(k, sizes, hull, R, r)
         if nearest and other[0] > 0.0:
             return other
-        if other[0] > found[0] + _TIE * sizes[6]:
+        if other[0] > found[0] + _TIE * sizes[PairSize.B + 2]:
             found = other
     return found
 
@@ -266,7 +267,7 @@ def farthest_element(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Found
 @inner_kernel
 def polytope_ellipsoid(sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
     """The element of a polytope a, with a radius around it, of the largest s."""
-    o, db, radius = int(sizes[0]), (sizes[4], sizes[5], sizes[6]), sizes[1]
+    o, db, radius = int(sizes[0]), three(sizes, PairSize.B), sizes[1]
     s, k, n = farthest_element(sizes, hull, R, r)
     if k > int(hull[o, 0] + hull[o, 1]):
         put_plane(n, s - radius, db, out)

@@ -16,6 +16,7 @@ from sim.contact.collision.box import column
 from sim.contact.collision.level_set import Bend, lost, nearest, turned
 from sim.contact.collision.rim import across, put_column
 from sim.contact.collision.witness import NOWHERE, along, axis, dot, put
+from sim.model.columns import PairSize
 from solvers.compiler import inner_kernel, kernel
 from solvers.rotation import Vec3
 from solvers.types import Matrix, Vector
@@ -65,7 +66,7 @@ def put_between(
 def sphere_field(sizes: Vector, hull: Matrix, r: Vector, out: Vector) -> None:
     """phi = d - ra - rb"""
     c = (r[0], r[1], r[2])
-    put_ball(c, nearest(hull, int(sizes[4]), c), (sizes[0], sizes[5]), out)
+    put_ball(c, nearest(hull, int(sizes[PairSize.B]), c), (sizes[0], sizes[PairSize.B + 1]), out)
 
 
 @kernel
@@ -107,7 +108,13 @@ def between(hull: Matrix, o: int, c: Vec3, u: Vec3, half: float) -> tuple[float,
 @inner_kernel
 def capsule_field(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
     """An end, or the place between the ends, which may coincide with an end."""
-    o, c, u, half, radii = int(sizes[4]), (r[0], r[1], r[2]), column(R, 2), sizes[1], (sizes[0], sizes[5])
+    o, c, u, half, radii = (
+        int(sizes[PairSize.B]),
+        (r[0], r[1], r[2]),
+        column(R, 2),
+        sizes[1],
+        (sizes[0], sizes[PairSize.B + 1]),
+    )
     s, inner = half if feature == 1 else -half, False
     if feature == INSIDE:
         s, inner = between(hull, o, c, u, half)
@@ -124,6 +131,6 @@ def choose_end(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) 
     """1 for the ends, and for a place between them; 0 where there is none, or only a flat one."""
     if feature != INSIDE:
         return 1
-    o, c, u, half = int(sizes[4]), (r[0], r[1], r[2]), column(R, 2), sizes[1]
+    o, c, u, half = int(sizes[PairSize.B]), (r[0], r[1], r[2]), column(R, 2), sizes[1]
     s, inner = between(hull, o, c, u, half)
     return 1 if inner and slope(hull, o, along(c, s, u), u)[1] * half > _FLAT else 0

@@ -6,8 +6,9 @@ from math import sqrt
 
 from sim.contact.collision.box import corner, to_b
 from sim.contact.collision.witness import FACE, NOWHERE, Z, absent, along, axis, moment, put, put_rows, vertex_a
+from sim.model.columns import PairSize
 from solvers.compiler import inner_kernel
-from solvers.rotation import Vec3
+from solvers.rotation import Vec3, three
 from solvers.types import Vector
 
 _LEVEL = 1e-4  # sine of the tilt below which the lowest point of a rim leaves the rim for its centre
@@ -37,7 +38,7 @@ def capsule_halfspace(feature: int, sizes: Vector, R: Vector, r: Vector, out: Ve
 @inner_kernel
 def box_halfspace(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Corners; the bits of `feature` are the signs of x, y, z."""
-    x = to_b(R, corner(feature, (sizes[0], sizes[1], sizes[2])))
+    x = to_b(R, corner(feature, three(sizes, PairSize.A)))
     point_plane((r[0] + x[0], r[1] + x[1], r[2] + x[2]), 0.0, out)
 
 

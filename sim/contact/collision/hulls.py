@@ -32,6 +32,7 @@ from sim.contact.collision.witness import (
     vertex_a,
     vertex_b,
 )
+from sim.model.columns import PairSize
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, cross
 from solvers.types import Matrix, Vector
@@ -99,7 +100,7 @@ def _edge_axis(
     """Code of edge i of a and edge j of b where their normal points out of b and into a, 0 where none does; their
     distance along it; whether they cross, seen along it.
     """
-    oa, ob = int(sizes[0]), int(sizes[4])
+    oa, ob = int(sizes[0]), int(sizes[PairSize.B])
     x, u, la = edge(hull, oa, i)
     y, ub, lb = edge(hull, ob, j)
     ua = to_b(R, u)
@@ -126,7 +127,7 @@ def separation(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Arrangement
     """Of the normals of faces and of pairs of edges, the one along which the two are farthest apart, or overlap least:
     (row of the face, or -1 for edges; the same again; distance along it; 1; 1).
     """
-    oa, ob = int(sizes[0]), int(sizes[4])
+    oa, ob = int(sizes[0]), int(sizes[PairSize.B])
     na, nb = int(hull[oa, 0]), int(hull[ob, 0])
     best, face = -1e300, -1
     for f in range(ob + 1 + nb + int(hull[ob, 1]), ob + 1 + nb + int(hull[ob, 1]) + int(hull[ob, 2])):
@@ -158,7 +159,7 @@ def two_edges(m: int, deepest: float, sizes: Vector, hull: Matrix, R: Vector, r:
     Edges on the far sides of the two cross as well, with a negative distance. Such pairs count only where the shapes
     overlap, and least along that normal: by `deepest`.
     """
-    oa, ob = int(sizes[0]), int(sizes[4])
+    oa, ob = int(sizes[0]), int(sizes[PairSize.B])
     for i in range(int(hull[oa, 1])):
         for j in range(int(hull[ob, 1])):
             code, d, crosses = _edge_axis(i, j, _LEANING, sizes, hull, R, r)
@@ -177,8 +178,8 @@ def face_towards(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector
     """The elements of feature `feature` where it is a corner: the face of the other shape that it is highest above, if
     it is not below that one, else the nearest element. 0 if that is not a corner.
     """
-    radius = sizes[1] + sizes[5]
-    oa, ob = int(sizes[0]), int(sizes[4])
+    radius = sizes[1] + sizes[PairSize.B + 1]
+    oa, ob = int(sizes[0]), int(sizes[PairSize.B])
     na, nb = int(hull[oa, 0]), int(hull[ob, 0])
     if feature < na:
         x = to_b(R, row(hull, oa + 1 + feature))
@@ -199,7 +200,7 @@ def choose_elements(
 ) -> int:
     """The elements that are contact point `feature` at this pose; writes the contact, too."""
     face, _, s, _, _ = arrangement
-    oa, ob = int(sizes[0]), int(sizes[4])
+    oa, ob = int(sizes[0]), int(sizes[PairSize.B])
     na, nb = int(hull[oa, 0]), int(hull[ob, 0])
     if feature < na:
         x = to_b(R, row(hull, oa + 1 + feature))
@@ -220,9 +221,9 @@ def choose_elements(
 def put_elements(feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
     """Contact of the elements `code`."""
     feature, code = original(feature, code)
-    oa, ob = int(sizes[0]), int(sizes[4])
+    oa, ob = int(sizes[0]), int(sizes[PairSize.B])
     na, nb = int(hull[oa, 0]), int(hull[ob, 0])
-    radii = (sizes[1], sizes[5])
+    radii = (sizes[1], sizes[PairSize.B + 1])
     if code == 0:
         absent(out)
     elif feature < na:

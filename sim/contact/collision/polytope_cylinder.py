@@ -29,6 +29,7 @@ from sim.contact.collision.rim import (
     rim_below,
 )
 from sim.contact.collision.witness import TIE, absent, dot
+from sim.model.columns import PairSize
 from sim.model.shape_kinds import CROSSINGS, RIM_POINTS
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
@@ -52,7 +53,7 @@ def survey(
     sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector, codes: Integers, first: int, room: int
 ) -> Survey:
     """Distance of the two, negative inside, and the elements that give its normal; overwrites `out`."""
-    o, rho, half = int(sizes[0]), sizes[4], sizes[5]
+    o, rho, half = int(sizes[0]), sizes[PairSize.B], sizes[PairSize.B + 1]
     na = int(hull[o, 0])
     best, kind, which, face, end = -1e300, END, 0, 0, TOP
     for k in range(2):
@@ -90,7 +91,7 @@ def choose_elements(
     sizes: Vector, hull: Matrix, R: Vector, r: Vector, codes: Integers, first: int, out: Vector
 ) -> None:
     """codes[first:] = the elements of all contact points at this pose; uses up `out`."""
-    o, rho, half = int(sizes[0]), sizes[4], sizes[5]
+    o, rho, half = int(sizes[0]), sizes[PairSize.B], sizes[PairSize.B + 1]
     na = int(hull[o, 0])
     rims = RIM_POINTS if int(hull[o, 2]) > 0 else 0
     begin = first + na + rims
@@ -130,7 +131,7 @@ def choose_elements(
 @inner_kernel
 def rim_at_face(k: int, face: int, deepest: float, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
     """Code of point k of the rims where it is below the face of a, and no deeper than the shapes are; 0 elsewhere."""
-    below, x = rim_below(k, face_plane(hull, face, R, r), (sizes[4], sizes[5]), deepest, R, r)
+    below, x = rim_below(k, face_plane(hull, face, R, r), (sizes[PairSize.B], sizes[PairSize.B + 1]), deepest, R, r)
     return 16 + 8 * (face - int(sizes[0])) if below and above(hull, int(sizes[0]), face, x) else 0
 
 
@@ -138,7 +139,7 @@ def rim_at_face(k: int, face: int, deepest: float, sizes: Vector, hull: Matrix, 
 def put_elements(feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
     """Contact of the elements `code`."""
     feature, code = original(feature, code)
-    o, rho, half = int(sizes[0]), sizes[4], sizes[5]
+    o, rho, half = int(sizes[0]), sizes[PairSize.B], sizes[PairSize.B + 1]
     na = int(hull[o, 0])
     if code == 0:
         absent(out)
@@ -157,4 +158,4 @@ def corner_instead(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vect
     o = int(sizes[0])
     if feature >= int(hull[o, 0]):
         return 0
-    return 16 + nearest(corner_of(hull, o, feature, R, r), sizes[4], sizes[5])
+    return 16 + nearest(corner_of(hull, o, feature, R, r), sizes[PairSize.B], sizes[PairSize.B + 1])

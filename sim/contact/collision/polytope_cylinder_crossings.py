@@ -21,6 +21,7 @@ from sim.contact.collision.rim import (
     sector_of,
 )
 from sim.contact.collision.witness import Z, along, dot, edges, vertex_b
+from sim.model.columns import PairSize
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
 from solvers.types import Integers, Matrix, Vector
@@ -55,7 +56,7 @@ def separation_along(n: Vec3, sizes: Vector, hull: Matrix, R: Vector, r: Vector)
     w = to_a(R, n)
     for k in range(int(hull[o, 0])):
         least = min(least, dot(w, row(hull, o + 1 + k)))
-    return least + dot(n, (r[0], r[1], r[2])) - reach(n, sizes[4], sizes[5])
+    return least + dot(n, (r[0], r[1], r[2])) - reach(n, sizes[PairSize.B], sizes[PairSize.B + 1])
 
 
 @inner_kernel
@@ -63,7 +64,7 @@ def crossing(i: int, part: int, sizes: Vector, hull: Matrix, R: Vector, r: Vecto
     """Code of edge i of a where it crosses b at its side (part 0) or at one of two places on rim + (1, 2) or - (3, 4),
     with a normal out of b and into a; 0 for none. Writes the contact.
     """
-    o, rho, half = int(sizes[0]), sizes[4], sizes[5]
+    o, rho, half = int(sizes[0]), sizes[PairSize.B], sizes[PairSize.B + 1]
     x, u, l = edge_of(hull, o, i, R, r)
     where, sector, over = SIDE, 0, 1.0
     if part == 0:
@@ -101,7 +102,11 @@ def crossing(i: int, part: int, sizes: Vector, hull: Matrix, R: Vector, r: Vecto
 @inner_kernel
 def rim_place(where: int, angle: float, sizes: Vector) -> Vec3:
     """The point of rim + or - (POINT_TOP, POINT_BOTTOM) at this angle."""
-    return sizes[4] * cos(angle), sizes[4] * sin(angle), (sizes[5] if where == POINT_TOP else -sizes[5])
+    return (
+        sizes[PairSize.B] * cos(angle),
+        sizes[PairSize.B] * sin(angle),
+        (sizes[PairSize.B + 1] if where == POINT_TOP else -sizes[PairSize.B + 1]),
+    )
 
 
 @inner_kernel
@@ -135,10 +140,10 @@ def put_crossing(code: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, o
     over = 1.0 if ((code - 16) >> 3) & 1 else -1.0
     x, u, _ = edge_of(hull, int(sizes[0]), k % _MANY, R, r)
     if where == SIDE:
-        edges(x, u, (0.0, 0.0, 0.0), Z, edge_normal(Z, u, over), (sizes[1], sizes[4]), out)
+        edges(x, u, (0.0, 0.0, 0.0), Z, edge_normal(Z, u, over), (sizes[1], sizes[PairSize.B]), out)
         return
-    z = sizes[5] if where == RIM_TOP else -sizes[5]
-    line_rim(x, u, angle_of(k // _MANY), sizes[4], z, sizes[1], out)
+    z = sizes[PairSize.B + 1] if where == RIM_TOP else -sizes[PairSize.B + 1]
+    line_rim(x, u, angle_of(k // _MANY), sizes[PairSize.B], z, sizes[1], out)
 
 
 @inner_kernel

@@ -27,6 +27,7 @@ from sim.contact.collision.witness import (
     vertex_a,
     vertex_b,
 )
+from sim.model.columns import PairSize
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
 from solvers.types import Vector
@@ -43,7 +44,7 @@ def choose_points(feature: int, sizes: Vector, R: Vector, r: Vector) -> int:
     1 + 3 (s + 1) + (t + 1), and 16 where the normal of a crossing is along ub x ua.
     """
     c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
-    la, lb = sizes[1], sizes[5]
+    la, lb = sizes[1], sizes[PairSize.B + 1]
     low, high = beside(-1.0, c, u, la, lb), beside(1.0, c, u, la, lb)
     code = high
     if feature == 0:
@@ -99,7 +100,7 @@ def sign_at(s: float, half: float) -> float:
 def put_points(code: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Contact of the points of `choose_points`, which are not 0."""
     c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
-    half, radii = (sizes[1], sizes[5]), (sizes[0], sizes[4])
+    half, radii = (sizes[1], sizes[PairSize.B + 1]), (sizes[0], sizes[PairSize.B])
     s, t = float((code - 1 & 15) // 3 - 1), float((code - 1 & 15) % 3 - 1)
     if s == 0.0 and t == 0.0:
         k = sqrt(1.0 - u[2] * u[2])

@@ -74,7 +74,7 @@ def room(kind: int, sizes: Vector, hull: Matrix) -> int:
         a = int(sizes[0])
         return int(hull[a, 0]) + (RIM_POINTS if hull[a, 2] > 0.0 else 0)
     if kind == Pair.POLYTOPE_POLYTOPE:
-        return int(hull[int(sizes[0]), 0] + hull[int(sizes[4]), 0])
+        return int(hull[int(sizes[0]), 0] + hull[int(sizes[PairSize.B]), 0])
     return 1 << 40
 
 
