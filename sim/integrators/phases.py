@@ -14,24 +14,22 @@ Columns of `inactive` here, at the first contact of a cluster: Apart of sim/mode
 from __future__ import annotations
 
 from math import cos, sin, sqrt
-from typing import NamedTuple
 
 from sim.contact.contact_report import report_contacts
 from sim.contact.inactive import cluster_gap, highest
 from sim.contact.pairs.clearance import largest_speed, least_gap, measure_pairs, omitted_pairs
 from sim.dynamics.external_forces import set_external
-from sim.integrators.runge_kutta import advance, begin
+from sim.integrators.rollout import MotionBuffers
+from sim.integrators.runge_kutta import advance
 from sim.mechanism.confined import IDLE
 from sim.model.columns import Apart, Bounce, Cluster, StepReport, StepSetting
 from sim.model.data import Data
-from sim.model.layout import data_view, model_view
 from sim.model.model import Model
-from sim.model.pace import is_due, start_pace
-from solvers.compiler import Table, kernel
-from solvers.dense import clear, copy, copy_vector
+from solvers.compiler import kernel
+from solvers.dense import copy, copy_vector
 from solvers.rotation import quat_matrix, quat_turn
 from solvers.status import Status
-from solvers.types import Cube, Matrix, Vector
+from solvers.types import Matrix, Vector
 
 NEAR = -1  # in place of a Status: a contact or limit is active
 
@@ -87,21 +85,6 @@ def _allowed(data: Data, tolerance: float) -> float:
 
 
 @kernel
-def first_far(model_at: Table, data_at: Table, settings: Vector, xs: Matrix) -> int:
-    """The first of the states xs (n, nx) at which all is inactive; n if there is none."""
-    model = model_view(model_at)
-    data = data_view(data_at)
-    nq = data.theta1.shape[0]
-    for t in range(xs.shape[0]):
-        begin(model, data, xs[t])
-        if left_out(model, data, settings[StepSetting.KAPPA], xs[t, nq:], -1.0) <= _allowed(
-            data, settings[StepSetting.TOLERANCE]
-        ):
-            return t
-    return xs.shape[0]
-
-
-@kernel
 def leave(data: Data) -> None:
     """Configuration 2 becomes configuration 1."""
     copy(data.pos2, data.pos1)
@@ -138,49 +121,28 @@ def report_apart(model: Model, data: Data, h: float, out: Matrix) -> None:
     copy(data.quat3, data.quat2)
 
 
-class Flight(NamedTuple):
-    """Steps while all is inactive."""
-
-    us: Matrix  # (T, nu) in
-    wrenches: Cube  # (T, nbody, 6) in, or (0, nbody, 6)
-    xs: Matrix  # (T + 1, nx), of which xs[0] is given
-    reports: Matrix  # (T, 5)
-    contacts: Cube  # (T, ncontact, 11)
-
-
 @kernel
-def roll_far(model_at: Table, data_at: Table, settings: Vector, flight: Flight, first: int) -> tuple[int, int]:
-    """xs[t + 1] = step(xs[t], us[t]) from t = first on while all is inactive.
+def fly(
+    model: Model, data: Data, settings: Vector, motion: MotionBuffers, x: Vector, x_next: Vector, t: int
+) -> int:  # fmt: skip
+    """x_next = the node a step of higher order after the node x, which is in `data`; the Status, or NEAR.
 
-    Returns how many steps were taken, and why no more: SOLVED at the end of us or after the deadline, NEAR, or the
-    Status of the next.
+    Inputs, external wrenches, report and contacts are those of step t of the motion.
     """
-    model = model_view(model_at)
-    data = data_view(data_at)
-    nq = data.theta1.shape[0]
-    h, kappa = settings[StepSetting.TIME_STEP], settings[StepSetting.KAPPA]
-    us, xs, reports = flight.us, flight.xs, flight.reports
-    start_pace(data, settings)
-    if first == 0:
-        clear(data.carry.external)
-        begin(model, data, xs[0])
-    for t in range(first, us.shape[0]):
-        x = xs[t + 1]
-        copy_vector(xs[t], x)
-        allowed = _allowed(data, settings[StepSetting.TOLERANCE])
-        if left_out(model, data, kappa, x[nq:], -1.0) > allowed:
-            return t, NEAR
-        leave(data)
-        set_external(data, flight.wrenches, t)
-        status = advance(model, data, h, us[t], x, None)
-        reports[t, StepReport.STATUS] = status
-        reports[t, StepReport.ITERATIONS] = model.stage_b.shape[0]
-        reports[t, StepReport.WORST] = -1.0
-        if status != _SOLVED:
-            return t, status
-        if left_out(model, data, kappa, x[nq:], h) > allowed:
-            return t, NEAR
-        report_apart(model, data, h, flight.contacts[t])
-        if is_due(data, reports[t, StepReport.ITERATIONS]):
-            return t + 1, _SOLVED
-    return us.shape[0], _SOLVED
+    nq, h, kappa = data.theta1.shape[0], settings[StepSetting.TIME_STEP], settings[StepSetting.KAPPA]
+    report = motion.reports[t]
+    copy_vector(x, x_next)
+    allowed = _allowed(data, settings[StepSetting.TOLERANCE])
+    if left_out(model, data, kappa, x_next[nq:], -1.0) > allowed:
+        return NEAR
+    leave(data)
+    set_external(data, motion.wrenches, t)
+    status = advance(model, data, h, motion.us[t], x_next, None)
+    report[StepReport.STATUS], report[StepReport.WORST] = status, -1.0
+    report[StepReport.ITERATIONS] = model.stage_b.shape[0]
+    if status != _SOLVED:
+        return status
+    if left_out(model, data, kappa, x_next[nq:], h) > allowed:
+        return NEAR
+    report_apart(model, data, h, motion.contacts[t])
+    return _SOLVED

@@ -184,7 +184,7 @@ def roll(
                 report[StepReport.EARLIER] += report[StepReport.ITERATIONS]
             if s + 1 < n and is_due(data, report[StepReport.ITERATIONS]):
                 return t * n + s + 1
-        if not _report(model, data, options, motion, t, report):
+        if not report_step(model, data, options, motion, t, report):
             return t
         if columns is not None:
             at = At(options.h, x[:nq], x[nq:], motion.us[t], columns.twists, columns.below)
@@ -197,7 +197,7 @@ def roll(
 
 
 @kernel
-def _report(model: Model, data: Data, options: StepOptions, motion: MotionBuffers, t: int, report: Vector) -> bool:
+def report_step(model: Model, data: Data, options: StepOptions, motion: MotionBuffers, t: int, report: Vector) -> bool:
     """Contacts and derivatives of step t, where there are buffers for them; False where they are not finite."""
     x, nq = motion.xs[t], data.theta1.shape[0]
     if motion.contacts.shape[0] > 0:

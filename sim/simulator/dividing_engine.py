@@ -156,6 +156,10 @@ class DividingEngine(Engine):
         A, B = chained(ahead, divided.rolled)
         return back @ A, back @ B
 
+    def forget_parts(self) -> None:
+        """As Engine.forget_parts."""
+        self._ended.parts = None
+
     def last(self) -> Data:
         """Data of the last step of this thread, or of its last part."""
         parts = getattr(self._ended, "parts", None)

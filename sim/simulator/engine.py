@@ -40,6 +40,7 @@ REPORT, CONTACT, CONE, BOUND = 6, 11, 12, 2
 _IMPULSE = slice(ContactRow.IMPULSE, ContactRow.POINT)
 _POINT = slice(ContactRow.POINT, ContactRow.GAP)
 _NORMAL = slice(ContactRow.NORMAL, CONTACT)
+_ONE_PART, _WHOLE = np.ones(1, dtype=np.int64), np.ones(1)  # of the division of one step
 _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 
@@ -95,9 +96,6 @@ class Divided(NamedTuple):
         turned = (length > 0.0) & out[:, _NORMAL].any(axis=1)  # without a normal, it is beyond its reach at the end
         out[turned, _NORMAL] = normals[turned] / length[turned, None]
         return np.asarray(out)
-
-
-_ONE_PART, _WHOLE = np.ones(1, dtype=np.int64), np.ones(1)
 
 
 class Division(NamedTuple):
@@ -338,6 +336,9 @@ class Engine:
     def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Vector) -> Floats:
         """(n, nx) states at any times of a motion; only engines with an accuracy have them."""
         raise NotImplementedError
+
+    def forget_parts(self) -> None:
+        """Let `last` be that of a step as a whole; only engines that divide steps have parts."""
 
     def whole(self) -> Engine:
         """The engine that refuses steps which it cannot solve as a whole."""

@@ -19,13 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.dynamics.joints.damper import node_dampings
-from sim.integrators import legendre, phases, rollout
+from sim.integrators import legendre
 from sim.integrators.hamilton_gradient import Slopes
+from sim.integrators.phased_rollout import Phases, roll_phases
+from sim.integrators.rollout import MotionBuffers
 from sim.model.columns import StepReport
 from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.dividing_engine import DividingEngine
-from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted
+from sim.simulator.engine import CONTACT, DIVISIBLE, REPORT, Division, Engine, Floats, Rolled, interrupted
 from sim.simulator.knot_engine import KnotEngine
 from sim.simulator.link import link_flight
 from sim.simulator.results import Interrupted
@@ -33,8 +35,6 @@ from sim.simulator.settings import Settings
 from solvers.compiler import Table
 from solvers.status import Status
 from solvers.types import Cube, Vector
-
-_PIECE, _LARGEST = 16, 1024  # steps of order 2 at once; those after all is inactive again are discarded
 
 
 class March(NamedTuple):
@@ -44,7 +44,7 @@ class March(NamedTuple):
     xs: Floats  # (T + 1, nx)
     reports: Floats  # (T, 6)
     contacts: Floats  # (T, ncontact, 11)
-    means: Floats  # (T, nx) the states of order 2 where the steps of order 2 begin
+    means: Floats  # (T + 1, nx) the states of order 2 where its steps begin
     near: NDArray[np.bool_]  # (T,) which those are
 
 
@@ -58,106 +58,59 @@ class PhasedEngine(KnotEngine):
         super().__init__(model, settings)
         self.second_order = second_order
         self._second = (DividingEngine if settings.divide else Engine)(model, settings._replace(order=2))
-        self._last = threading.local()
+        self._kept = threading.local()  # tables, and whether the last step was `near`
 
     def march(self, x: Vector, us: Floats, wrenches: Cube | None = None, kappa: float | None = None) -> March:
         """Steps from x under us (T, nu) and external wrenches (T, nbody, 6)."""
-        steps, ncontact = len(us), self.sizes.ncontact
-        external = self.external(wrenches)
-        out = March(
-            0,
-            np.zeros((steps + 1, self.nx)),
-            np.zeros((steps, REPORT)),
-            np.zeros((steps, ncontact, CONTACT)),
-            np.zeros((steps, self.nx)),
-            np.zeros(steps, dtype=bool),
-        )
-        out.xs[0] = x
-        t, mean = 0, None
+        steps, t = len(us), 0
+        xs, means, near = np.zeros((steps + 1, self.nx)), np.zeros((steps + 1, self.nx)), np.zeros(steps, np.int64)
+        reports, contacts = np.zeros((steps, REPORT)), np.zeros((steps, self.sizes.ncontact, CONTACT))
+        motion = MotionBuffers(means, us, self.external(wrenches), reports, contacts, *self.unknown[:2])
+        path = Phases(xs, motion, near, not self.second_order, self.settings.divide)
+        xs[0], settings, (models, works) = x, self._second.settings.array(kappa), self._lines()
+        self._second.forget_parts()
         try:
-            while t < steps:
-                taken, why = self._fly(
-                    phases.Flight(us[t:], external[t:], out.xs[t:], out.reports[t:], out.contacts[t:]), kappa
-                )
-                t += taken
-                if why != phases.NEAR:
-                    break
-                if taken or mean is None:
-                    status, mean = self._second.start(out.xs[t, : self.sizes.nq], out.xs[t, self.sizes.nq :])
-                    if status != Status.SOLVED:
-                        out.reports[t] = status, 0.0, np.inf, 0.0, -1.0
-                        break
-                taken, mean = self._stay(out, t, (us, external), mean, kappa)
-                t += taken
-                if mean is None:
-                    break
-        except KeyboardInterrupt as stop:
-            t += stop.result if isinstance(stop, Interrupted) else int(out.near[t:].sum())
-            raise Interrupted((t, out.xs, interrupted(out.reports, t), out.contacts)) from None
-        self._last.near = bool(t and out.near[t - 1])
-        if t < steps:
-            np.nan_to_num(out.reports[t], copy=False, nan=np.inf, posinf=np.inf)
-        return out._replace(knot=t)
-
-    def _flight_table(self) -> Table:
-        """Table of the Model for steps of higher order beside contacts."""
-        return self.linked(link_flight)
-
-    def _fly(self, flight: phases.Flight, kappa: float | None) -> tuple[int, int]:
-        """Steps of higher order while all is inactive: their number, and the reason for the end; see `roll_far`."""
-        if self.second_order:
-            return 0, phases.NEAR
-        model, data, settings = self._flight_table(), self._scratch.table(), self.settings.array(kappa)
-        taken, why = 0, int(Status.SOLVED)
-        try:
-            for _ in pieces(settings, len(flight.us)):
-                taken, why = phases.roll_far(model, data, settings, flight, taken)
-                if taken == len(flight.us) or why != Status.SOLVED:
+            for _ in pieces(settings, steps):
+                t = int(roll_phases(models, works, settings, path, t))
+                while t < steps and near[t] and self._divide(path, t, kappa):
+                    t += 1
+                    if t < steps:
+                        t = int(roll_phases(models, works, settings, path, t))
+                if t == steps or reports[t, StepReport.STATUS] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
-            raise Interrupted(taken) from None
-        return int(taken), int(why)
+            raise Interrupted((t, xs, interrupted(reports, t), contacts)) from None
+        self._kept.near = bool(t and near[t - 1])
+        if t < steps:
+            np.nan_to_num(reports[t], copy=False, nan=np.inf, posinf=np.inf)
+        return March(t, xs, reports, contacts, means, near > 0)
 
-    def _stay(
-        self, out: March, first: int, given: tuple[Floats, Floats], mean: Vector, kappa: float | None
-    ) -> tuple[int, Vector | None]:
-        """Steps of order 2 from the state `mean` at step `first` until all is inactive: their number, the last state.
+    def _lines(self) -> tuple[Table, Table]:
+        """Tables of the models of both orders, and of this thread's Data of both."""
+        own, other = self.table(), self._second.table()
+        if getattr(self._kept, "works", (None, None))[0] is not own:
+            self._kept.works = own, np.stack([own, other])
+            self._kept.models = np.stack([self.linked(link_flight), self._second.step_table()])
+        return self._kept.models, self._kept.works[1]
 
-        None in its place where a step is not solved. given: inputs, and external wrenches.
-        """
-        model, settings = self._second.step_table(), self.settings.array(kappa)
-        us, external = given
-        t, piece, nq = first, _PIECE, self.sizes.nq
-        while t < len(us):
-            count = min(piece, len(us) - t)
-            means = np.zeros((count + 1, self.nx))
-            means[0] = mean
-            rows = slice(t, t + count)
-            line = rollout.MotionBuffers(
-                means, us[rows], external[rows], out.reports[rows], out.contacts[rows], *self.unknown[:2]
-            )
-            try:
-                solved = self._second.take_steps(model, line, kappa, Division.none(count))
-            except Interrupted:
-                raise KeyboardInterrupt from None
-            nodes = means[1 : solved + 1].copy()
-            nodes[:, nq:] = self._second.node_velocities(nodes)
-            far = self._first_far(nodes, settings)
-            taken = min(far + 1, solved)
-            out.xs[t + 1 : t + 1 + taken] = nodes[:taken]
-            out.means[t : t + taken], out.near[t : t + taken] = means[:taken], True
-            t, mean, piece = t + taken, means[taken], min(2 * piece, _LARGEST)
-            if far < solved:
-                break
-            if solved < count:
-                return t - first, None
-        return t - first, mean
-
-    def _first_far(self, nodes: Floats, settings: Vector) -> int:
-        """The first of some nodes (n, nx) from which the steps are of higher order; n if there is none."""
-        if self.second_order:
-            return len(nodes)
-        return int(phases.first_far(self._flight_table(), self._scratch.table(), settings, nodes))
+    def _divide(self, path: Phases, t: int, kappa: float | None) -> bool:
+        """Take the unsolved step t of order 2 in parts; False where that does not solve it."""
+        motion, row = path.motion, slice(t, t + 1)
+        if int(motion.reports[t, StepReport.STATUS]) not in DIVISIBLE:
+            return False
+        one = MotionBuffers(
+            motion.xs[t : t + 2],
+            motion.us[row],
+            motion.wrenches[row],
+            motion.reports[row],
+            motion.contacts[row],
+            *self.unknown[:2],
+        )
+        if self._second.take_steps(self._second.step_table(), one, kappa, Division.none(1)) == 0:
+            return False
+        path.xs[t + 1] = motion.xs[t + 1]
+        path.xs[t + 1, self.sizes.nq :] = self._second.node_velocities(motion.xs[t + 1 : t + 2])[0]
+        return True
 
     def roll(
         self,
@@ -182,7 +135,7 @@ class PhasedEngine(KnotEngine):
 
     def inactive(self) -> NDArray[np.bool_]:
         """As Engine.inactive; all of them where the step was of higher order."""
-        return self._second.inactive() if self._last.near else np.ones(self.sizes.ncontact, dtype=bool)
+        return self._second.inactive() if self._kept.near else np.ones(self.sizes.ncontact, dtype=bool)
 
     def linearize_knot(
         self, x: Vector, given: tuple[Floats, Cube], kappa: float | None

@@ -204,14 +204,16 @@ def momenta_of_velocities(model_at: Table, data_at: Table, x: Vector, vs: Matrix
 
 
 @kernel
-def intervals(model_at: Table, data_at: Table, h: float, xs: Matrix, out: Vector) -> None:
-    """out[t] = interval of the velocity of the state xs[t]: h, or SHORTEST h if a body would turn by half a turn in h.
+def interval(model: Model, data: Data, h: float, x: Vector) -> float:
+    """Interval of the velocity of the state x: h, or SHORTEST h if a body would turn by half a turn in h [s]."""
+    node_poses(model, data, h, x)
+    return h if turns_below_half(model, data, h, x[data.theta1.shape[0] :]) else SHORTEST * h
 
-    xs: (n, nx); out: (n,) [s].
-    """
+
+@kernel
+def intervals(model_at: Table, data_at: Table, h: float, xs: Matrix, out: Vector) -> None:
+    """`interval` of each state.   xs: (n, nx); out: (n,) [s]."""
     model = model_view(model_at)
     data = data_view(data_at)
-    nq = data.theta1.shape[0]
     for t in range(xs.shape[0]):
-        node_poses(model, data, h, xs[t])
-        out[t] = h if turns_below_half(model, data, h, xs[t, nq:]) else SHORTEST * h
+        out[t] = interval(model, data, h, xs[t])

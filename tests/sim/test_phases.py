@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from sim.simulator import phased_engine
 from support.scenes import pendulum
 
 H, KAPPA, TOLERANCE = 0.02, 1e-12, 1e-10
@@ -191,3 +192,24 @@ def test_a_step_that_fails_says_so() -> None:
     assert not t.success and 0 < t.knot < 40
     assert f"step {t.knot}" in t.message and t.status == dojo.Status.MAX_ITERATIONS
     assert len(t.x) == t.knot + 1 and np.isfinite(t.x).all()
+
+
+def test_steps_of_both_orders_are_one_call_of_a_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    sim = simulator(4)
+    x, us = thrown(sim, 0.1), np.zeros((30, 3))
+    sim.rollout(x, us)
+    calls: list[int] = []
+    kernel = phased_engine.roll_phases
+    monkeypatch.setattr(phased_engine, "roll_phases", lambda *arguments: calls.append(0) or kernel(*arguments))
+    order2 = near(sim, x, us)
+    assert len(calls) == 1 and order2.any() and not order2.all()
+
+
+def test_a_step_that_has_no_mean_velocity_says_so() -> None:
+    """At the ground, and so fast that poses an interval apart cannot tell how far it turns."""
+    sim = simulator(4, dojo.models.block(), divide=False)
+    x = sim.neutral()
+    x[sim.nq + 3 :] = 0.0, 0.0, 200.0
+    step = sim.step(x)
+    assert step.status == dojo.Status.ANGULAR_STEP and not step.success
+    np.testing.assert_array_equal(step.x, x)
