@@ -31,6 +31,7 @@ from dojo_opt.planning.term import (
     table,
 )
 from sim.mechanism.brief import brief_repr
+from sim.simulator.simulator import Simulator
 
 Integers = NDArray[np.int64]
 Vector = NDArray[np.float64]
@@ -72,7 +73,7 @@ class Goal(Spec):
 
     __repr__ = brief_repr
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         knots = knot_list("Goal(knots=...)", self.knots, horizon, last=True)
         target = state_table("Goal(target=...)", self.target, knots.size, sim.nx, layout)
         mask = np.zeros((knots.size, sim.ndx))
@@ -119,7 +120,7 @@ class StateBounds(Spec):
 
     __repr__ = brief_repr
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         knots = knot_list("StateBounds(knots=...)", self.knots, horizon, last=True)
         knots = knots[knots > 0] if self.knots is None else knots
         chosen = chosen_components("StateBounds(components=...)", self.components, sim)
@@ -148,12 +149,12 @@ class SpeedLimits(Spec):
 
     __repr__ = brief_repr
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         mech = sim.mechanism
-        limited = [i for i in mech.inputs or () if i.joint is not None and np.isfinite(i.speed)]
+        limited = [(i, i.joint) for i in mech.inputs or () if i.joint is not None and np.isfinite(i.speed)]
         if not limited:
             raise ValueError(f"SpeedLimits(): no input of {mech.name!r} has a largest speed; see Input(speed=...)")
-        speeds = {mech.v_slice(i.joint).start + i.dof: self.share * i.speed for i in limited}
+        speeds = {mech.v_slice(joint).start + i.dof: self.share * i.speed for i, joint in limited}
         most = np.array(list(speeds.values()))
         return StateBounds(-most, most, mech.nv + np.array(list(speeds)), self.knots).bind(sim, horizon, layout)
 
@@ -179,7 +180,7 @@ class ControlBounds(Spec):
 
     __repr__ = brief_repr
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         del layout
         knots = knot_list("ControlBounds(knots=...)", self.knots, horizon, last=False)
         chosen = chosen_inputs("ControlBounds(components=...)", self.components, sim)
@@ -209,7 +210,7 @@ class ResidualConstraint(Spec):
 
     __repr__ = brief_repr
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         check_residual("ResidualConstraint", self.function, self.dimension, self.jacobian, sim)
         knots = knot_list("ResidualConstraint(knots=...)", self.knots, horizon, last=True)
         kernels = ResidualKernels(self.function, self.jacobian, sim.nu)
@@ -231,7 +232,7 @@ class Periodic(Spec):
 
     __repr__ = brief_repr
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         shift = table("Periodic(shift=...)", self.shift, 1, sim.ndx)[0]
         if np.any(shift[layout < 0]):
             raise ValueError("Periodic(shift=...): expected zeros for rotations by quaternion")

@@ -22,6 +22,7 @@ from dojo_opt.planning.task_space.joint_limits import JointLimits
 from dojo_opt.planning.term import Pick, PickTerm, ResidualTerm, Spec, StateTerm, Term, knot_list, state_table, table
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
+from sim.simulator.simulator import Simulator
 
 Integers = NDArray[np.int64]
 
@@ -74,7 +75,7 @@ class Tracking(Spec):
 
     __repr__ = brief_repr
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         knots = knot_list("Tracking(knots=...)", self.knots, horizon, last=True)
         reference = state_table("Tracking(reference=...)", self.reference, knots.size, sim.nx, layout)
         named = state_weight("Tracking(weight=...)", self.weight, sim)
@@ -98,7 +99,7 @@ class Effort(Spec):
 
     __repr__ = brief_repr
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         del layout
         knots = np.arange(horizon)
         reference = table("Effort(reference=...)", self.reference, horizon, sim.nu)
@@ -136,7 +137,7 @@ class ResidualCost(Spec):
 
     __repr__ = brief_repr
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         check_residual("ResidualCost", self.function, self.dimension, self.jacobian, sim)
         knots = knot_list("ResidualCost(knots=...)", self.knots, horizon, last=True)
         weight = _checked_weight("ResidualCost", self.weight, knots.size, self.dimension, self.scale)

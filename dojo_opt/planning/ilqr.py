@@ -30,7 +30,7 @@ from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.starts import multi_start
 from dojo_opt.planning.subproblem import Subproblem
 from sim.mechanism import checks
-from sim.simulator.results import Interrupted
+from sim.simulator.results import Interrupted, Linearization
 from solvers.riccati import Promise
 from solvers.status import MESSAGES, Status
 
@@ -410,7 +410,7 @@ class Solver:
         self._open_gaps(stage, linear)
         return Status.SOLVED
 
-    def _open_gaps(self, stage: Stage, linear: Any) -> None:
+    def _open_gaps(self, stage: Stage, linear: Linearization) -> None:
         """Keep the states at the smoothing of `stage`, where their derivatives are `linear`."""
         gaps = self._horizon.gaps(linear, self.now.x)
         closed = float(np.abs(gaps).max()) <= self.options.gap

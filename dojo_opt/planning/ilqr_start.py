@@ -14,6 +14,7 @@ from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.task_space.task_term import PeriodicTaskTerm
 from dojo_opt.planning.term import PeriodicTerm
 from sim.simulator.horizon import Horizon
+from sim.simulator.simulator import Simulator
 from solvers.riccati import Quadratic, Regularization, backward, value_hessian, work_size
 from solvers.status import Status
 
@@ -47,7 +48,7 @@ def fitting_stage(horizon: Horizon, now: Iterate, stages: tuple[Stage, ...]) -> 
     return chosen, there
 
 
-def at_rest(sim: Any, objective: Objective, now: Iterate) -> bool:
+def at_rest(sim: Simulator, objective: Objective, now: Iterate) -> bool:
     """Whether a joint rests in the states from the second on, though it starts elsewhere or has to move.
 
     Such a guess fits a hard contact because nothing happens there. It does not show how contact moves that joint:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.simulator.simulator import Simulator
 from solvers.compiler import kernel, users_callee
 from solvers.rotation import inverse_right_jacobian, quat_exp, quat_log, quat_mul
 
@@ -23,7 +22,7 @@ def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
     return a[..., _NEXT] * b[..., _AFTER] - a[..., _AFTER] * b[..., _NEXT]
 
 
-def tangent_layout(sim: Any, x: Vector) -> Integers:
+def tangent_layout(sim: Simulator, x: Vector) -> Integers:
     """(ndx,) address in x of each scalar tangent component; -(a + 1) for the three of a quaternion that starts at a.
 
     Found by moving each component in the simulator: one that changes a single coordinate is a scalar.

@@ -10,20 +10,21 @@ from numpy.typing import NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.dofs import components
+from sim.simulator.simulator import Simulator
 
 Integers = NDArray[np.int64]
 
 __all__ = ["chosen_components", "chosen_inputs", "component_name", "input_weight", "state_weight"]
 
 
-def chosen_components(call: str, chosen: Any, sim: Any) -> Integers:
+def chosen_components(call: str, chosen: Any, sim: Simulator) -> Integers:
     """Components of dx by number or name; None means all. Names as in `Mechanism.components`."""
     if _named(chosen):
         return components(call, sim.mechanism.joints, chosen)
     return _numbers(call, chosen, sim.ndx)
 
 
-def chosen_inputs(call: str, chosen: Any, sim: Any) -> Integers:
+def chosen_inputs(call: str, chosen: Any, sim: Simulator) -> Integers:
     """Components of u by number or name; None means all."""
     if not _named(chosen):
         return _numbers(call, chosen, sim.nu)
@@ -50,7 +51,7 @@ def _numbers(call: str, chosen: Any, count: int) -> Integers:
     return numbers.astype(np.int64)
 
 
-def state_weight(call: str, weight: Any, sim: Any) -> Any:
+def state_weight(call: str, weight: Any, sim: Simulator) -> Any:
     """(ndx,) weights from a table by name, zero where none is given; anything else unchanged."""
     if not isinstance(weight, Mapping):
         return weight
@@ -61,7 +62,7 @@ def state_weight(call: str, weight: Any, sim: Any) -> Any:
     return out
 
 
-def input_weight(call: str, weight: Any, sim: Any) -> Any:
+def input_weight(call: str, weight: Any, sim: Simulator) -> Any:
     """(nu,) weights from a table by the names of inputs, zero where none is given; anything else unchanged."""
     if not isinstance(weight, Mapping):
         return weight
@@ -76,7 +77,7 @@ def _value(call: str, value: Any, size: int) -> Any:
     return checks.number(call, value) if checks.ndim(call, value) == 0 else checks.array(call, value, (size,))
 
 
-def component_name(sim: Any, column: int) -> str:
+def component_name(sim: Simulator, column: int) -> str:
     """Of a column of z = (dx, du)."""
     dofs = sim.mechanism.dof_names
     if column < sim.nv:

@@ -41,7 +41,7 @@ SAVED: dict[str, Any] = {  # fields in the head of a file
 }
 
 
-def _check_arrays(sim: Any, meta: dict[str, Any], data: dict[str, Any]) -> None:
+def _check_arrays(sim: Simulator, meta: dict[str, Any], data: dict[str, Any]) -> None:
     """Refuse a file whose arrays or records do not fit one another, or its simulator."""
     check_shapes(data, {"x": (None, None), "u": (None, None), "K": (None, None, None)})
     (knots, nu), ndx = data["u"].shape, data["K"].shape[2]

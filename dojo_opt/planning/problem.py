@@ -15,6 +15,7 @@ from dojo_opt.planning.term import Spec, numbers, state_table, table
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.memory import check_room
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -22,7 +23,7 @@ Matrix = NDArray[np.float64]
 __all__ = ["Problem"]
 
 
-def _limits(limits: tuple[ArrayLike, ArrayLike] | None, sim: Any) -> tuple[Vector, Vector] | None:
+def _limits(limits: tuple[ArrayLike, ArrayLike] | None, sim: Simulator) -> tuple[Vector, Vector] | None:
     """Control limits as two (nu,) arrays, infinite where free; those of the inputs where none are given."""
     nu = sim.nu
     if limits is None:
@@ -45,7 +46,7 @@ def _limits(limits: tuple[ArrayLike, ArrayLike] | None, sim: Any) -> tuple[Vecto
     return lo, hi
 
 
-def _components(call: str, chosen: Any, sim: Any) -> Any:
+def _components(call: str, chosen: Any, sim: Simulator) -> Any:
     """Component numbers as an array; None for none, True for all."""
     if chosen is None or chosen is False:
         return None
@@ -86,7 +87,7 @@ class Problem:
 
     def __init__(
         self,
-        sim: Any,
+        sim: Simulator,
         start: ArrayLike,
         horizon: int,
         *,

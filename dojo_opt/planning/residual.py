@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from dojo_opt.planning.captured import fingerprint
 from dojo_opt.planning.manifold import displace
 from sim.model.pace import rows
+from sim.simulator.simulator import Simulator
 from solvers.compiler import CompilationError, users_kernel, users_loop
 
 Matrix = NDArray[np.float64]
@@ -58,7 +59,7 @@ def kernel(func: Callable[..., Any] | None = None, *, boundscheck: bool = True) 
     return users_kernel(func, boundscheck)
 
 
-def check_residual(call: str, function: Any, dimension: Any, jacobian: Any, sim: Any) -> None:
+def check_residual(call: str, function: Any, dimension: Any, jacobian: Any, sim: Simulator) -> None:
     """Call the user's functions once, uncompiled, in the neutral state, where mistakes have the clearest messages.
 
     ValueError, naming the function, when it fails there, writes into x or u, or leaves an entry of out as it was.
@@ -73,7 +74,7 @@ def check_residual(call: str, function: Any, dimension: Any, jacobian: Any, sim:
         _tried(f"{call}(jacobian=...)", jacobian, (int(dimension), sim.ndx + sim.nu), sim, 0.0)
 
 
-def _tried(call: str, function: Any, shape: tuple[int, ...], sim: Any, poison: float) -> NDArray[np.float64]:
+def _tried(call: str, function: Any, shape: tuple[int, ...], sim: Simulator, poison: float) -> NDArray[np.float64]:
     """Results of a user's function for an output full of poison and arguments that must not be written to."""
     if not callable(function):
         raise ValueError(f"{call}: expected a function of (x, u, out), got {function!r}")

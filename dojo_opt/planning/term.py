@@ -12,6 +12,7 @@ from dojo_opt.planning.names import component_name
 from dojo_opt.planning.penalty import add_dense_expansion, add_expansion, penalty, penalty_derivatives
 from dojo_opt.planning.residual import ResidualKernels
 from sim.mechanism import checks
+from sim.simulator.simulator import Simulator
 from solvers.rotation import inverse_right_jacobian
 
 Vector = NDArray[np.float64]
@@ -26,7 +27,7 @@ _ROUNDED = 1e-12  # below, it is as near to one as sums get
 class Spec(Protocol):
     """A cost or a constraint as a user writes it."""
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         """The term of one simulator and horizon, with its arrays; `Problem` calls it.
 
         Args:
@@ -79,7 +80,7 @@ class Term:
         penalty_derivatives(self.residual, self.weight, self.slope, self.one_sided, self._first, self._second)
         self._add(xs, us, g, H)
 
-    def entry_name(self, sim: Any, entry: int) -> str:
+    def entry_name(self, sim: Simulator, entry: int) -> str:
         """The subject of an entry of the residual, in words."""
         return f"entry {entry}" if self.columns is None else component_name(sim, int(self.columns[entry]))
 
@@ -122,7 +123,7 @@ class StateTerm(Term):
 class PeriodicTerm(StateTerm):
     """r = x_T (-) (x_0 (+) shift); its dependence on x_0 is left to `jacobians`."""
 
-    def __init__(self, sim: Any, horizon: int, mask: Matrix, shift: Matrix, layout: Integers) -> None:
+    def __init__(self, sim: Simulator, horizon: int, mask: Matrix, shift: Matrix, layout: Integers) -> None:
         super().__init__("Periodic", np.array([horizon]), mask, np.zeros((1, sim.nx)), layout)
         self._sim, self.shift = sim, shift
 

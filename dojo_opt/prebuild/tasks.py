@@ -15,6 +15,7 @@ import dojo_opt as dojo
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
 from sim.model.state_columns import BaseState
+from sim.simulator.simulator import Simulator
 from solvers.compiler.optional import OptionalKernel, optional_kernels
 
 __all__ = ["CONTENTS", "run", "tasks"]
@@ -32,7 +33,7 @@ _FIRST = (  # the longest, and code that later tasks would compile beside them
 # -- scenes ------------------------------------------------------------------------------------------------------------
 
 
-def states(sim: Any) -> None:
+def states(sim: Simulator) -> None:
     """Properties of a state without motion."""
     x = sim.neutral()
     sim.describe()
@@ -50,7 +51,7 @@ def states(sim: Any) -> None:
         sim.close(x)
 
 
-def motions(sim: Any) -> None:
+def motions(sim: Simulator) -> None:
     """Steps and rollouts, open and closed."""
     x, us = sim.neutral(), np.zeros((2, sim.nu))
     wrenches = np.zeros((2, sim.nbody, 6))
@@ -62,7 +63,7 @@ def motions(sim: Any) -> None:
     sim.closed_loop(x, us, np.stack([x] * 3), k, K)
 
 
-def derivatives(sim: Any) -> None:
+def derivatives(sim: Simulator) -> None:
     """Of steps and rollouts, by state and input."""
     x, us = sim.neutral(), np.zeros((2, sim.nu))
     sim.linearize(x, us[0], kappa=1e-3)
@@ -73,7 +74,7 @@ def derivatives(sim: Any) -> None:
     sim.vjp((np.stack([x] * 3), us), np.zeros((3, sim.ndx)), kappa=1e-3)
 
 
-def divisions(sim: Any) -> None:
+def divisions(sim: Simulator) -> None:
     """Steps that turn a body too far, and their derivatives."""
     x, us = sim.neutral(), np.zeros((2, sim.nu))
     x[sim.nq :] = 4.0 / sim.time_step
@@ -83,7 +84,7 @@ def divisions(sim: Any) -> None:
     sim.reactions(x[None], us[:1])
 
 
-def parameters(sim: Any) -> None:
+def parameters(sim: Simulator) -> None:
     """Features of order 2 only: reactions, derivatives by maximal coordinates and by parameters."""
     x, us = sim.neutral(), np.zeros((2, sim.nu))
     sim.reactions(x[None], us[:1])
@@ -94,7 +95,7 @@ def parameters(sim: Any) -> None:
     sim.vjp((np.stack([x] * 3), us), np.zeros((3, sim.ndx)), ("state", "input", *kinds))
 
 
-def _every(sim: Any) -> None:
+def _every(sim: Simulator) -> None:
     for calls in (states, motions, derivatives, parameters):
         calls(sim)
 
@@ -137,7 +138,7 @@ def _accurate(ground: bool) -> None:
     sim.rollout(sim.neutral(), steps=2).at([0.005])
 
 
-def derivatives_of_order(sim: Any) -> None:
+def derivatives_of_order(sim: Simulator) -> None:
     """Of steps and sweeps at the kappa of the simulator."""
     x, us = sim.neutral(), np.zeros((2, sim.nu))
     sim.linearize(x, us[0])

@@ -37,7 +37,7 @@ class Arguments:
         self.nbody, self.nx, self.nu = mechanism.nbody, engine.nx, engine.nu
         self.time_step = engine.settings.time_step
 
-    def states(self, call: str, xs: Floats) -> Floats:
+    def states(self, call: str, xs: ArrayLike) -> Floats:
         """A copy of the states (..., nx), with quaternions of length one."""
         out = np.array(xs, dtype=np.float64, order="C")
         bad = self._engine.normalise(out.reshape(-1, self.nx), UNIT)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sim.integrators.feedback import FeedbackLaw
 from sim.model.columns import StepReport
@@ -65,7 +65,7 @@ class Horizon:
         self._K = np.zeros((knots, engine.nu, engine.ndx))
         self._gaps = np.zeros((knots + 1, engine.ndx))
 
-    def states(self, call: str, xs: Floats) -> Floats:
+    def states(self, call: str, xs: ArrayLike) -> Floats:
         """States that the other methods take.
 
         Args:

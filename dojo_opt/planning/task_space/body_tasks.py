@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +13,7 @@ from dojo_opt.planning.task_space.task_spec import TaskSpec
 from dojo_opt.planning.term import numbers
 from sim.mechanism import checks
 from sim.simulator.kinematics import Kinematics
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -21,7 +21,7 @@ Integers = NDArray[np.int64]
 _UNIT = (1.0, 0.0, 0.0, 0.0)
 
 
-def frame_on_body(call: str, sim: Any, frame: str, offset: ArrayLike) -> tuple[int, Vector]:
+def frame_on_body(call: str, sim: Simulator, frame: str, offset: ArrayLike) -> tuple[int, Vector]:
     """(number of the body, (7,) point and quaternion) of a frame whose origin is moved by `offset` in its own axes."""
     kin = Kinematics(sim)
     body, point, turn = kin.place(checks.one_of(f"{call}(frame)", frame, kin.frames))
@@ -50,7 +50,7 @@ class Point(TaskSpec):
 
     __repr__ = TaskSpec.__repr__
 
-    def _bound(self, sim: Any, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
+    def _bound(self, sim: Simulator, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
         frame = frame_on_body("Point", sim, self.frame, self.offset)
         return FramePoses(sim, knots, frame, np.tile(_UNIT, (knots.size, 1))), np.arange(3), self.target
 
@@ -77,7 +77,7 @@ class Frame(TaskSpec):
 
     __repr__ = TaskSpec.__repr__
 
-    def _bound(self, sim: Any, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
+    def _bound(self, sim: Simulator, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
         if self.place is None and self.orientation is None:
             raise ValueError("Frame(...): expected place=..., orientation=..., or both")
         if self.orientation is not None and (self.lower is not None or self.upper is not None):
@@ -121,13 +121,13 @@ class Velocity(TaskSpec):
 
     __repr__ = TaskSpec.__repr__
 
-    def _bound(self, sim: Any, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
+    def _bound(self, sim: Simulator, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
         needs_order_two("Velocity", sim)
         frame = frame_on_body("Velocity", sim, self.frame, self.offset)
         return FrameVelocities(sim, knots, frame), np.arange(6), self.target
 
 
-def needs_order_two(call: str, sim: Any) -> None:
+def needs_order_two(call: str, sim: Simulator) -> None:
     """Refuse simulators whose states have velocities at nodes."""
     if sim.order != 2:
         raise ValueError(f"{call}: expected a Simulator of order 2, whose velocities are means, got {sim.order}")
@@ -145,7 +145,7 @@ class CenterOfMass(TaskSpec):
 
     __repr__ = TaskSpec.__repr__
 
-    def _bound(self, sim: Any, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
+    def _bound(self, sim: Simulator, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
         return Momenta(sim, knots), np.arange(3), self.target
 
 
@@ -163,6 +163,6 @@ class Momentum(TaskSpec):
 
     __repr__ = TaskSpec.__repr__
 
-    def _bound(self, sim: Any, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
+    def _bound(self, sim: Simulator, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
         needs_order_two("Momentum", sim)
         return Momenta(sim, knots), np.arange(3, 9), self.target

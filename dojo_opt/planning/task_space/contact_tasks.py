@@ -30,13 +30,14 @@ from sim.mechanism.parts import WORLD
 from sim.mechanism.shapes import Solid
 from sim.model.shape_kinds import SWAPPED, Pair
 from sim.simulator.kinematics import Kinematics
+from sim.simulator.simulator import Simulator
 
 Integers = NDArray[np.int64]
 
 __all__ = ["Clearance", "ContactForce", "FrictionUse", "Slip", "TorqueRate"]
 
 
-def ground_contacts(call: str, sim: Any, given: Any) -> Integers:
+def ground_contacts(call: str, sim: Simulator, given: Any) -> Integers:
     """Numbers of contacts with the ground, by their names or those of bodies or links; None means all."""
     contacts = sim.mechanism.contacts
     names = {c.name: [i] for i, c in enumerate(contacts)}
@@ -54,7 +55,7 @@ def ground_contacts(call: str, sim: Any, given: Any) -> Integers:
     return np.array([i for name in wanted for i in names[checks.one_of(call, name, names)]], dtype=np.int64)
 
 
-def _without_restitution(call: str, sim: Any, chosen: Integers) -> None:
+def _without_restitution(call: str, sim: Simulator, chosen: Integers) -> None:
     """Refuse contacts whose forces have no derivative here."""
     for i in chosen:
         contact = sim.mechanism.contacts[i]
@@ -81,7 +82,7 @@ class ContactForce(TaskSpec):
     __repr__ = TaskSpec.__repr__
     _LAST = False
 
-    def _bound(self, sim: Any, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
+    def _bound(self, sim: Simulator, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
         needs_order_two("ContactForce", sim)
         chosen = ground_contacts("ContactForce(contacts)", sim, self.contacts)
         _without_restitution("ContactForce(contacts)", sim, chosen)
@@ -106,12 +107,12 @@ class FrictionUse(TaskSpec):
     __repr__ = TaskSpec.__repr__
     _LAST = False
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         if self.lower is not None or self.upper is not None:
             raise ValueError("FrictionUse(...): expected share=... instead of bounds")
         return TaskSpec.bind(replace(self, upper=0.0), sim, horizon, layout)
 
-    def _bound(self, sim: Any, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
+    def _bound(self, sim: Simulator, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
         needs_order_two("FrictionUse", sim)
         chosen = ground_contacts("FrictionUse(contacts)", sim, self.contacts)
         _without_restitution("FrictionUse(contacts)", sim, chosen)
@@ -138,7 +139,7 @@ class Slip(TaskSpec):
 
     __repr__ = TaskSpec.__repr__
 
-    def _bound(self, sim: Any, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
+    def _bound(self, sim: Simulator, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
         needs_order_two("Slip", sim)
         chosen = ground_contacts("Slip(contacts)", sim, self.contacts)
         if not self.near > 0.0:
@@ -169,11 +170,11 @@ class Clearance(TaskSpec):
 
     __repr__ = TaskSpec.__repr__
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         free = self.target is None and self.lower is None and self.upper is None and not self.periodic
         return TaskSpec.bind(replace(self, lower=0.0) if free else self, sim, horizon, layout)
 
-    def _bound(self, sim: Any, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
+    def _bound(self, sim: Simulator, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
         target = 0.0 if self.target is None else self.target
         if self.b is None:
             chosen = ground_contacts("Clearance(a)", sim, self.a)
@@ -223,7 +224,7 @@ class TorqueRate(Spec):
 
     __repr__ = brief_repr
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         del layout
         knots = knot_list("TorqueRate(knots=...)", self.knots, horizon, last=False)
         knots = knots if self.before is not None else knots[knots > 0]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.planning.task_space.task_term import Entries
 from dojo_opt.planning.term import Term
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -29,7 +28,7 @@ class InputChanges(Term):
         self._input, self._sign, self._reference = entries
         self._before = before
 
-    def entry_name(self, sim: Any, entry: int) -> str:
+    def entry_name(self, sim: Simulator, entry: int) -> str:
         return f"input {sim.mechanism.input_names[self._input[entry]]}"
 
     def update(self, xs: Matrix, us: Matrix) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dojo_opt.planning.term import Pick, PickTerm, Spec, Term, knot_list
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
+from sim.simulator.simulator import Simulator
 
 Integers = NDArray[np.int64]
 
@@ -36,7 +37,7 @@ class JointLimits(Spec):
 
     __repr__ = brief_repr
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         knots = knot_list("JointLimits(knots=...)", self.knots, horizon, last=True)
         knots = knots[knots > 0] if self.knots is None else knots
         margin = checks.number("JointLimits(margin=...)", self.margin)

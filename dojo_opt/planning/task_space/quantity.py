@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.simulator.simulator import Simulator
 from sim.simulator.task_space.calls import Buffers, TaskSpace
 
 Vector = NDArray[np.float64]
@@ -25,7 +26,9 @@ class Quantity:
         kappa: central-path parameter at which forces are taken; None for that of the simulator.
     """
 
-    def __init__(self, sim: Any, knots: Integers, names: Sequence[str], groups: Mapping[str, Sequence[int]]) -> None:
+    def __init__(
+        self, sim: Simulator, knots: Integers, names: Sequence[str], groups: Mapping[str, Sequence[int]]
+    ) -> None:
         self.names, self.groups = tuple(names), dict(groups)
         self.knots = knots
         self.kappa: float | None = None
@@ -50,7 +53,7 @@ class Quantity:
 class FramePoses(Quantity):
     """Place of a frame, and its rotation vector from an aim, in the axes of the aim."""
 
-    def __init__(self, sim: Any, knots: Integers, frame: tuple[int, Vector], aims: Matrix) -> None:
+    def __init__(self, sim: Simulator, knots: Integers, frame: tuple[int, Vector], aims: Matrix) -> None:
         groups = {"place": (0, 1, 2), "orientation": (3, 4, 5)}
         super().__init__(sim, knots, ("x", "y", "z", "rx", "ry", "rz"), groups)
         self._frame = (*frame, aims)
@@ -62,7 +65,7 @@ class FramePoses(Quantity):
 class FrameVelocities(Quantity):
     """Velocity of the origin of a frame, and its angular velocity, world axes."""
 
-    def __init__(self, sim: Any, knots: Integers, frame: tuple[int, Vector]) -> None:
+    def __init__(self, sim: Simulator, knots: Integers, frame: tuple[int, Vector]) -> None:
         groups = {"linear": (0, 1, 2), "angular": (3, 4, 5)}
         super().__init__(sim, knots, ("x", "y", "z", "rx", "ry", "rz"), groups)
         self._frame = frame
@@ -74,7 +77,7 @@ class FrameVelocities(Quantity):
 class Momenta(Quantity):
     """Centre of mass, momentum, and angular momentum about the centre of mass, world axes."""
 
-    def __init__(self, sim: Any, knots: Integers) -> None:
+    def __init__(self, sim: Simulator, knots: Integers) -> None:
         groups = {"place": (0, 1, 2), "linear": (3, 4, 5), "angular": (6, 7, 8)}
         super().__init__(sim, knots, [f"{letter}{axis}" for letter in ("", "p", "l") for axis in "xyz"], groups)
 
@@ -85,7 +88,7 @@ class Momenta(Quantity):
 class Distances(Quantity):
     """Distances of all pairs of shapes of a simulator of the same states, which has the collisions in question."""
 
-    def __init__(self, sim: Any, other: Any, knots: Integers, names: Sequence[str]) -> None:
+    def __init__(self, sim: Simulator, other: Any, knots: Integers, names: Sequence[str]) -> None:
         super().__init__(sim, knots, names, {})
         self.space = other.task_space()
 
@@ -96,7 +99,7 @@ class Distances(Quantity):
 class ContactQuantity(Quantity):
     """Three numbers per contact with the ground: those along its normal and its two tangents."""
 
-    def __init__(self, sim: Any, knots: Integers, contacts: Integers) -> None:
+    def __init__(self, sim: Simulator, knots: Integers, contacts: Integers) -> None:
         labels = [sim.mechanism.contacts[c].name for c in contacts]
         self._contacts = contacts
         names = [f"{label} {part}" for label in labels for part in ("normal", "first", "second")]
@@ -122,7 +125,7 @@ class ContactForces(ContactQuantity):
 class Slips(Quantity):
     """Slips of contacts; faded by 1/(1 + (gap/near)^2) where `near` is finite."""
 
-    def __init__(self, sim: Any, knots: Integers, contacts: Integers, near: float) -> None:
+    def __init__(self, sim: Simulator, knots: Integers, contacts: Integers, near: float) -> None:
         labels = [sim.mechanism.contacts[c].name for c in contacts]
         names = [f"{label} {part}" for label in labels for part in ("first", "second")]
         groups = {label: (2 * i, 2 * i + 1) for i, label in enumerate(labels)}
@@ -148,7 +151,7 @@ class FrictionReserves(Quantity):
     |f_t| is sqrt(f_1^2 + f_2^2 + e^2) - e, with a small e [N], for a derivative where there is no such force.
     """
 
-    def __init__(self, sim: Any, knots: Integers, contacts: Integers, share: float) -> None:
+    def __init__(self, sim: Simulator, knots: Integers, contacts: Integers, share: float) -> None:
         mech = sim.mechanism
         super().__init__(sim, knots, [mech.contacts[c].name for c in contacts], {})
         weight = sum(body.mass for body in mech.bodies) * float(np.linalg.norm(mech.gravity))

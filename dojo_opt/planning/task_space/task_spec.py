@@ -14,6 +14,7 @@ from dojo_opt.planning.task_space.task_term import Entries, PeriodicTaskTerm, Ta
 from dojo_opt.planning.term import Spec, Term, knot_list, numbers, table
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -51,7 +52,7 @@ class TaskSpec(Spec):
 
     _LAST = True  # whether the final knot has one
 
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+    def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         del layout
         call = type(self).__name__
         if not isinstance(self.periodic, bool | np.bool_):
@@ -69,7 +70,7 @@ class TaskSpec(Spec):
         entries = Entries(chosen[entry], sign, reference)
         return TaskTerm(call, quantity, entries, np.ascontiguousarray(weight[:, entry]), one_sided=True)
 
-    def _tie(self, sim: Any, horizon: int) -> Term:
+    def _tie(self, sim: Simulator, horizon: int) -> Term:
         call = type(self).__name__
         if not self._LAST:
             raise ValueError(f"{call}(periodic=True): it depends on the inputs, which the end of a plan does not have")
@@ -97,7 +98,7 @@ class TaskSpec(Spec):
             raise ValueError(f"{call}: expected finite numbers >= 0, got {out.min():g}")
         return checks.number(f"{type(self).__name__}(scale=...)", self.scale, at_least=0.0) * out
 
-    def _bound(self, sim: Any, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
+    def _bound(self, sim: Simulator, knots: Integers) -> tuple[Quantity, Integers, ArrayLike]:
         """The quantity, its chosen entries, and their target."""
         raise NotImplementedError
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dojo_opt.planning.penalty import add_dense_expansion, penalty_derivatives
 from dojo_opt.planning.task_space.quantity import Quantity
 from dojo_opt.planning.term import Term
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -34,7 +35,7 @@ class TaskTerm(Term):
         super().__init__(name, quantity.knots, weight, one_sided)
         self._quantity, self._entries = quantity, entries
 
-    def entry_name(self, sim: Any, entry: int) -> str:
+    def entry_name(self, sim: Simulator, entry: int) -> str:
         return self._quantity.names[self._entries.entry[entry]]
 
     def at_kappa(self, kappa: float | None) -> None:
@@ -64,7 +65,7 @@ class PeriodicTaskTerm(Term):
         super().__init__(name, quantity.knots[-1:], weight)
         self._quantity, self._entries, self._shift = quantity, entries, shift
 
-    def entry_name(self, sim: Any, entry: int) -> str:
+    def entry_name(self, sim: Simulator, entry: int) -> str:
         return self._quantity.names[self._entries[entry]]
 
     def update(self, xs: Matrix, us: Matrix) -> None:
