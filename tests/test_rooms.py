@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import tokenize
 from collections import Counter, defaultdict
 from functools import cache
 from pathlib import Path
@@ -160,3 +161,28 @@ def test_a_walk_goes_from_import_to_import(walk: str) -> None:
     graph = _imports()
     for k, module in enumerate(modules[1:], 1):
         assert any(module in graph[before] for before in modules[:k]), module
+
+
+def _files_that_name(word: str) -> list[str]:
+    """Files of the packages whose names or short strings contain a word; Meshcat's class of that name apart."""
+    found = []
+    for file in sorted(
+        path for package in PACKAGES for path in (ROOT / package).rglob("*.py*") if "__pycache__" not in str(path)
+    ):
+        if word not in file.read_text().lower():
+            continue
+        with open(file, "rb") as lines:
+            tokens = [
+                token for token in tokenize.tokenize(lines.readline) if token.type in (tokenize.NAME, tokenize.STRING)
+            ]
+        before = ["", *(token.string for token in tokens)]
+        texts = [t.string for k, t in enumerate(tokens) if len(t.string) < 40 and before[k] != "meshcat"]
+        found += [str(file.relative_to(ROOT))] if any(word in text.lower() for text in texts) else []
+    return found
+
+
+@pytest.mark.parametrize("word", ["ellipsoid", "screw"])
+def test_a_shape_and_a_joint_are_named_in_few_files(word: str) -> None:
+    """With derivatives by its sizes, drawing, and the files of robots that have it."""
+    found = _files_that_name(word)
+    assert 1 < len(found) <= 8, found
