@@ -301,6 +301,7 @@ def test_no_folder_depends_on_where_a_process_starts(tmp_path: Path, given: str)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["home"]
 
 
+@pytest.mark.slow
 def test_a_user_that_the_system_does_not_know_can_import(filled: Filled) -> None:
     unknown = """
 import os, pwd

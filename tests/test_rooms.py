@@ -151,18 +151,6 @@ def test_files_that_docstrings_name_exist() -> None:
     assert wrong == []
 
 
-@pytest.mark.parametrize("walk", ["The walk through a step", "The walk through a plan"])
-def test_a_walk_goes_from_import_to_import(walk: str) -> None:
-    """Every file of a walk in CONTRIBUTING.md is imported by one before it."""
-    text = (ROOT / "CONTRIBUTING.md").read_text().split(f"## {walk}\n")[1].split("\n## ")[0]
-    names = re.findall(r"^\| `([\w/]+\.py)`", text, re.MULTILINE)
-    modules = [name.removesuffix(".py").replace("/", ".") for name in names]
-    assert len(modules) >= 6
-    graph = _imports()
-    for k, module in enumerate(modules[1:], 1):
-        assert any(module in graph[before] for before in modules[:k]), module
-
-
 def _files_that_name(word: str) -> list[str]:
     """Files of the packages whose names or short strings contain a word; Meshcat's class of that name apart."""
     found = []

@@ -133,6 +133,7 @@ def package(built: Package, tmp_path: Path) -> Package:
     return Package(tmp_path / "copy")
 
 
+@pytest.mark.slow
 def test_shipped_code_runs_elsewhere_and_nothing_is_compiled(package: Package) -> None:
     assert package.call() == (NUMBERS, 0, "", [])
     assert list((package.root / "cache" / "dojo_opt").rglob("*.nbc")) == []
@@ -160,6 +161,7 @@ def test_an_edited_source_is_compiled(package: Package) -> None:
     assert package.call()[1] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("environment", "why"),
     [

@@ -29,7 +29,8 @@ from sim.mechanism.servos import limited_servos
 from sim.model.columns import ContactRow, StepReport, StepSetting
 from sim.model.model import Model
 from sim.model.pace import pieces
-from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, refuse
+from sim.simulator.division import Division
+from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted, refuse
 from sim.simulator.knot_engine import KnotEngine
 from sim.simulator.link import link_flight
 from sim.simulator.results import Interrupted

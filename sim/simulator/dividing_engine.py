@@ -22,7 +22,8 @@ from sim.model.columns import StepReport
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.state_columns import BodyState
-from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, chained, knot_inputs, refuse
+from sim.simulator.division import DIVISIBLE, Division
+from sim.simulator.engine import REPORT, Divided, Engine, Floats, chained, knot_inputs, refuse
 from sim.simulator.intervals import Intervals
 from sim.simulator.link import link_step
 from sim.simulator.results import Interrupted

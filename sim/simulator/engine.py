@@ -25,6 +25,7 @@ from sim.model.layout import data_view, sizes_of, table
 from sim.model.model import Model
 from sim.model.pace import pieces, rows
 from sim.model.scratch import Scratch
+from sim.simulator.division import Division
 from sim.simulator.link import link_gradient, link_nodes, link_planner, link_poses, link_step
 from sim.simulator.results import Interrupted, SimulationError
 from sim.simulator.settings import Settings, of_call
@@ -40,24 +41,8 @@ REPORT, CONTACT, CONE, BOUND = 6, 11, 12, 2
 _IMPULSE = slice(ContactRow.IMPULSE, ContactRow.POINT)
 _POINT = slice(ContactRow.POINT, ContactRow.GAP)
 _NORMAL = slice(ContactRow.NORMAL, CONTACT)
-_ONE_PART, _WHOLE = np.ones(1, dtype=np.int64), np.ones(1)  # of the division of one step
 _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
-
-
-# reasons that shorter steps may remove; they remove neither NaN nor contacts below the ground
-DIVISIBLE = frozenset(
-    int(status)
-    for status in (
-        Status.MAX_ITERATIONS,
-        Status.NO_PROGRESS,
-        Status.SINGULAR,
-        Status.ANGULAR_STEP,
-        Status.LOOP_STEP,
-        Status.COLLISION_STEP,
-        Status.ENERGY_STEP,
-    )
-)
 
 
 class Divided(NamedTuple):
@@ -96,21 +81,6 @@ class Divided(NamedTuple):
         turned = (length > 0.0) & out[:, _NORMAL].any(axis=1)  # without a normal, it is beyond its reach at the end
         out[turned, _NORMAL] = normals[turned] / length[turned, None]
         return np.asarray(out)
-
-
-class Division(NamedTuple):
-    """The divided steps of a motion, and the share of the momentum that each conserved."""
-
-    substeps: Integers  # (T,) steps that each was divided into, 1 for whole ones
-    shares: Floats  # (T,) of the momentum of bodies against each other, 1 where all was handed on
-    errors: Floats  # (T,) estimated, over those that an accuracy allows; 0 without one
-
-    @classmethod
-    def none(cls, steps: int) -> Division:
-        """The division of a given number of undivided steps."""
-        if steps == 1:  # np.ones takes ten times as long as a copy, a tenth of the Python of a step
-            return cls(_ONE_PART.copy(), _WHOLE.copy(), np.zeros(1))
-        return cls(np.ones(steps, dtype=np.int64), np.ones(steps), np.zeros(steps))
 
 
 _UNDIVIDED = Division.none(0)

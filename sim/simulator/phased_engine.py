@@ -27,7 +27,8 @@ from sim.model.columns import StepReport
 from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.dividing_engine import DividingEngine
-from sim.simulator.engine import CONTACT, DIVISIBLE, REPORT, Division, Engine, Floats, Rolled, interrupted
+from sim.simulator.division import DIVISIBLE, Division
+from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted
 from sim.simulator.knot_engine import KnotEngine
 from sim.simulator.link import link_flight
 from sim.simulator.results import Interrupted

@@ -20,7 +20,8 @@ from sim.mechanism.brief import brief_repr
 from sim.mechanism.memory import room_for
 from sim.model.columns import StepReport, StepSetting
 from sim.model.pace import pieces
-from sim.simulator.engine import DIVISIBLE, REPORT, Division, Engine, finite_rows, refuse
+from sim.simulator.division import DIVISIBLE, Division
+from sim.simulator.engine import REPORT, Engine, finite_rows, refuse
 from sim.simulator.results import Result, ended
 from sim.simulator.state_space import StateSpace
 from solvers.status import MESSAGES, Status

@@ -18,7 +18,8 @@ from sim.integrators.rollout import MotionBuffers, ParameterColumns, roll
 from sim.mechanism.mechanism import Mechanism
 from sim.model.columns import StepReport
 from sim.model.pace import pieces
-from sim.simulator.engine import CONTACT, DIVISIBLE, REPORT, Divided, Division, Engine, Rolled, refuse
+from sim.simulator.division import DIVISIBLE, Division
+from sim.simulator.engine import CONTACT, REPORT, Divided, Engine, Rolled, refuse
 from sim.simulator.link import link_heights, link_parameters
 from solvers.status import Status
 from solvers.types import Vector

@@ -66,6 +66,7 @@ def test_errors_below_the_effect_of_rounding_count_as_equal() -> None:
     assert curves.ratios(ours | peer, "MuJoCo RK4", "position", floors["attitude"])[0.01] == 1.0
 
 
+@pytest.mark.slow
 def test_scenes_match_the_peer_figures() -> None:
     assert scenes.tree(1.0).exact().energy[0] == pytest.approx(15.84)
     chain = scenes.chain(5)

@@ -37,6 +37,7 @@ def balanced(sim, gait):
     np.testing.assert_allclose(Feet(sim).positions(gait.x), gait.feet, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_reference_step_is_in_balance(atlas):
     """The centre of mass goes over the other foot, and stays over it while one foot is in the air."""
     gait = dojo.gaits.step(atlas, length=0.15)

@@ -84,6 +84,7 @@ def test_batches_can_be_reset_in_part():
     assert np.abs(after[0] - before[0]).max() > 1e-6
 
 
+@pytest.mark.slow
 def test_observations_and_rewards_of_the_cheetah_agree_with_mujoco():
     """Reward and observation, from MuJoCo's own qpos and qvel after a fall without contact; see gymnasium's v5."""
     import mujoco

@@ -76,6 +76,7 @@ def test_a_prior_decides_where_the_data_do_not():
         dojo.identify(start, motions, names, prior={"masses": 1.0})
 
 
+@pytest.mark.slow
 def test_several_starts_leave_a_local_minimum_and_need_not_be_fitted_here():
     """A pendulum that swings slower than it was measured to is a swing behind after a while: no small change helps."""
     name = "armature"
@@ -126,6 +127,7 @@ def test_bad_arguments_are_named(change, message):
         dojo.identify(_arm(), _motions(_arm(), np.random.default_rng(0), 0.0), ("damper",), **change)
 
 
+@pytest.mark.slow
 def test_a_quadruped_finds_payload_friction_and_damping_in_its_own_log():
     plan = dojo.ilqr(dojo.problems.trot())
     sim = dojo.problems.trot().sim

@@ -110,6 +110,7 @@ def test_table_and_history():
     assert [r["iteration"] for r in plan.history] == list(range(1, plan.nit + 1))
 
 
+@pytest.mark.slow
 def test_the_refined_problem_may_ask_for_more_and_the_table_tells_both():
     problem, stream = hop(), io.StringIO()
     higher = ilqr(problem).x[10] + np.eye(15)[2] * 0.05

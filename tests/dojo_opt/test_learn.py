@@ -288,6 +288,7 @@ def test_a_dask_cluster_finds_the_same_policy_though_a_worker_is_killed(task):
     assert (together.steps, together.best) == (alone.steps, alone.best)
 
 
+@pytest.mark.slow
 def test_policies_learn_and_hold_the_pendulum_down_in_a_closed_loop(task, tmp_path):
     lines = io.StringIO()
     learned = dojo.learn.shac(
@@ -304,6 +305,7 @@ def test_policies_learn_and_hold_the_pendulum_down_in_a_closed_loop(task, tmp_pa
     assert len(learned.plot().lines) == 2
 
 
+@pytest.mark.slow
 def test_the_best_of_several_beginnings_goes_on(task):
     options = {"environments": 8, "horizon": 8, "hidden": (16,), "episode": 8, "episodes": 2, "evaluations": 2}
     whole = {k: dojo.learn.shac(task, seed=k, epochs=20, **options) for k in (1, 2, 3)}
@@ -316,6 +318,7 @@ def test_the_best_of_several_beginnings_goes_on(task):
         dojo.learn.best_of(dojo.learn.shac, task, epochs=20, share=2.0)
 
 
+@pytest.mark.slow
 def test_imitated_policies_have_the_feedback_of_plans_and_can_learn_on(task, tmp_path):
     gain, xs, us = np.array([[-2.0, -0.4]]), [np.array([0.7, 0.5])], []
     for _ in range(40):

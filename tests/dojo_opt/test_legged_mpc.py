@@ -53,6 +53,7 @@ def test_an_unknown_gait_or_command_is_refused():
         dojo.tasks.legged_mpc(dojo.models.quadruped(), velocity=(0.1, 0.2))
 
 
+@pytest.mark.slow
 def test_an_arm_pushes_a_box_along_a_table():
     box = dojo.Body("box", 0.5, shape=dojo.Box(0.1, 0.1, 0.1))
     arm = dojo.models.panda(gripper=False)

@@ -80,6 +80,7 @@ def test_a_wrong_derivative_by_a_parameter_is_seen() -> None:
     assert parameters.error(case._replace(sim=Off()), "mass") == pytest.approx(1e-3, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_the_study_by_its_name() -> None:
     assert isinstance(study("mechanics", quick=True, studies=STUDIES), MechanicsStudy)
     report = MechanicsStudy(quick=True).run(Progress(io.StringIO()))

@@ -40,6 +40,7 @@ def test_the_spinner_starts_to_turn():
     assert set(outcome.measures) == {"mean speed [rad/s]"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [None, 1, 5])
 def test_an_arm_rolls_a_ball(seed):
     """Towards the goal within 1 s, the stub of the arm on it, also from starts that the last bit could turn to rest."""
@@ -143,6 +144,7 @@ def test_servos_of_the_model_are_the_forces_of_its_springs():
     assert force == pytest.approx(mpc.policy.control(0.0)[0] - 40.0 * 0.2 - 4.0 * 0.5)
 
 
+@pytest.mark.slow
 def test_the_effort_of_servos_has_the_right_derivatives():
     sim = dojo.Simulator(arm(40.0, 4.0), time_step=0.05)
     problem = dojo.Problem(sim, [0.0, 0.0], 3, cost=[servo_effort(sim, arm(damper=0.0), 0.5, 3)])

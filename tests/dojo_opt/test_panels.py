@@ -38,6 +38,7 @@ def test_a_robot_with_legs_is_drawn_leg_by_leg(motion):
     assert not any(ax.get_legend() for ax in titled)
 
 
+@pytest.mark.slow
 def test_names_at_the_lines_do_not_touch(motion):
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.text import Text

@@ -37,6 +37,7 @@ def high(x, u, out):
     out[:] = 0.1 * (tip(x) - np.array([1.0, -0.5]))
 
 
+@pytest.mark.slow
 def test_a_plain_function_is_a_constraint_that_holds():
     free = dojo.ilqr(problem())
     held = dojo.ilqr(problem(constraints=[ResidualConstraint(too_fast, 1, equality=False)]))
@@ -175,6 +176,7 @@ def of_copies(x, u, out):
     out[0] = y[1] + z[0] + w[0] + np.dot(x, x) + np.linalg.norm(u) + x.reshape(2, 2)[0, 1]
 
 
+@pytest.mark.slow
 def test_copies_may_be_written_to_and_numpy_takes_the_arguments():
     term = problem(ResidualCost(of_copies, 1)).costs[1]
     xs, us = np.random.default_rng(1).normal(size=(31, 4)), np.zeros((30, 1))
@@ -213,6 +215,7 @@ def far_in(x, u, out):
         out[0, 50_000_000] = 1.0
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("function", [far_beyond, far_beyond_compiled, far_out], ids=lambda f: f.__name__)
 def test_an_index_beyond_the_end_names_function_and_knot(function):
     states = np.zeros((31, 4))
@@ -261,6 +264,7 @@ def by_a_global(x, u, out):
     out[0] = GAIN * x[0]
 
 
+@pytest.mark.slow
 def test_a_global_that_has_changed_is_not_taken_for_the_old_one(monkeypatch):
     xs, us = np.ones((31, 4)), np.zeros((30, 1))
     before = problem(ResidualCost(by_a_global, 1)).costs[1].value(xs, us)

@@ -82,6 +82,7 @@ def test_the_shift_of_a_walk_is_that_of_a_pendulum():
         assert support[(t > 0.8 * begin) & (t < 0.8 * end)].mean() == pytest.approx(middle, abs=0.005)
 
 
+@pytest.mark.slow
 def test_a_humanoid_crouches_as_far_as_its_ankles_go():
     """Atlas stands up and jumps without a height that its user would have to find."""
     mech = dojo.models.atlas()
@@ -109,6 +110,7 @@ def test_an_arm_reaches_a_pose_within_its_limits():
     assert plan.nit < 30 and R.shape == (3, 3)
 
 
+@pytest.mark.slow
 def test_impossible_motions_are_refused(straight):
     arm = dojo.models.panda(gripper=False)
     with pytest.raises(ValueError, match="out of reach"):

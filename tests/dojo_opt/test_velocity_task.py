@@ -36,6 +36,7 @@ def test_velocities_are_those_that_the_trunk_sees(task):
     np.testing.assert_allclose(error, [*(seen[3:5] - seen[9:11]), seen[8] - seen[11]], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_best_reward_is_that_of_the_command(task):
     x = task.starts([np.random.default_rng(1)])
     x[:, task.sim.nq :] = 0.0
@@ -50,6 +51,7 @@ def test_the_best_reward_is_that_of_the_command(task):
     assert -0.3 < task.rewards(x, still, x)[0][0] < -0.2
 
 
+@pytest.mark.slow
 def test_commands_change_in_batches_as_in_single_environments(task):
     pytest.importorskip("gymnasium")
     from dojo_opt.learn.vector_environment import VectorEnvironment
@@ -69,6 +71,7 @@ def test_commands_change_in_batches_as_in_single_environments(task):
     assert same == [True, False, True, False]
 
 
+@pytest.mark.slow
 def test_learning_under_pushes_repeats_to_the_bit_and_gives_a_controller(task):
     runs = [
         dojo.learn.shac(task, epochs=2, environments=4, horizon=3, evaluations=0, episodes=1, seed=4) for _ in range(2)

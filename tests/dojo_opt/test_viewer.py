@@ -230,6 +230,7 @@ def opened(page, path):
     return wrong + page.evaluate("window.hits")
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", ["<object>", NAMES[-1]], ids=["object", "html"])
 def test_names_of_a_user_are_text_in_the_page(page, tmp_path, name):
     sim = dojo.Simulator(hostile(name, NAMES[:-1]), time_step=0.01)
@@ -356,6 +357,7 @@ def test_the_goal_of_a_plan_is_a_ghost_where_the_plan_leaves_nothing_free():
     assert motion(sim.rollout(plans[0].x[0], plans[0].u)).goal is None
 
 
+@pytest.mark.slow
 def test_motions_side_by_side_are_apart_and_end_together(quadruped, tmp_path):
     two = [motion(quadruped), motion(quadruped.simulator.rollout(quadruped.x[0], quadruped.u[:10]))]
     text = animation.html_of(*two, shown={"forces": True})

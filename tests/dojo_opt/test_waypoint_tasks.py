@@ -9,6 +9,7 @@ import dojo_opt as dojo
 from dojo_opt.learn.registration import task_of
 
 
+@pytest.mark.slow
 def test_a_quadrotor_sees_the_way_in_its_own_axes_whatever_its_heading():
     task = task_of("QuadrotorWaypoint")
     x = np.concatenate([task.sim.neutral(), [1.0, 0.0, 2.5]])

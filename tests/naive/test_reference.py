@@ -71,6 +71,7 @@ def test_complex_step_jacobian(rng):
         np.testing.assert_allclose(jacobian(step, y, 1e-2, exact), np.transpose(differences), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_free_body_against_ode_order_two():
     scene = samples.free_body()
     J, w0 = scene.bodies[0].inertia, np.array([2.0, 3.0, -2.0])
@@ -103,6 +104,7 @@ def test_pendulum_against_ode_order_two():
     assert (abs(orders - 2.0) < 0.1).all(), (errors, orders)
 
 
+@pytest.mark.slow
 def test_momentum_and_energy_of_a_floating_tree(rng):
     tree = samples.quadruped()
     scene = Scene(tree.bodies, [tree.joints[0]] + [j for j in tree.joints[1:]], gravity=np.zeros(3))
@@ -155,6 +157,7 @@ def test_limits_hold():
     np.testing.assert_allclose((s.q[7] - 0.2) * s.limit_impulse[0], 1e-8, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_energy_of_a_spring_is_kept():
     scene = samples.spherical_chain()
     joint = [

@@ -90,6 +90,7 @@ def test_a_cube_on_an_axis(height: float, axis: tuple[float, ...], status: str) 
         assert set(found) == ({IDLE} if status == "IDLE" else {0})
 
 
+@pytest.mark.slow
 def test_the_angle_that_lifts_most_is_found(rng: np.random.Generator) -> None:
     """Random bodies on random axes, against a scan of all angles."""
     seen = set()

@@ -167,6 +167,7 @@ def test_methods_of_order_two_alone_and_unknown_orders_are_refused() -> None:
         dojo.Simulator(dojo.models.pendulum(), order=3)
 
 
+@pytest.mark.slow
 def test_second_order_does_not_know_of_the_others() -> None:
     program = (
         "import sys, numpy as np, dojo_opt as dojo; sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01); "

@@ -95,6 +95,7 @@ def test_quantities_are_of_one_motion(tmp_path: Path, state: tuple[np.ndarray, .
         kin.pose("hnd", q)
 
 
+@pytest.mark.slow
 def test_inverse_kinematics_meets_targets_in_reach(tmp_path: Path, rng: np.random.Generator) -> None:
     sim = dojo.Simulator(robot(tmp_path, floating=False), 0.01)
     kin = dojo.Kinematics(sim)

@@ -39,6 +39,7 @@ def test_every_format_holds_the_same_box(tmp_path: Path, ending: str) -> None:
 # -- hulls -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_reduced_hull_says_how_far_it_is(rng: np.random.Generator) -> None:
     """The error is the largest distance of a corner from the reduced hull, which a convex program finds, too."""
     points = rng.normal(size=(300, 3))

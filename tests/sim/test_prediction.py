@@ -46,6 +46,7 @@ def both_ways(model_at, data_at, h, points, size, by_solves):
     delassus(model, work, h, points, size)
 
 
+@pytest.mark.slow
 def test_the_delassus_matrix_agrees_with_whole_solves():
     sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.01)
     us = np.random.default_rng(0).uniform(-5.0, 5.0, (3, sim.nu))

@@ -30,6 +30,7 @@ def egg(x: Array) -> Array:
     return 2.0 * (np.linalg.norm(x / (0.3, 0.2, 0.25), axis=1) - 1.0)
 
 
+@pytest.mark.slow
 def test_moments_are_those_of_a_sphere_and_a_box() -> None:
     sphere = dojo.SignedDistance.from_function(ball, BOUNDS, 0.03)
     assert sphere.volume() == pytest.approx(dojo.Sphere(RADIUS).volume(), rel=1e-3)
@@ -44,6 +45,7 @@ def test_moments_are_those_of_a_sphere_and_a_box() -> None:
     np.testing.assert_allclose(moved.about_centroid().inertia(2.0), sphere.inertia(2.0), rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_density_becomes_distances_to_its_level() -> None:
     level = float(np.exp(-0.5 * (RADIUS / 0.2) ** 2))
     blob = dojo.SignedDistance.from_density(

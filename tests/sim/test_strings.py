@@ -153,6 +153,7 @@ def thrown(seed: int) -> tuple[dojo.Simulator, np.ndarray]:
     return sim, x
 
 
+@pytest.mark.slow
 def test_strings_of_bodies_thrown_about() -> None:
     """Those that turn fast pull along the end of the step: no more of them fail than where all strings do so (7)."""
     unsolved = 0

@@ -155,6 +155,7 @@ def test_far_contacts_are_left_out_and_change_nothing():
 # -- motions -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("friction", [0.0, 0.1, 1.0])
 def test_a_ball_on_an_incline(friction):
     """a = g (sin - mu cos) while it slides, 5/7 g sin once it rolls; every direction of the slope."""

@@ -91,12 +91,17 @@ assert A[0, 7] == 3.0
 """
 
 
+@pytest.fixture(scope="module")
+def alone() -> str:
+    """What Numba compiles in a process without dojo-opt."""
+    return python(GUEST.format(first=""))
+
+
 @pytest.mark.parametrize("plain", ["0", "1"], ids=["fast", "plain"])
-def test_numba_compiles_others_functions_as_it_does_without_us(plain: str):
+def test_numba_compiles_others_functions_as_it_does_without_us(alone: str, plain: str):
     """No type is registered with an operator, not even lanes, by either pipeline."""
-    alone = python(GUEST.format(first=""))
-    for first in ("import dojo_opt, sim.integrators.rollout", "import dojo_opt, sim.integrators.rollout" + COMPILE):
-        assert python(GUEST.format(first=first), DOJO_OPT_PLAIN_NUMBA=plain) == alone, first
+    first = "import dojo_opt, sim.integrators.rollout" + COMPILE
+    assert python(GUEST.format(first=first), DOJO_OPT_PLAIN_NUMBA=plain) == alone
 
 
 INDEXED = """

@@ -22,6 +22,7 @@ from sim.simulator.simulator import Simulator
 __all__ = ["air_hockey"]
 
 _KNOT, _HORIZON, _RATE = 0.05, 40, 200.0  # [s], knots, [Hz]
+_PUCK = slice(3, 6)  # its coordinates in a state
 _NEAR = 0.1  # [m] off the goal at the end
 _KAPPA = 3e-5  # [N s m] at 1e-4 a contact that acts at a distance leaves the puck 9 cm off
 _FRICTION = 0.3  # assumed by plans: with all of 1 they turn the puck by its rim, lose it, and end 20 cm off
@@ -76,11 +77,11 @@ def air_hockey(**settings: Any) -> SuiteTask:
     sim = Simulator(mechanism(1.0), time_step=_KNOT, kappa=_KAPPA)
     start = sim.neutral()
     goal = start.copy()
-    goal[3:6] = _GOAL
+    goal[_PUCK] = _GOAL
     ends = np.array([0.0, _KNOT * _HORIZON])
-    speed = (goal - start)[:6] / ends[1]
-    begin = np.concatenate([start[:6], speed])
-    target = Sampled([*ends, ends[1] + _KNOT], [begin, np.concatenate([goal[:6], speed]), goal], sim)
+    speed = (goal - start)[: sim.nq] / ends[1]
+    begin = np.concatenate([start[: sim.nq], speed])
+    target = Sampled([*ends, ends[1] + _KNOT], [begin, np.concatenate([goal[: sim.nq], speed]), goal], sim)
     pusher, puck = np.zeros(3), np.ones(3)
     running = np.concatenate([pusher, 0.1 * puck]), np.concatenate([pusher + 0.5, 0.1 * puck])
     end = np.concatenate([pusher, 10.0 * puck]), np.ones(6)
@@ -95,6 +96,6 @@ def air_hockey(**settings: Any) -> SuiteTask:
 
 
 def _judge(loop: ClosedLoop) -> tuple[bool, dict[str, float]]:
-    off = loop.x[-1, 3:6] - np.asarray(_GOAL)
+    off = loop.x[-1, _PUCK] - np.asarray(_GOAL)
     place, turn = float(np.hypot(*off[:2])), abs(float(off[2]))
     return place < _NEAR, {"off [mm]": 1e3 * place, "turned off [rad]": turn}
