@@ -26,7 +26,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Collect garbage seldom, and not among the modules and the tests that are there by now: that took a tenth of the processor time."""
+    """Collect garbage seldom, and never among modules and tests: that took a tenth of the processor time."""
     gc.freeze()
     gc.set_threshold(50_000, 20, 100)
 
