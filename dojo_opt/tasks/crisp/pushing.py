@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.planning.plan import Plan
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Contact, Input, Joint
+from sim.model.state_columns import BaseState
 
 Vector = NDArray[np.float64]
 Point = tuple[float, float]
@@ -112,6 +113,7 @@ class Placed:
         """
         x = plan.x[-1]
         off = float(np.hypot(*(x[:2] - self._goal[:2])))
-        angle = 2.0 * np.arctan2(x[6], x[3]) - self._goal[2]
+        w, _, _, z = x[BaseState.QUATERNION]
+        angle = 2.0 * np.arctan2(z, w) - self._goal[2]
         turn = abs(float(np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi))
         return off < self._near and turn < self._turned, {"off [mm]": 1e3 * off, "turned off [rad]": turn}
