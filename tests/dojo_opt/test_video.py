@@ -28,16 +28,18 @@ def test_a_robot_moves_in_a_video(fall, tmp_path):
     pytest.importorskip("playwright.sync_api")
     if not any(map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))):
         pytest.skip("no Chromium")
-    video = image.open(dojo.viewer.save_video(fall, tmp_path / "fall.gif", size=(160, 120), rate=10.0))
-    assert video.n_frames == 4 and video.size == (160, 120)
     pictures = []
-    for k in range(video.n_frames):
-        video.seek(k)
-        pictures.append(np.asarray(video.convert("RGB"), dtype=float))
+    with image.open(dojo.viewer.save_video(fall, tmp_path / "fall.gif", size=(160, 120), rate=10.0)) as video:
+        assert video.n_frames == 4 and video.size == (160, 120)
+        for k in range(video.n_frames):
+            video.seek(k)
+            pictures.append(np.asarray(video.convert("RGB"), dtype=float))
     moved = np.abs(pictures[-1] - pictures[0]).max(axis=2) > 30.0
     assert moved.sum() > 50  # the cube covers hundreds of pixels
-    still = image.open(dojo.viewer.save_picture(fall.simulator.mechanism, tmp_path / "cube.png", size=(160, 120)))
-    assert still.size == (160, 120) and np.ptp(np.asarray(still.convert("L")).astype(float)) > 60.0
+    with image.open(
+        dojo.viewer.save_picture(fall.simulator.mechanism, tmp_path / "cube.png", size=(160, 120))
+    ) as still:
+        assert still.size == (160, 120) and np.ptp(np.asarray(still.convert("L")).astype(float)) > 60.0
     pytest.importorskip("imageio_ffmpeg")
     film = dojo.viewer.save_video(fall, tmp_path / "fall.mp4", size=(160, 120), rate=10.0)
     assert b"ftyp" in film.read_bytes()[:12]
