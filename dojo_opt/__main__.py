@@ -248,9 +248,12 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
 
 def _check_files(args: argparse.Namespace) -> None:
     """Refuse output files that cannot be written, before the work begins."""
+    folder = {"report": "out", "models": "thumbnails"}.get(args.command, "")
+    if folder and (path := getattr(args, folder)) is not None and path.exists() and not path.is_dir():
+        raise ValueError(f"--{folder}: expected a folder, and {str(path)!r} is a file")
     for name in ("out", "html"):
         path = getattr(args, name, None)
-        if path is None or args.command == "report":  # whose --out is a folder
+        if path is None or name == folder:
             continue
         if not path.parent.is_dir():
             raise ValueError(f"--{name}: there is no folder {str(path.parent)!r}")

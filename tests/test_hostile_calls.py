@@ -160,7 +160,8 @@ COMMANDS: dict[str, tuple[list[str], str]] = {
     "page in place of a folder": (["show", "pendulum", "--html", "{}"], "is a folder"),
     "no such file": (["show", "{}/a.urdf"], "a.urdf"),
     "a file that is none": (["show", "{}"], "neither"),
-    "pictures in place of a file": (["models", "--thumbnails", os.devnull], os.devnull),
+    "pictures in place of a file": (["models", "--thumbnails", os.devnull], "expected a folder"),
+    "page in place of a file": (["report", "timing", "--out", os.devnull], "expected a folder"),
     "a deep literal": (["run", "hop", "--set", "gait=" + "(" * 5000], "gait"),
 }
 
