@@ -23,7 +23,10 @@ from support.fork_server import forked
 from support.programs import HOME, PACKAGES, python
 
 TARGET = (targets.runnable() or ("none",))[0]
-pytestmark = pytest.mark.skipif(TARGET == "none", reason="no target is known for this processor")
+pytestmark = [
+    pytest.mark.skipif(TARGET == "none", reason="no target is known for this processor"),
+    pytest.mark.slow,  # its package is compiled and copied first
+]
 
 OWN = """
 from solvers.compiler import kernel, parallel_kernel, prange, users_callee, users_loop
@@ -133,7 +136,6 @@ def package(built: Package, tmp_path: Path) -> Package:
     return Package(tmp_path / "copy")
 
 
-@pytest.mark.slow
 def test_shipped_code_runs_elsewhere_and_nothing_is_compiled(package: Package) -> None:
     assert package.call() == (NUMBERS, 0, "", [])
     assert list((package.root / "cache" / "dojo_opt").rglob("*.nbc")) == []
@@ -161,7 +163,6 @@ def test_an_edited_source_is_compiled(package: Package) -> None:
     assert package.call()[1] == 0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("environment", "why"),
     [

@@ -115,6 +115,7 @@ def test_jumps_up_and_back_land_in_short_steps(distance, height):
     assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(height, abs=0.01)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     "name, settings", [("trot", {"damping": 5.0}), ("trot", {}), ("trot", {"cycles": 4}), ("walk", {})]
 )
@@ -131,6 +132,7 @@ def test_periodic_gaits_choose_their_start(name, settings):
     assert np.abs(start).max() > 1e-3 and np.abs(start[[0, 1, 5]]).max() < 1e-4  # 5: its rotation is not small
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name, settings", [("trot", {"speed": 0.4}), ("trot", {"damping": 0.05}), ("walk", {})])
 def test_periodic_gaits_go_on(name, settings):
     problem = getattr(problems, name)(periodic=True, cycles=1, **settings)

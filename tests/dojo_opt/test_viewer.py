@@ -346,6 +346,7 @@ def test_forces_are_bars_as_long_as_the_robot_for_its_weight(quadruped):
     assert all(clip.tracks["scale"].frames[-1] == 60.0 for clip in clips.values())  # they stay until the page ends
 
 
+@pytest.mark.slow
 def test_the_goal_of_a_plan_is_a_ghost_where_the_plan_leaves_nothing_free():
     sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.05)
     goal = np.array([np.pi, 0.0])

@@ -160,6 +160,7 @@ def divided(whip: tuple[dojo.Simulator, Floats]) -> tuple[dojo.Simulator, dojo.T
 NAMES = ("mass", "inertia", "com", "parent_point", "time_step")
 
 
+@pytest.mark.slow
 def test_derivatives_by_parameters(divided: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
     sim, motion = divided
     t = int(motion.substeps.argmax())

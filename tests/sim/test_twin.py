@@ -195,6 +195,7 @@ def test_cone_limit(kind, rng):
             assert axis @ rot.rotate(q, axis) > np.cos(0.6) - 1e-9
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("base", ["floating", None])
 @pytest.mark.parametrize("kind", ["revolute", "planar_axis", "orbital", "fixed_orientation", "screw"])
 def test_armature(kind, base, rng):

@@ -43,6 +43,7 @@ def test_an_unknown_numba_is_used_as_it_is_and_said_so_in_one_line():
     assert python(UNKNOWN, DOJO_OPT_PLAIN_NUMBA="1").split() == ["False", "0"]
 
 
+@pytest.mark.slow
 def test_the_cache_keeps_the_pipelines_apart(tmp_path: Path):
     program = "from solvers.compiler import cache_folder; print(cache_folder().name)"
     names = [python(program, NUMBA_CACHE_DIR=str(tmp_path), DOJO_OPT_PLAIN_NUMBA=plain) for plain in "01"]
@@ -126,6 +127,7 @@ print(*a.ravel())
 """
 
 
+@pytest.mark.slow
 def test_names_of_columns_are_indices_for_old_numbas_too():
     """Numba 0.66 and 0.67 refuse members of an IntEnum; this one takes them, and has to with our signatures, too."""
     for plain in "01":
@@ -154,6 +156,7 @@ print(*sorted(d.name.lstrip("0") for d in root.iterdir() if d != cache_folder())
 """
 
 
+@pytest.mark.slow
 def test_folders_are_dropped_when_a_new_one_is_filled_and_only_after_weeks(tmp_path: Path):
     os.chmod(tmp_path, 0o700)
     own = {"NUMBA_CACHE_DIR": str(tmp_path), "DOJO_OPT_CACHE": "1", "DOJO_OPT_SHIPPED": "0"}
