@@ -74,10 +74,8 @@ def finite(values: Floats) -> bool:
     """Whether all entries are finite numbers."""
     # the sum of squares shows it at a third of the cost, without a warning, unless it overflows itself; of long arrays
     # BLAS takes it with threads, which cost more than they gain, and milliseconds where other processes have the cores
-    if values.size < _LONG:
-        row = values if values.ndim == 1 else values.ravel()
-        if isfinite(row.dot(row)):  # half the time of np.vdot
-            return True
+    if values.size < _LONG and isfinite(np.vdot(values, values)):  # where `dot` overflows, it warns
+        return True
     return bool(np.isfinite(values).all())
 
 
