@@ -63,6 +63,7 @@ class SuiteTask:
         judge: function of a run that returns (whether it is a success, the numbers that decide it by name).
         rate: rate at which the publication replans [Hz].
         rise: coordinate that lifts a start out of the ground (default None: starts are taken as they are).
+        lost: function of a state that returns whether a run has failed there, which ends it (default None: none has).
     """
 
     name: str
@@ -74,6 +75,7 @@ class SuiteTask:
     judge: Callable[[ClosedLoop], tuple[bool, dict[str, float]]] = field(repr=False)
     rate: float = 0.0
     rise: int | None = None
+    lost: Callable[[Vector], bool] | None = field(default=None, repr=False)
 
     __repr__ = brief_repr
 
@@ -124,7 +126,7 @@ class SuiteTask:
             Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the run so far.
         """
         plant = self.plant(seed) if plant is None else plant
-        return closed_loop(self.mpc, plant, self.duration if seconds is None else seconds)
+        return closed_loop(self.mpc, plant, self.duration if seconds is None else seconds, fallen=self.lost)
 
     def outcome(self, loop: ClosedLoop) -> TaskOutcome:
         """How a run ended.

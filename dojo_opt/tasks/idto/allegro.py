@@ -30,6 +30,7 @@ _SERVO = 0.5, 1e-3  # [N m/rad], [N m s/rad]
 _JOINTS, _HEIGHT, _QUATERNION = 16, 18, slice(19, 23)  # of the fingers; of the ball, columns of a state
 _EFFORT = 0.7  # [N m]
 _REACH = 0.02  # [m] of contacts in plans, of which those further away would cost most of the time
+_KAPPA = 3e-5  # [N s m] ticks take twice as long at a third of it, and at three times as much the ball slips away
 _PALM = 0.18  # friction of palm and ball; plans that assume 1, as the publication's do, let the ball slide off
 _UP = np.array([0.5**0.5, 0.0, -(0.5**0.5), 0.0])  # the palm, whose fingers point along -x
 _BALL = 0.05, 0.06, (-0.06, 0.0, 0.0712)  # [kg], [m], place [m]
@@ -173,7 +174,7 @@ def allegro(**settings: Any) -> SuiteTask:
         TypeError: for an unknown setting.
         ValueError: for an argument out of range.
     """
-    sim = Simulator(mechanism(1.0, _PALM, servos=True), time_step=_KNOT, kappa=1e-5)
+    sim = Simulator(mechanism(1.0, _PALM, servos=True), time_step=_KNOT, kappa=_KAPPA)
     own = mechanism(1.0, _PALM)
     start = sim.neutral()
     goal = start.copy()
@@ -190,11 +191,17 @@ def allegro(**settings: Any) -> SuiteTask:
     ]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=_SERVO[0] * start[:_JOINTS])
     given = timed(_RATE) | {"servo": own, "gain_scale": 0.0}
-    given |= {"kappa": 1e-5, "first": Options(stages=(Stage(1e-4, 1e-4), Stage(1e-5, 1e-5)))}
+    given |= {"kappa": _KAPPA, "first": Options(stages=(Stage(1e-4, 1e-4), Stage(_KAPPA, _KAPPA)))}
     mpc = MPC(problem, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)
     spread = np.concatenate([np.full(_JOINTS, 0.03), np.full(3, 1e-3), np.full(3, 0.1), np.full(22, 0.02)])
-    return SuiteTask("idto.allegro", mpc, model, start, 10.0, spread, _Turned(goal[_QUATERNION]), _RATE)
+    judge = _Turned(goal[_QUATERNION])
+    return SuiteTask("idto.allegro", mpc, model, start, 10.0, spread, judge, _RATE, lost=_dropped)
+
+
+def _dropped(x: Vector) -> bool:
+    """Whether the ball is below the palm: the fingers cannot reach it any more."""
+    return bool(x[_HEIGHT] < _LOW)
 
 
 class _Turned:
