@@ -26,7 +26,8 @@ def step(
     """out = state after one step from x = (q, v) under the input u; returns the Status.
 
     guess: of the next velocity, x[nq:] when nothing better is known.
-    report: (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none). `out` holds the
+    report: (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
+    accuracy of derivatives, which is written by those that compute them. `out` holds the
     last iterate if the status is not SOLVED; do not use it.
     """
     nq = data.theta1.shape[0]

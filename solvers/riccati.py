@@ -196,8 +196,8 @@ def _predict(quad: Quadratic, K: Stack, k: Matrix, z: Vector, y: Vector, dx: Vec
 def backward(quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: Integers, buffer: Vector) -> Promise:
     """Gains K (T, m, n), k (T, m) of the regularised model, and the change predicted for the full step.
 
-    k on entry is the guess of the box QPs. free: (m,) integer scratch; buffer: (work_size(n, m),). The horizon is gone
-    through in pieces, with Python between them, which hears Ctrl-C there.
+    k on entry is the guess of the box QPs. free: (m,) integer scratch; buffer: (work_size(n, m),). The horizon is
+    done in pieces that return to Python, which hears Ctrl-C between them.
     """
     left, gradient = len(K), 0.0
     while True:

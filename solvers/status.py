@@ -8,7 +8,7 @@ __all__ = ["MESSAGES", "Status"]
 
 
 class Status(IntEnum):
-    """Exit of a time step (below 10), of the planner (10 and above), or of both; `IntEnum`, so kernels return it."""
+    """Exit of a time step (below 10, and TOLERANCE_STEP), of the planner, or of both; kernels return it as a number."""
 
     SOLVED = 0
     MAX_ITERATIONS = 1
@@ -19,7 +19,7 @@ class Status(IntEnum):
     LOOP_STEP = 6
     COLLISION_STEP = 7
     ENERGY_STEP = 8
-    JOINT_STEP = 8  # deprecated name
+    JOINT_STEP = 8  # deprecated name of ENERGY_STEP, until version 0.2
     CONTACT_SUNK = 9
     MAX_REGULARIZATION = 10
     LINE_SEARCH = 11

@@ -1,13 +1,15 @@
 """Adaptation: parameters of the model, estimated from measurements while the controller runs.
 
-An extended Kalman filter of the parameters theta, whose measurements are the states at both ends of an interval:
+An extended Kalman filter of the parameters theta. It measures the states x and x+ at both ends of an interval:
 
-    theta+ = theta + w,                   w ~ N(0, P0 dt/memory)
-    r = x+ (-) f(x, u; theta) = J (theta+ - theta) + e,   e ~ N(0, R + A R A')
+    theta+ = theta + w,    w ~ N(0, P0 dt/memory)
+    r = x+ (-) f(x, u; theta) = J (theta+ - theta) + e,    e ~ N(0, R + A R A')
 
-f are the steps of the model, of the length of the samples and with hard contact; J and A are its derivatives by the
-parameters and by the state, R is the noise of the measured state. A residual r larger than its covariance explains
-counts less, as with Huber's loss: a foot that touches what the model does not know says nothing about the payload.
+f: steps of the model with hard contact, each as long as a sample. J, A: derivatives of f by the parameters and by the
+state. R: noise of the measured state. An innovation r beyond two standard deviations counts less, as with Huber's
+loss. J is then the derivative of contact as smooth as that of the plans: a foot that slides, but sticks in the model,
+has no derivative by the friction where contact is hard. Intervals in which a contact lands are not used: the time of an
+impact depends on the height of the ground, which is not known as exactly as the states.
 """
 
 from __future__ import annotations
@@ -28,8 +30,8 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 _ROUNDING = 1e-9  # [s]
-_OUTLIER = 2.0  # standard deviations beyond which a residual counts less, and a change of the estimate is shortened
-_CURVED = 0.25  # share of a change of the estimate that may be wrong, as the residual is not linear in it
+_OUTLIER = 2.0  # standard deviations beyond which an innovation counts less, and a change of the estimate is shortened
+_CURVED = 0.25  # share of a change of the estimate that may be wrong, as the prediction is not linear in it
 _MOVED = 0.02  # share of the spread by which the estimate moves until models take it; in between they are linear in it
 _NEAR = 3.0  # standard deviations of the height of a contact that stands
 _CLOSE = 1e-4  # [m] the same without noise
@@ -173,62 +175,63 @@ class ParameterEstimator:
         found = self._predict(fine, x, us)
         if found is None or self._lands(ground, x, self._samples[-1][1], found[0]):
             return
-        end, A, slopes = found
-        off, P = fine.difference(self._samples[-1][1], end), self.covariance
-        wrong = _CURVED
-        if self._surprise(off, P, A, slopes) > _OUTLIER:  # a foot that sticks in the model says nothing of friction
+        end, A, J = found
+        innovation, inflation = fine.difference(self._samples[-1][1], end), _CURVED
+        if self._normalised(innovation, A, J) > _OUTLIER:  # a foot that sticks in the model says nothing of friction
             smooth = self._planner.kappa * fine.time_step / self._planner.time_step
             found = self._predict(fine, x, us, smooth)
-            slopes, wrong = (slopes, wrong) if found is None else (found[2], 1.0)
-        self._correct(off, P, A, slopes, wrong)
+            J, inflation = (J, inflation) if found is None else (found[2], 1.0)
+        self._correct(innovation, A, J, inflation)
         if np.any(np.abs(self.theta - self._written) > _MOVED * np.sqrt(self._prior)):
             self._write()
 
     def _predict(
         self, fine: Simulator, x: Vector, us: Matrix, kappa: float | None = None
     ) -> tuple[Vector, Matrix, Matrix] | None:
-        """State after the inputs us, and its derivatives by x and by the parameters; None where a step fails."""
+        """State after the inputs us, A = d(state)/dx and J = d(state)/d(theta); None if a step fails."""
         xs, linear = fine.linearize_rollout(x, us, kappa, wrt=self.space.wrt)
         if not linear.success:
             return None
-        A, slopes = np.eye(fine.ndx), np.zeros((fine.ndx, len(self.theta)))
+        A, J = np.eye(fine.ndx), np.zeros((fine.ndx, len(self.theta)))
         blocks = self.space.chain(self._written, linear.parameters)
         for step, block in zip(linear.A, blocks, strict=True):
-            A, slopes = step @ A, step @ slopes + block
-        return xs[-1], A, slopes
+            A, J = step @ A, step @ J + block
+        return xs[-1], A, J
 
-    def _covariance(self, P: Matrix, A: Matrix, slopes: Matrix) -> tuple[Matrix, Matrix]:
-        """Those of a residual: of the measured states, and of the parameters."""
-        return np.diag(self._noise) + (A * self._noise) @ A.T, slopes @ P @ slopes.T
+    def _at_estimate(self, innovation: Vector, J: Matrix) -> Vector:
+        """The innovation of the estimate, from that of the values that the models have."""
+        return innovation - J @ (self.theta - self._written)
 
-    def _surprise(self, off: Vector, P: Matrix, A: Matrix, slopes: Matrix) -> float:
-        """Size of a residual in standard deviations."""
-        residual = off - slopes @ (self.theta - self._written)
-        return float(np.sqrt(residual @ np.linalg.solve(sum(self._covariance(P, A, slopes)), residual) / len(off)))
+    def _innovation_covariance(self, A: Matrix, J: Matrix) -> tuple[Matrix, Matrix]:
+        """Its two parts: R + A R A' of the measured states, and J P J' of the parameters."""
+        return np.diag(self._noise) + (A * self._noise) @ A.T, J @ self.covariance @ J.T
 
-    def _correct(self, off: Vector, P: Matrix, A: Matrix, slopes: Matrix, wrong: float) -> None:
-        """Update estimate and covariance by a measurement that is `off` what the models predict.
+    def _normalised(self, innovation: Vector, A: Matrix, J: Matrix) -> float:
+        """Root mean square of an innovation in standard deviations."""
+        r = self._at_estimate(innovation, J)
+        return float(np.sqrt(r @ np.linalg.solve(sum(self._innovation_covariance(A, J)), r) / len(r)))
 
-        wrong: share of the change that may be, as slopes are those of another point, or of another contact
+    def _correct(self, innovation: Vector, A: Matrix, J: Matrix, inflation: float) -> None:
+        """Update estimate and covariance.
+
+        innovation: measured (-) predicted state; inflation: share of the change of the estimate that is added to its
+        standard deviation, as J is the derivative at another point, or of smoothed contact.
         """
-        residual = off - slopes @ (self.theta - self._written)
-        R, of_parameters = self._covariance(P, A, slopes)
-        R *= max(1.0, self._surprise(off, P, A, slopes) / _OUTLIER)
-        gain = np.linalg.solve(R + of_parameters, slopes @ P).T
-        change = gain @ residual
-        change /= max(1.0, np.sqrt(change @ np.linalg.solve(P, change) / len(change)) / _OUTLIER)
+        R, of_parameters = self._innovation_covariance(A, J)
+        R *= max(1.0, self._normalised(innovation, A, J) / _OUTLIER)
+        P = self.covariance
+        gain = np.linalg.solve(R + of_parameters, J @ P).T
+        change = gain @ self._at_estimate(innovation, J)
+        change /= max(1.0, float(np.sqrt(change @ np.linalg.solve(P, change) / len(change))) / _OUTLIER)
         low, high = (0.5 * (self.theta + bound) for bound in (self.space.low, self.space.high))
         self.theta = np.clip(self.theta + change, low, high)  # at most half-way to a bound at once
-        P = P - gain @ slopes @ P
-        P = 0.5 * (P + P.T) + np.diag((wrong * change) ** 2)
-        share = np.sqrt(np.minimum(1.0, self._prior / np.diag(P)))  # no estimate is worse than none
-        self.covariance = share[:, None] * P * share
+        P = P - gain @ J @ P
+        P = 0.5 * (P + P.T) + np.diag((inflation * change) ** 2)
+        scale = np.sqrt(np.minimum(1.0, self._prior / np.diag(P)))  # no estimate is worse than none
+        self.covariance = scale[:, None] * P * scale
 
     def _lands(self, ground: Ground, x: Vector, *ends: Vector) -> bool:
-        """Whether a contact that is in the air at x touches the ground at one of the ends.
-
-        The time of an impact depends on the height of the ground, which is not known as exactly as the states.
-        """
+        """Whether a contact that is in the air at x touches the ground at one of the ends."""
         before, *after = (ground.gaps(ground.points(state)) for state in (x, *ends))
         return any(bool(np.any((before > self._near) & (gaps < self._near))) for gaps in after)
 

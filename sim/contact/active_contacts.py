@@ -84,7 +84,7 @@ def condense_contacts(model: Model, data: Data, h: float, kappa: float, share: f
 
     share: of the terms that can make the matrix indefinite, the growth of the friction with the normal impulse and the
     turning of the arms of the impulses; 1 for the derivative.
-    form: LawForm.PLAIN, LawForm.LINEAR or LawForm.SOFT, see `condense_contact`.
+    form: LawForm.PLAIN, LawForm.STICKING or LawForm.SOFT, see `condense_contact`.
     """
     for m in range(data.active_ground_count[0]):
         c = data.active[m]

@@ -195,7 +195,7 @@ def condense_contact(model: Model, data: Data, h: float, c: int, kappa: float, s
     W[0] = -data.cone[c, Cone.IMPULSE] / data.cone[c, Cone.SLACK]
     law = law_of(model, c)
     if law == Law.NONLINEAR:
-        condense_cone(model, data, c, kappa, share, form == LawForm.LINEAR)
+        condense_cone(model, data, c, kappa, share, form == LawForm.STICKING)
     elif law == Law.LINEAR:
         condense_pyramid(model, data, c)
     if form == LawForm.SOFT:

@@ -74,7 +74,10 @@ def _add_force_slope(f: Vector, x: float, y: float, z: float, out: Vector) -> No
 
 @kernel
 def outer_slopes(model: Model, data: Data, u: Vector, out: Matrix) -> None:
-    """out[i] = N of the subtree of body i, (nbody, 36): of `outer_wrenches`; BODY inputs turn along."""
+    """out[i] = d(outer_wrenches of the subtree of body i)/d(twist of the tree), (nbody, 36): 6 x 6 by rows.
+
+    The force of a BODY input turns with its body.
+    """
     n, o, w = model.body_parent.shape[0], data.origin, data.wrench[0]
     for i in range(n):
         for k in range(36):

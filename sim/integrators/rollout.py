@@ -110,7 +110,7 @@ def begin(data: Data) -> None:
 
 @kernel
 def is_finite_matrix(M: Matrix) -> bool:
-    """Whether all numbers of a matrix, C order, are: here it is in the cache of the processor, later no more.
+    """Whether all numbers of a matrix in C order are finite; checked while the matrix is in the processor's cache.
 
     Four sums: one would wait for itself. The last lanes may repeat some before.
     """
@@ -155,7 +155,8 @@ def roll(
 
     A step is solved once, and differentiated where it ends; by parameters, too, if there are columns of them. Inputs
     are written if the motion follows a law, with several steps per knot if it says so, and reports (1, 7) whose last
-    number adds up the iterations. Without columns or a law nothing of them is compiled. An invalid state is REFUSED.
+    number adds up the iterations. Where columns or following are None, their branches are not compiled. An invalid
+    state is REFUSED.
     """
     model, data, n = model_view(model_at), data_view(data_at), 1
     if following is not None:

@@ -65,7 +65,7 @@ class LawForm(IntEnum):
     """Forms of a contact law in a matrix."""
 
     PLAIN = 0  # as it stands
-    LINEAR = 1  # linear in the slip of contacts that stick
+    STICKING = 1  # linear in the slip of contacts that stick
     SOFT = 2  # soft enough for its digits: of derivatives
 
 

@@ -143,7 +143,7 @@ class DividingEngine(Engine):
         return None if slowed is None else Divided(engine, rolled, *slowed)
 
     def interval(self, x: Vector) -> float:
-        """That of the velocity of the state x [s]."""
+        """Interval over which the velocity of the state x is the mean [s]."""
         return self.intervals.of_one(x)
 
     def conversions(self, x: Vector, divided: Divided) -> tuple[Floats, Floats]:

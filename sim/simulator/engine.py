@@ -51,7 +51,7 @@ class Divided(NamedTuple):
     engine: Engine  # that of its parts
     rolled: Rolled  # its parts
     x: Vector  # (nx,) the state after it
-    share: float  # of the momentum of bodies against each other at the end of the parts that it has, nearly always 1
+    share: float  # of the momentum of bodies against each other that the parts end with and x has; nearly always 1
 
     @property
     def parts(self) -> int:
@@ -315,7 +315,7 @@ class Engine:
         return self
 
     def interval(self, x: Vector) -> float:
-        """That of the velocity of the state x [s]: the time step, but for engines that divide steps."""
+        """Interval over which the velocity of the state x is the mean [s]: the time step, unless steps are divided."""
         return self.settings.time_step
 
     def conversions(self, x: Vector, divided: Divided) -> tuple[Floats, Floats]:

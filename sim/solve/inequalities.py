@@ -153,7 +153,7 @@ def apply_inequalities(model: Model, data: Data) -> float:
 
 @kernel
 def apply_limits(model: Model, data: Data) -> None:
-    """residual -= sign gamma, and p gamma of a cone."""
+    """residual -= impulses of joint limits (sign gamma), of cones (p gamma), and of dry friction."""
     for k in range(model.limit_dof.shape[0]):
         add_limit_impulse(model, data, k, -data.bound[k, Bound.IMPULSE], data.residual)
     apply_dry(model, data, data.residual)

@@ -193,7 +193,7 @@ def test_frames_and_trajectories() -> None:
         sim.reactions(t.x[0], frame="child")
     with pytest.raises(ValueError, match=r"Reactions\[...\]: joint: 'f' is not one of"):
         world["f"]
-    with pytest.raises(ValueError, match="steps of order 2"):
+    with pytest.raises(ValueError, match="simulator of order 2"):
         dojo.Simulator(pendulum(), order=4).reactions(np.zeros(2))
 
 

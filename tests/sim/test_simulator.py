@@ -166,7 +166,7 @@ ERRORS: list[tuple[Callable[[], object], str]] = [
     ),
     (
         lambda: SIM.closed_loop(X, np.zeros((4, 3)), Ks=np.zeros((4, 3, 14))),
-        r"closed_loop\(Ks=.*gains need the states xs",
+        r"closed_loop\(Ks=.*gains need reference states",
     ),
     (lambda: SIM.closed_loop(X, np.zeros((4, 3)), ks=np.zeros(3)), r"closed_loop\(ks=.*expected shape \(4, 3\)"),
     (lambda: SIM.closed_loop(X, np.zeros((4, 3)), limits=(1, -1)), r"closed_loop\(limits=.*lower <= upper"),

@@ -36,9 +36,9 @@ def collide(model: Model, kind: int, feature: int, sizes: Vector, R: Vector, r: 
     """Distance, normal and point of contact point `feature` of shapes a and b, with derivatives by the twist of a.
 
     model    its hull has the tables of polytopes (hull.py), and the kernels of this kind are linked
-    kind     a Pair; feature: 0 to kinds.count(kind) - 1. Pair + SWAPPED: out is then that of b against a, in the frame
-             of a, by the twist of b
-    sizes    (8,) sizes of a from 0, of b from 4 [m], in the order of kinds.Shape
+    kind     a Pair; Pair + SWAPPED: out is then that of b against a, in the frame of a, by the twist of b
+    feature  0 to shape_kinds.count(kind) - 1
+    sizes    (8,) sizes of a from 0, of b from 4 [m], in the order of shape_kinds.Shape
     R, r     pose of a in the frame of b: rotation (9,), row-major, and centre (3,) [m]
     out      (43,), overwritten, in the frame of b:
              0       phi, signed distance [m], negative inside; 1e9 if the point does not exist now
