@@ -155,8 +155,7 @@ def roll(
 
     A step is solved once, and differentiated where it ends; by parameters, too, if there are columns of them. Inputs
     are written if the motion follows a law, with several steps per knot if it says so, and reports (1, 7) whose last
-    number adds up the iterations. Where columns or following are None, their branches are not compiled. An invalid
-    state is REFUSED.
+    number adds up the iterations. Without columns or a law, their code is not compiled. An invalid state is REFUSED.
     """
     model, data, n = model_view(model_at), data_view(data_at), 1
     if following is not None:
