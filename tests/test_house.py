@@ -157,6 +157,14 @@ def test_prose_has_nouns_for_clauses(package: str) -> None:
 KERNEL_MARKS = ("kernel", "inner_kernel", "parallel_kernel", "local_kernel", "inlined", "optional")
 
 
+@pytest.mark.parametrize("package", PACKAGES)
+def test_docstrings_begin_with_a_noun(package: str) -> None:
+    """An editor shows a docstring by itself, where "Those of both" means nothing."""
+    pronouns = re.compile(r'"""(Those|That of)\b')
+    found = [str(file) for file in (ROOT / package).rglob("*.py") if pronouns.search(file.read_text())]
+    assert found == []
+
+
 def test_files_stay_readable() -> None:
     """A file with kernels has about 300 lines, others up to 600."""
     long = {}

@@ -103,7 +103,7 @@ class Predictor:
         self._found: Integers | None = None
 
     def _layout(self, sim: Simulator) -> Integers:
-        """That of the tangent space, which is the same for all simulators of the space."""
+        """Layout of the tangent space, the same for all simulators of the space."""
         if self._found is None:
             self._found = tangent_layout(sim, sim.neutral())
         return self._found

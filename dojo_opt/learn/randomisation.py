@@ -140,12 +140,12 @@ class Drawn:
         return found if xs.shape[1] == nx else replace(found, x=np.concatenate([found.x, xs[:, nx:]], axis=1))
 
     def rows(self, chosen: NDArray[np.int64]) -> Drawn:
-        """Those of some rows."""
+        """Models of some rows."""
         kappa = None if self.kappa is None else self.kappa[chosen]
         own = {name: t if len(t) == 1 else t[chosen] for name, t in self.parameters.items()}
         return replace(self, kappa=kappa, parameters=own)
 
     @classmethod
     def of(cls, task: Task) -> Drawn:
-        """That of the task, for all rows."""
+        """The model of the task, for all rows."""
         return cls(task.sim, task.substeps, None, {}, 0.0)

@@ -45,7 +45,7 @@ class Link:
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
     def rigid(self) -> RigidInertia:
-        """The same as one rigid inertia."""
+        """The link as one rigid inertia."""
         return RigidInertia(self.mass, np.asarray(self.com, dtype=np.float64), self.matrix)
 
     def welded(self, *others: tuple[Link, ArrayLike]) -> Link:

@@ -20,7 +20,7 @@ _MOST = 8  # workers by default: each takes half a gigabyte, and the longest tas
 
 
 def _cores() -> int:
-    """Those that this process may use, as far as they are of use."""
+    """Number of cores that this process may use, at most as many as are of use."""
     return min(_MOST, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
 
 

@@ -285,7 +285,7 @@ _SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to co
 
 
 def _kernels() -> dict[str, OptionalKernel]:
-    """Those that a scene may link, by name."""
+    """Kernels that a scene may link, by name."""
     import_module("sim.simulator.link")
     return {kernel.name: kernel for kernel in optional_kernels()}
 

@@ -59,7 +59,7 @@ class _Place:
 
     @classmethod
     def of(cls, x: Vector) -> _Place:
-        """That of the base of a state (nx,)."""
+        """Place of the base of a state (nx,)."""
         w, a, b, d = x[BaseState.QUATERNION]
         return cls(complex(*x[:2]), float(np.arctan2(2.0 * (w * d + a * b), 1.0 - 2.0 * (b * b + d * d))))
 

@@ -92,7 +92,7 @@ class Hopping:
         return np.stack([self._forward * (phase - 0.5 * self.stance), np.full_like(phase, self._forward)])
 
     def _swung(self, flight: Vector) -> Matrix:
-        """The same in flight, by the cubic that goes on as stance ends and ends as stance begins."""
+        """`_carried` in flight: the cubic that joins the end of a stance with the beginning of the next."""
         length = self.period - self.stance
         s = flight / length
         first, swing = 0.5 * self._forward * self.stance, self._forward * length

@@ -20,7 +20,7 @@ from sim.contact.pyramid import (
     start_pyramid,
 )
 from sim.contact.softening import soften
-from sim.model.columns import Bounce, Cone, ContactRow, Kin
+from sim.model.columns import Bounce, Cone, ContactRow, Kin, Pyramid
 from sim.model.data import Data
 from sim.model.model import Law, Model
 from sim.model.options import LawForm, NewtonTarget
@@ -100,8 +100,8 @@ def contact_impulse(model: Model, data: Data, c: int) -> tuple[float, float, flo
     if law == Law.LINEAR:
         return (
             z[Cone.IMPULSE],
-            z[Cone.FRICTION2 + 1] - z[Cone.FRICTION2 + 2],
-            z[Cone.FRICTION2 + 3] - z[Cone.FRICTION2 + 4],
+            z[Pyramid.FRICTION] - z[Pyramid.FRICTION + 1],
+            z[Pyramid.FRICTION + 2] - z[Pyramid.FRICTION + 3],
         )
     return z[Cone.IMPULSE], 0.0, 0.0
 

@@ -52,7 +52,7 @@ def height_field(model: Model, k: int, x: float, y: float) -> tuple[float, float
 def field_values(
     model: Model, coefficients: Vector, k: int, x: float, y: float
 ) -> tuple[float, float, float, float, float, float]:
-    """The same with other coefficients on its grid."""
+    """(F, F_x, F_y, F_xx, F_xy, F_yy) of field k at (x, y) with other coefficients on its grid."""
     p, size = model.terrain_place[k], model.terrain_size[k]
     first, nx, ny = size[TerrainSize.FIRST], size[TerrainSize.ALONG_X], size[TerrainSize.ALONG_Y]
     C, S = p[Grid.DIRECTION], p[Grid.DIRECTION + 1]

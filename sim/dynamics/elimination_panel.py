@@ -71,7 +71,7 @@ def _up(model: Model, data: Data, c: int) -> None:
 
 @kernel
 def _down(model: Model, data: Data, c: int) -> None:
-    """The same columns, from the root to the leaves."""
+    """Substitution in the columns from the root to the leaves."""
     X, T = data.columns, data.triangles
     for i in range(model.body_parent.shape[0]):
         above = model.dofs_above[i]

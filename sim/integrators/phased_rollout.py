@@ -45,7 +45,7 @@ class Phases(NamedTuple):
 
 @kernel
 def _interval(model: Model, data: Data, h: float, path: Phases, x: Vector) -> float:
-    """That of the velocity of a state with a mean velocity [s]."""
+    """Interval over which the velocity of a state is the mean [s]."""
     return interval(model, data, h, x) if path.divides else h
 
 

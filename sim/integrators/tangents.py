@@ -38,7 +38,7 @@ class Tangents(NamedTuple):
 
 @inlined
 def tangents_of(data: Data) -> Tangents:
-    """Those in `data`."""
+    """Tangents with the arrays of `data`."""
     return Tangents(
         Slopes(data.slope_p_q, data.slope_p_v, data.slope_f_q, data.slope_f_v, data.slope_f_u, data.slope_column),
         data.tangent_q,

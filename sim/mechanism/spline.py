@@ -19,7 +19,7 @@ def spline_coefficients(heights: ArrayLike) -> Floats:
 
 
 def spline_coefficients_along(values: Floats, axis: int) -> Floats:
-    """The same along one axis of an array, which gets longer by two."""
+    """Coefficients along one axis of an array, which gets longer by two."""
     rows = np.moveaxis(values, axis, 0)
     ends = np.zeros((2, rows[0].size))
     out = np.linalg.solve(_collocation(len(rows)), np.concatenate([rows.reshape(len(rows), -1), ends]))

@@ -79,7 +79,7 @@ class Cone(IntEnum):
 
 
 class Pyramid(IntEnum):
-    """The same fields, of a contact with a pyramid."""
+    """Columns of `cone` for a contact with a friction pyramid."""
 
     SLACK = 0
     IMPULSE = 1

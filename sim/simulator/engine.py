@@ -190,7 +190,7 @@ class Engine:
         return self.linked(link_step)
 
     def gradient_table(self, *needs: Callable[[Model], None]) -> Table:
-        """The same with the derivatives of the step, and further needs of a call."""
+        """Table of the Model, with the step, its derivatives, and further needs of a call linked."""
         return self.linked(link_step, link_gradient, *needs)
 
     def prepare(self) -> None:

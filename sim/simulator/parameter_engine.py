@@ -44,7 +44,7 @@ class ParameterEngine:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Those of all parameters."""
+        """Names of all parameters."""
         return tuple(p.name for p in self._known)
 
     def select(self, call: str, wrt: Sequence[str]) -> tuple[tuple[str, ...], Parameters, ParameterPlan]:

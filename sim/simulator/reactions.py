@@ -83,7 +83,7 @@ class Reactions(Result):
         return np.asarray(self.torque - self.constraint_torque)
 
     def __getitem__(self, joint: str) -> Reactions:
-        """Those of one joint, (..., 3)."""
+        """Reactions of one joint, (..., 3)."""
         k = self.names.index(checks.one_of("Reactions[...]: joint", joint, self.names))
         parts = (self.point, self.force, self.torque, self.constraint_force, self.constraint_torque)
         point, force, torque, held_force, held_torque = (part[..., k, :] for part in parts)

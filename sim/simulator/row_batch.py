@@ -157,7 +157,7 @@ class RowBatch:
         return BatchStep(x_next, statuses, iterations, A, B)
 
     def _kappa(self, row: int) -> float | None:
-        """That of a row, or None for its engine's."""
+        """Kappa of a row; None for that of its engine."""
         level = float(self.kappas[row])
         return None if np.isnan(level) else level
 

@@ -78,7 +78,7 @@ class Request(NamedTuple):
     change: Callable[[Vector, float, float], Floats]
 
     def of_parts(self, parts: int) -> Request:
-        """The same for the parts of a step, which last 1/parts of a time step."""
+        """Request for the parts of a step, which last 1/parts of a time step."""
         weights = self.plan.weights.copy()
         weights[self.plan.terms[:, 0] == Effect.TIME_STEP] /= parts
         return self._replace(plan=self.plan._replace(weights=weights))

@@ -22,6 +22,6 @@ def free_matrix(model: Model, data: Data, h: float, q: Vector, v: Vector) -> Non
 
 @kernel
 def factor_free(model: Model, data: Data, h: float, q: Vector, v: Vector) -> bool:
-    """The same, eliminated; False if it is singular."""
+    """Free matrix, eliminated; False if it is singular."""
     free_matrix(model, data, h, q, v)
     return factor(model, data) != 0

@@ -164,7 +164,7 @@ class Store:
                 os.utime(self.folder)  # says when it was used last
 
     def names(self) -> list[str]:
-        """Those of all files, apart from drafts."""
+        """Names of all files, apart from drafts."""
         return sorted(path.name for path in self.folder.glob("*.nbc")) if self.folder else []
 
     def holds(self, name: str) -> bool:

@@ -142,7 +142,7 @@ class Kernel:
 
     @property
     def signatures(self) -> set[Any]:
-        """Those compiled or loaded so far, of both forms."""
+        """Signatures compiled or loaded so far, of both forms."""
         return {s for form in ("entry", "inner") if form in vars(self) for s in vars(self)[form].overloads}
 
 

@@ -73,7 +73,7 @@ def type_of(annotation: str, names: dict[str, Any]) -> types.Type:
 
 
 def _annotations(cls: Any) -> Iterable[Any]:
-    """Those of the fields of a NamedTuple, which keeps their texts as references."""
+    """Annotations of the fields of a NamedTuple, which keeps their texts as references."""
     found: Iterable[Any] = cls.__annotations__.values()
     return found
 
@@ -158,7 +158,7 @@ class _Ahead:
         self.name = f"{self.func.__module__}:{self.func.__name__}"
 
     def types(self) -> tuple[types.Type, ...]:
-        """Those of its arguments."""
+        """Types of its arguments."""
         *arguments, _ = (type_of(text, self.func.__globals__) for text in self.func.__annotations__.values())
         return tuple(arguments)
 
@@ -209,7 +209,7 @@ def optional(slot: int, default: Any = None, seldom: bool = False) -> Callable[[
 
 
 def optional_kernels() -> list[OptionalKernel]:
-    """Those of all modules imported so far."""
+    """Optional kernels of all modules imported so far."""
     return list(_EVERY)
 
 

@@ -70,7 +70,7 @@ class ParallelKernel:
 
     @property
     def signatures(self) -> set[Any]:
-        """Those compiled or loaded so far, of both forms."""
+        """Signatures compiled or loaded so far, of both forms."""
         return {s for form in ("spread", "serial") if form in vars(self) for s in vars(self)[form].signatures}
 
 

@@ -60,13 +60,13 @@ class PlainCompiler(Compiler):
 
 
 class UsersCompiler(PlainCompiler):
-    """The same for functions of the user, and loops around them."""
+    """Plain compiler for functions of the user, and loops around them."""
 
     own = False
 
 
 class _Compilers(NamedTuple):
-    """Those of each form of a kernel."""
+    """Compilers of each form of a kernel."""
 
     fast: bool
     entry: type[Compiler]  # called from Python

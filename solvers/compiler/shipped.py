@@ -118,7 +118,7 @@ def _files(folder: Path) -> list[Path]:
 
 
 def versions() -> str:
-    """Those that compiled code depends on, as text."""
+    """Versions that compiled code depends on, as text."""
     return f"Numba {numba.__version__} and Python {sys.version_info[0]}.{sys.version_info[1]}"
 
 

@@ -187,7 +187,7 @@ def choose(trials: Sequence[SettingTrial], target: float = _TARGET) -> SettingTr
 
 
 def _smooth(report: Report, scene: scenes.SmoothScene, peers: Sequence[PhysicsEngine], quick: bool) -> None:
-    """The same start without contacts and limits, against the ODE, for all orders and peers."""
+    """Errors from the same start without contacts and limits, against the ODE, for all orders and peers."""
     everyone = curves.engines(1 if quick else 3, peers)
     steps = (0.05, 0.01, 0.002) if quick else (0.05, 0.025, 0.01, 0.005, 0.0025, 0.001)
     measured = curves.measure(scene, everyone, steps, 0.05 if quick else 0.3)

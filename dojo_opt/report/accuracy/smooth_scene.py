@@ -81,7 +81,7 @@ def smooth(mechanism: Mechanism, q: Floats, v: Floats, duration: float) -> Smoot
 
 
 def without_contact(mechanism: Mechanism) -> Mechanism:
-    """The same without contacts, collisions and limits."""
+    """The mechanism without contacts, collisions and limits."""
     joints = [replace(joint, limits=None) for joint in mechanism.joints]
     return replace(mechanism, contacts=(), collisions=(), joints=joints)
 

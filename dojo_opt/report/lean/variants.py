@@ -21,13 +21,13 @@ def robot_scene(name: str, mechanism: Mechanism, time_step: float) -> CostScene:
 
 
 def with_joints(mechanism: Mechanism, **features: Any) -> Mechanism:
-    """The same with these fields of all joints that are not floating."""
+    """The mechanism with these fields of all joints that are not floating."""
     joints = [j if j.kind == "floating" else replace(j, **features) for j in mechanism.joints]
     return replace(mechanism, joints=joints)
 
 
 def with_contacts(mechanism: Mechanism, contacts: Sequence[Contact]) -> Mechanism:
-    """The same with more contacts."""
+    """The mechanism with more contacts."""
     return replace(mechanism, contacts=[*mechanism.contacts, *contacts])
 
 

@@ -33,7 +33,7 @@ def along_b(i: int, ha: Vec3, hb: Vec3, R: Vector) -> float:
 
 @inner_kernel
 def along_a(j: int, ha: Vec3, hb: Vec3, R: Vector) -> float:
-    """The same along axis j of a."""
+    """Reach of the two boxes along axis j of a: half extent of a and of the shadow of b."""
     return ha[j] + hb[0] * abs(R[j]) + hb[1] * abs(R[3 + j]) + hb[2] * abs(R[6 + j])
 
 

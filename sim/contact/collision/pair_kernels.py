@@ -29,7 +29,7 @@ from solvers.types import Vector
 
 @inner_kernel
 def half_sides(sizes: Vector, first: int) -> Vec3:
-    """Those of a box: of shape a from 0, of b from 4."""
+    """Half sides of a box: shape a has its sizes from 0, shape b from 4."""
     return sizes[first], sizes[first + 1], sizes[first + 2]
 
 

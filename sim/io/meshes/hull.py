@@ -28,7 +28,7 @@ def reduced_hull(points: Floats, corners: int = CORNERS) -> tuple[Floats, float]
 
 @lru_cache(maxsize=256)
 def _reduced(data: bytes, corners: int) -> tuple[Floats, float]:
-    """The same, kept: a robot has a mesh many times."""
+    """Result of `reduced_hull`, kept: a robot has a mesh many times."""
     from scipy.spatial import ConvexHull
 
     points = np.frombuffer(data).reshape(-1, 3)

@@ -75,7 +75,8 @@ def _kind(model: Any, run: list[int]) -> str | None:
     if SLIDE in rotations or len(rotations) > 1:
         return None
     nrot = {HINGE: 1, BALL: 3}[rotations[0]] if rotations else 0
-    kind = next((name for name, free in KINDS.items() if free == (ntrans, nrot)), None)
+    others = {name: free for name, free in KINDS.items() if name != "screw"}  # which turns as a hinge does
+    kind = next((name for name, free in others.items() if free == (ntrans, nrot)), None)
     if ntrans and kind:
         slides = np.array([model.jnt_axis[j] for j in run[:ntrans]])
         axes = translation_axes(ntrans, _axis(model, run))[:ntrans]

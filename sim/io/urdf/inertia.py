@@ -24,7 +24,7 @@ class RigidInertia(NamedTuple):
     inertia: Floats
 
     def seen_from(self, pose: Pose) -> RigidInertia:
-        """The same in an outer frame in which this frame has the given pose."""
+        """Inertia in an outer frame in which this frame has the given pose."""
         return RigidInertia(self.mass, pose.at(self.com), pose.rotation @ self.inertia @ pose.rotation.T)
 
 

@@ -34,7 +34,7 @@ class MergedLinks:
 
     @property
     def inertias(self) -> list[RigidInertia]:
-        """Those of the links, in the frame of the group."""
+        """Inertias of the links, in the frame of the group."""
         return [RigidInertia(u.mass, u.com, u.inertia).seen_from(pose) for u, pose in self.links]
 
     def add(self, link: UrdfLink, pose: Pose) -> None:
