@@ -19,7 +19,7 @@ import dojo_opt as dojo
 from dojo_opt.report.result import Report
 from sim.derivatives.parameters.parameters import KINDS, all_parameters
 from sim.derivatives.parameters.seen_terms import with_seen
-from sim.derivatives.parameters.selection import select
+from sim.derivatives.parameters.selection import by_names, select
 from sim.simulator.sensitivity import parameter_columns
 
 REPEATS = 40
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> Report:
     x, u = sim.neutral(), np.zeros(sim.nu)
     calls = sim._engine
     known = with_seen(sim.model, all_parameters(sim.mechanism, sim.time_step))
-    every, plan = select("benchmark", known, sim.parameters().names)
+    every, plan = select("benchmark", by_names(known), sim.parameters().names)
     T = 5 if args.quick else 50
     us = np.zeros((T, sim.nu))
     t = sim.rollout(x, us, throw=True)

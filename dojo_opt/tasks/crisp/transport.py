@@ -15,7 +15,7 @@ from sim.simulator.simulator import Simulator
 __all__ = ["transport"]
 
 _KNOT, _HORIZON = 0.02, 200  # [s], knots
-_KAPPAS = (1e-1, 1e-2, 1e-3, 1e-6)  # [N s m]
+_KAPPAS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # [N s m]
 _NEAR = 0.05  # [m, m/s] of the goal
 _CART, _CARGO, _FRICTION = 2.0, 1.0, 0.2  # [kg], [kg]
 _G = 9.81  # [m/s^2]
