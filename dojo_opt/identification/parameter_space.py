@@ -105,14 +105,14 @@ class ParameterSpace:
         Raises:
             ValueError: for a wrong shape, a number that is not finite, or values that no mechanism has.
         """
-        changed: Simulator = self._sim.with_parameters(self.named("ParameterSpace.simulator(theta)", theta))
+        at = checks.array("ParameterSpace.simulator(theta)", theta, self.values.shape)
+        changed: Simulator = self._sim.with_parameters(self.named(at))
         return changed
 
-    def named(self, call: str, theta: ArrayLike) -> dict[str, Floats]:
+    def named(self, theta: ArrayLike) -> dict[str, Floats]:
         """The values at theta, by name, as `Simulator.with_parameters` and `set_parameters` take them.
 
         Args:
-            call: name of the call, for messages.
             theta: (n,) the vector.
 
         Returns:
@@ -121,7 +121,7 @@ class ParameterSpace:
         Raises:
             ValueError: for a wrong shape, or a number that is not finite.
         """
-        at = checks.array(call, theta, self.values.shape)
+        at = checks.array("ParameterSpace.named(theta)", theta, self.values.shape)
         values: dict[str, Floats] = {}
         for group in self._groups:
             numbers, first = group.chart(at[group.columns])[0], 0

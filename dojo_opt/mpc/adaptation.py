@@ -161,7 +161,7 @@ class ParameterEstimator:
             return None
         if self._fine is None or abs(self._fine.time_step - h) > _ROUNDING:
             self._fine = self._nominal.replace(time_step=h, kappa=None)
-            self._fine.set_parameters(self.space.named("MPC", self._written))
+            self._fine.set_parameters(self.space.named(self._written))
         return self._fine
 
     def _update(self, ground: Ground) -> None:
@@ -245,7 +245,7 @@ class ParameterEstimator:
     def _write(self) -> None:
         """Write the estimate into both models, which takes some milliseconds."""
         self._written = self.theta.copy()
-        values = self.space.named("MPC", self.theta)
+        values = self.space.named(self.theta)
         if self._fine is not None:
             self._fine.set_parameters(values)
         planned = {k: np.minimum(self._friction, v) if k.startswith("friction") else v for k, v in values.items()}
