@@ -23,7 +23,7 @@ from solvers.status import Status
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-__all__ = ["Window", "WindowErrors", "cut_windows", "difference_slopes"]
+__all__ = ["Window", "WindowErrors", "cut_windows", "difference_slopes", "slopes_along"]
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,30 @@ def difference_slopes(layout: Integers, differences: Floats) -> Floats:
         out[:, i : i + 3, i : i + 3] = np.eye(3) + 0.5 * K + factor[:, None, None] * (K @ K)
         i += 3
     return out
+
+
+def slopes_along(A: Floats, by_theta: Floats, rows: Integers) -> Floats:
+    """Derivatives of the states of a motion by its start and by theta, from those of its steps.
+
+    Args:
+        A: (T, ndx, ndx) derivatives of each step by its state.
+        by_theta: (T, ndx, n) those by theta.
+        rows: numbers of the states, in ascending order; the last one is T.
+
+    Returns:
+        (len(rows), ndx, ndx + n) derivatives.
+    """
+    ndx = A.shape[1]
+    width = ndx + by_theta.shape[2]
+    slope, moved = np.eye(ndx, width), np.empty((len(rows), ndx, width))
+    k = 0
+    for t in range(len(A) + 1):
+        if t == rows[k]:
+            moved[k], k = slope, k + 1
+        if t < len(A):
+            slope = A[t] @ slope
+            slope[:, ndx:] += by_theta[t]
+    return moved
 
 
 @dataclass(frozen=True)
@@ -140,16 +164,5 @@ class Predictor:
 
     def _moved(self, line: Linearization, rows: Integers, chain: Floats) -> Floats:
         """(len(rows), ndx, ndx + n) derivatives of the states at some steps by the start and by theta."""
-        ndx = line.A.shape[1]
         blocks = [np.asarray(line.parameters[name]) for name in self._space.wrt]
-        by_theta = np.concatenate(blocks, axis=2) @ chain
-        width = ndx + by_theta.shape[2]
-        slope, moved = np.eye(ndx, width), np.empty((len(rows), ndx, width))
-        k = 0
-        for t in range(len(line.A) + 1):
-            if t == rows[k]:
-                moved[k], k = slope, k + 1
-            if t < len(line.A):
-                slope = line.A[t] @ slope
-                slope[:, ndx:] += by_theta[t]
-        return moved
+        return slopes_along(line.A, np.concatenate(blocks, axis=2) @ chain, rows)

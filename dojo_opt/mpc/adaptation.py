@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.identification.parameter_space import ParameterSpace
+from dojo_opt.identification.windows import slopes_along
 from dojo_opt.mpc.ground import Ground
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
@@ -171,17 +172,21 @@ class ParameterEstimator:
             return
         x, us = self._samples[0][1], np.array([u for *_, u in self._samples[:-1]])
         self.covariance = self.covariance + np.diag(self._prior * len(us) * fine.time_step / self._settings.memory)
-        self._stand(fine, ground, x)
+        gaps = ground.gaps(ground.points(x))
+        self._stand(fine, ground, gaps)
         found = self._predict(fine, x, us)
-        if found is None or self._lands(ground, x, self._samples[-1][1], found[0]):
+        if found is None or self._lands(ground, gaps, self._samples[-1][1], found[0]):
             return
         end, A, J = found
         innovation, inflation = fine.difference(self._samples[-1][1], end), _CURVED
-        if self._normalised(innovation, A, J) > _OUTLIER:  # a foot that sticks in the model says nothing of friction
+        size = self._normalised(innovation, A, J)
+        if size > _OUTLIER:  # a foot that sticks in the model says nothing of friction
             smooth = self._planner.kappa * fine.time_step / self._planner.time_step
             found = self._predict(fine, x, us, smooth)
-            J, inflation = (J, inflation) if found is None else (found[2], 1.0)
-        self._correct(innovation, A, J, inflation)
+            if found is not None:
+                J, inflation = found[2], 1.0
+                size = self._normalised(innovation, A, J)
+        self._correct(innovation, A, J, size, inflation)
         if np.any(np.abs(self.theta - self._written) > _MOVED * np.sqrt(self._prior)):
             self._write()
 
@@ -192,11 +197,9 @@ class ParameterEstimator:
         xs, linear = fine.linearize_rollout(x, us, kappa, wrt=self.space.wrt)
         if not linear.success:
             return None
-        A, J = np.eye(fine.ndx), np.zeros((fine.ndx, len(self.theta)))
-        blocks = self.space.chain(self._written, linear.parameters)
-        for step, block in zip(linear.A, blocks, strict=True):
-            A, J = step @ A, step @ J + block
-        return xs[-1], A, J
+        by_theta = self.space.chain(self._written, linear.parameters)
+        slopes = slopes_along(linear.A, by_theta, np.array([len(us)]))[0]
+        return xs[-1], slopes[:, : fine.ndx], slopes[:, fine.ndx :]
 
     def _at_estimate(self, innovation: Vector, J: Matrix) -> Vector:
         """The innovation of the estimate, from that of the values that the models have."""
@@ -211,14 +214,16 @@ class ParameterEstimator:
         r = self._at_estimate(innovation, J)
         return float(np.sqrt(r @ np.linalg.solve(sum(self._innovation_covariance(A, J)), r) / len(r)))
 
-    def _correct(self, innovation: Vector, A: Matrix, J: Matrix, inflation: float) -> None:
+    def _correct(self, innovation: Vector, A: Matrix, J: Matrix, size: float, inflation: float) -> None:
         """Update estimate and covariance.
 
-        innovation: measured (-) predicted state; inflation: share of the change of the estimate that is added to its
-        standard deviation, as J is the derivative at another point, or of smoothed contact.
+        innovation: measured (-) predicted state
+        size: `_normalised` of it
+        inflation: share of the change of the estimate that is added to its standard deviation, as J is the derivative
+            at another point, or of smoothed contact
         """
         R, of_parameters = self._innovation_covariance(A, J)
-        R *= max(1.0, self._normalised(innovation, A, J) / _OUTLIER)
+        R *= max(1.0, size / _OUTLIER)
         P = self.covariance
         gain = np.linalg.solve(R + of_parameters, J @ P).T
         change = gain @ self._at_estimate(innovation, J)
@@ -230,16 +235,15 @@ class ParameterEstimator:
         scale = np.sqrt(np.minimum(1.0, self._prior / np.diag(P)))  # no estimate is worse than none
         self.covariance = scale[:, None] * P * scale
 
-    def _lands(self, ground: Ground, x: Vector, *ends: Vector) -> bool:
-        """Whether a contact that is in the air at x touches the ground at one of the ends."""
-        before, *after = (ground.gaps(ground.points(state)) for state in (x, *ends))
-        return any(bool(np.any((before > self._near) & (gaps < self._near))) for gaps in after)
+    def _lands(self, ground: Ground, gaps: Vector, *ends: Vector) -> bool:
+        """Whether a contact that is in the air, by its gap at first, touches the ground at one of the ends."""
+        after = ground.gaps(ground.points(np.stack(ends)))
+        return bool(np.any((gaps > self._near) & (after < self._near)))
 
-    def _stand(self, fine: Simulator, ground: Ground, x: Vector) -> None:
-        """Put the ground of the model under every contact that stands at x: its height is that of a noisy state."""
+    def _stand(self, fine: Simulator, ground: Ground, gaps: Vector) -> None:
+        """Put the ground of the model under every contact that stands: its gap is that of a noisy state."""
         if ground.normal is not None:
             fine.turn_ground(ground.normal)
-        gaps = ground.gaps(ground.points(x))
         fine.model.contact_height[:] = ground.height + np.where(np.abs(gaps) < self._near, gaps, np.minimum(gaps, 0.0))
 
     def _write(self) -> None:

@@ -77,12 +77,6 @@ class DividingEngine(Engine):
             self._engines[1] = Engine(self.model, self.settings._replace(loss=math.inf))
         return self._engines[1]
 
-    def turn_ground(self, frame: Floats) -> None:
-        """As Engine.turn_ground."""
-        super().turn_ground(frame)
-        for engine in self._engines.values():
-            engine.turn_ground(frame)
-
     def renew(self) -> None:
         """As Engine.renew."""
         super().renew()

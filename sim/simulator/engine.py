@@ -212,7 +212,7 @@ class Engine:
     def turn_ground(self, frame: Floats) -> None:
         """Give all contacts with half-spaces the frame (3, 3): rows normal and two tangents."""
         self.model.contact_frame[self.model.contact_terrain == 0] = frame.ravel()
-        self._scratch.turn()
+        self.renew()
 
     def renew(self) -> None:
         """Take anew what Data keeps of the model, after a change in it."""
