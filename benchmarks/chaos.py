@@ -41,7 +41,7 @@ def signals(count: int, rng: np.random.Generator) -> list[Heard]:
         victim = Victim(name)
         for _ in range(-(-(count - k) // len(LONG))):
             found.append(victim.interrupt(0.02 + 0.5 * rng.random()))
-            if found[-1].outcome == "crashed":
+            if found[-1].outcome in ("crashed", "hung"):
                 victim.end()
                 victim = Victim(name)
         victim.end()
@@ -181,7 +181,7 @@ def _add_signals(report: Report, found: list[Heard]) -> None:
     for call in LONG:
         mine = [h for h in found if h.call == call]
         times = [h.seconds for h in mine if np.isfinite(h.seconds)] or [np.nan]
-        bad = [sum(h.outcome == outcome for h in mine) for outcome in ("crashed", "different")]
+        bad = [sum(h.outcome == outcome for h in mine) for outcome in ("crashed", "hung", "different")]
         lines.append(
             [call, len(mine), *bad, float(np.median(times)), max(times), ", ".join(sorted({h.kept for h in mine}))]
         )
@@ -189,11 +189,12 @@ def _add_signals(report: Report, found: list[Heard]) -> None:
     report.rows += [
         number("interrupts", len(found)),
         number("crashed", sum(h.outcome == "crashed" for h in found), 0),
+        number("never heard", sum(h.outcome == "hung" for h in found), 0),
         number("other results afterwards", sum(h.outcome == "different" for h in found), 0),
         number("heard, median", float(np.median(times)), unit="s"),
         number("heard, latest", max(times), ANSWER, unit="s"),
     ]
-    header = ("call", "interrupts", "crashed", "other results", "heard [s]", "latest [s]", "kept")
+    header = ("call", "interrupts", "crashed", "never heard", "other results", "heard [s]", "latest [s]", "kept")
     report.tables.append(Table("Interrupts", header, lines))
 
 

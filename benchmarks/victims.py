@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -18,6 +19,7 @@ __all__ = ["FORKS", "LONG", "SMALL", "Heard", "Victim", "answer", "environment"]
 
 HOME = Path(dojo.__file__).resolve().parent.parent
 PATIENCE = 300.0  # [s]; a longer call counts as hung
+DEAF = 30.0  # [s] after a signal; a process that says nothing until then is killed, and counts as hung
 
 LONG = {
     "ilqr": "dojo.ilqr(trot, tolerance=1e-12, violation=1e-14)",
@@ -107,19 +109,23 @@ class Victim:
     def interrupt(self, after: float) -> Heard:
         """Begin a call, and send SIGINT `after` seconds later."""
         assert self.process.stdin is not None and self.process.stdout is not None
+        patience = threading.Timer(after + DEAF, self.process.kill)
+        sent, words = time.time(), list[str]()
         try:
             self.process.stdin.write("go\n")
             self.process.stdin.flush()
-            if self.process.stdout.readline() != "begin\n":
-                return Heard(self.call, np.nan, "", "crashed")
-            time.sleep(after)
-            sent = time.time()
-            self.process.send_signal(signal.SIGINT)
-            words = self.process.stdout.readline().split()
+            if self.process.stdout.readline() == "begin\n":
+                patience.start()
+                time.sleep(after)
+                sent = time.time()
+                self.process.send_signal(signal.SIGINT)
+                words = self.process.stdout.readline().split()
         except BrokenPipeError:
-            words = []
+            pass
+        finally:
+            patience.cancel()
         if len(words) != 3:
-            return Heard(self.call, np.nan, "", "crashed")
+            return Heard(self.call, np.nan, "", "hung" if time.time() > sent + 0.9 * DEAF else "crashed")
         return Heard(self.call, float(words[0]) - sent, words[1], words[2])
 
     def end(self) -> None:

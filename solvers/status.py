@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
+from solvers.codes import Code
 
 __all__ = ["MESSAGES", "Status"]
 
 
-class Status(IntEnum):
+class Status(Code):
     """Exit of a time step (below 10, and TOLERANCE_STEP), of the planner, or of both; kernels return it as a number."""
 
     SOLVED = 0

@@ -5,11 +5,11 @@ from __future__ import annotations
 import ast
 import inspect
 import re
-from enum import IntEnum
 from pathlib import Path
 
 from sim.model import columns
 from sim.model.layout import CARRY_FIELDS, DATA_FIELDS, MODEL_FIELDS
+from solvers.codes import Code
 
 SIM = Path(columns.__file__).parents[1]
 WIDTHS = {name: shape[-1] for name, shape in {**MODEL_FIELDS, **CARRY_FIELDS, **DATA_FIELDS}.items()}
@@ -22,8 +22,8 @@ PADDED = ("couple_x",)  # one column, in lanes
 
 def _named() -> set[str]:
     """Fields whose columns have names, which the docstrings of the enumerations begin with."""
-    enums = [thing for thing in vars(columns).values() if inspect.isclass(thing) and issubclass(thing, IntEnum)]
-    texts = [inspect.getdoc(thing) or "" for thing in enums if thing is not IntEnum]
+    enums = [thing for thing in vars(columns).values() if inspect.isclass(thing) and issubclass(thing, Code)]
+    texts = [inspect.getdoc(thing) or "" for thing in enums if thing is not Code]
     return {name for text in texts for name in re.findall(r"\w+", text.partition(":")[0]) if name in WIDTHS}
 
 

@@ -293,9 +293,9 @@ class Solver:
     def _begin(self, now: Iterate) -> None:
         """Start from another trajectory."""
         self._search.forget()
-        self._begun = True
         self._subproblem.forget()
         self.now = now
+        self._begun = True  # from here on Ctrl-C leaves a plan
 
     def _attempts(self, duals: tuple[Sequence[Matrix], ...]) -> tuple[Status, str]:
         """Attempts from the guess, each beginning at a stage, until one is good; else that with the least violation.

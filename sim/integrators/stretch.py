@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
 from math import sqrt
 from typing import NamedTuple
 
 from sim.integrators.landing import BEGINS, NEVER, UNKNOWN
 from sim.model.columns import ContactRow
+from solvers.codes import Code
 from solvers.compiler import kernel
 from solvers.dense import clear, copy_vector
 from solvers.types import Cube, Integers, Matrix, Vector
 
 
-class Clock(IntEnum):
+class Clock(Code):
     """clock of a Stretch."""
 
     TIME = 0  # [s] since its beginning
@@ -34,7 +34,7 @@ class Clock(IntEnum):
     BEGUN = 15  # 0 before the first sub-step
 
 
-class AccuracyGoal(IntEnum):
+class AccuracyGoal(Code):
     """goal of the sub-steps of a step."""
 
     ACCURACY = 0  # [m/s, rad/s]

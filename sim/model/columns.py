@@ -8,10 +8,10 @@ Rows that are matrices, row by row, such as rotations, have none: `W[3]` is entr
 
 from __future__ import annotations
 
-from enum import IntEnum
+from solvers.codes import Code
 
 
-class Kin(IntEnum):
+class Kin(Code):
     """contact_kin: geometry of a contact at configuration 3."""
 
     GAP = 0
@@ -23,7 +23,7 @@ class Kin(IntEnum):
     BY_TRANSLATION = 18  # (3, 3) d(gap, slip)/d(translation)
 
 
-class Dry(IntEnum):
+class Dry(Code):
     """dry, dry_step and dry_trial: variables of the dry friction of a joint, or of a servo with limits of its force."""
 
     FORWARD = 0  # motion forward
@@ -32,7 +32,7 @@ class Dry(IntEnum):
     LEFT_BACKWARD = 3  # F - lambda
 
 
-class Drive(IntEnum):
+class Drive(Code):
     """dry_drive: the servo of an element in this step (joints/limited_servo.py), zero of dry friction."""
 
     REST = 0  # r
@@ -40,14 +40,14 @@ class Drive(IntEnum):
     MEAN = 2  # M
 
 
-class DryMove(IntEnum):
+class DryMove(Code):
     """dry_move: the motion of an element in this step, and the bound of its impulse."""
 
     MOTION = 0
     BOUND = 1
 
 
-class DryConstant(IntEnum):
+class DryConstant(Code):
     """dry_w: constant parts of the step of an element."""
 
     IMPULSE = 0
@@ -55,7 +55,7 @@ class DryConstant(IntEnum):
     BACKWARD = 2
 
 
-class Gain(IntEnum):
+class Gain(Code):
     """dry_gain: those of a servo with limits of its force."""
 
     INPUT = 0  # force per unit of its input
@@ -63,13 +63,13 @@ class Gain(IntEnum):
     DAMPING = 2
 
 
-class PairFrame(IntEnum):
+class PairFrame(Code):
     """pair_frame: the rows n, t1, t2 of a frame, and behind them"""
 
     POINT = 9  # (3,) the contact point, world axes
 
 
-class Cone(IntEnum):
+class Cone(Code):
     """cone, cone_step and cone_trial: variables of a contact with the exact cone."""
 
     SLACK = 0  # of the gap
@@ -78,7 +78,7 @@ class Cone(IntEnum):
     FRICTION2 = 3
 
 
-class Pyramid(IntEnum):
+class Pyramid(Code):
     """Columns of `cone` for a contact with a friction pyramid."""
 
     SLACK = 0
@@ -89,14 +89,14 @@ class Pyramid(IntEnum):
     SLIP = 8  # (4,) s, slip in these directions, plus psi
 
 
-class ConeScale(IntEnum):
+class ConeScale(Code):
     """contact_scale of a contact with the exact cone."""
 
     GROWTH = 0  # (2,) d(beta)/d(mu gamma), of beta1 and beta2
     RESIDUAL = 2  # (2,) of the law, as a change of -beta
 
 
-class PyramidScale(IntEnum):
+class PyramidScale(Code):
     """contact_scale of a contact with a pyramid."""
 
     RATIO = 0  # (4,) beta_i / s_i
@@ -106,7 +106,7 @@ class PyramidScale(IntEnum):
     FRICTION = 8  # (4,) constant parts of dbeta
 
 
-class Inactive(IntEnum):
+class Inactive(Code):
     """inactive: a cluster whose impulses are evaluated, at its first contact (contact/inactive.py)."""
 
     ACTIVATION = 0  # gap below which the cluster is active; 0 where it is
@@ -127,14 +127,14 @@ class Inactive(IntEnum):
     STIFF = 37  # 1 where derivatives take it as active
 
 
-class Apart(IntEnum):
+class Apart(Code):
     """inactive and pair_apart, in motions of higher order: the node in `data` (integrators/phases.py)."""
 
     GAP = 0
     SPEED = 1
 
 
-class Cluster(IntEnum):
+class Cluster(Code):
     """cluster: contacts of one body against one direction, as one ball (mechanism/pack_clusters.py)."""
 
     CENTRE = 0  # (3,) in the body
@@ -146,7 +146,7 @@ class Cluster(IntEnum):
     CONTACTS = 8  # those of its body
 
 
-class Bounce(IntEnum):
+class Bounce(Code):
     """bounce: impact of a contact (contact/restitution.py)."""
 
     FLOOR = 0
@@ -159,7 +159,7 @@ class Bounce(IntEnum):
     POINT2 = 19  # (3,)
 
 
-class Witness(IntEnum):
+class Witness(Code):
     """pair_out and pair_trial: the results of `collide`, in the frame of shape b."""
 
     GAP = 0
@@ -169,13 +169,13 @@ class Witness(IntEnum):
     POINT_RATE = 25  # (3, 6)
 
 
-class RelativePose(IntEnum):
+class RelativePose(Code):
     """pair_before: rotation and centre of shape a in the frame of shape b at configuration 2, then"""
 
     GAP = 12  # least gap of the features there
 
 
-class PairBound(IntEnum):
+class PairBound(Code):
     """pair_far: the data that decide whether a collision is active (pairs/inactive_pairs.py), at its first pair."""
 
     RADII = 0  # sum of those of the balls around the shapes
@@ -187,14 +187,14 @@ class PairBound(IntEnum):
     REACH = 7  # gap from which there is no force, infinite for most
 
 
-class PairShare(IntEnum):
+class PairShare(Code):
     """pair_share: the part w of the impulse of a pair that acts within a reach (pairs/limited_reach.py)."""
 
     PART = 0
     RATE = 1  # d(log w)/d(gap)
 
 
-class Way(IntEnum):
+class Way(Code):
     """body_way: how far points of a body with collisions have moved, at most (pairs/limited_reach.py)."""
 
     BEFORE = 0  # since the motion began, along the configurations where steps began
@@ -202,7 +202,7 @@ class Way(IntEnum):
     POSE = 2  # (7,) pose where BEFORE ends
 
 
-class TerrainSize(IntEnum):
+class TerrainSize(Code):
     """terrain_size: the coefficients of a terrain."""
 
     FIRST = 0
@@ -210,34 +210,34 @@ class TerrainSize(IntEnum):
     ALONG_Y = 2
 
 
-class PairSize(IntEnum):
+class PairSize(Code):
     """pair_sizes: first of the sizes of each shape."""
 
     A = 0
     B = 4
 
 
-class JointFactor(IntEnum):
+class JointFactor(Code):
     """D: LU factors of the block of a joint, (n, n)."""
 
     INVERSE = 0  # of a block of one row, instead of factors
     SWAPS = 36  # exchanges of rows
 
 
-class DirectionRow(IntEnum):
+class DirectionRow(Code):
     """F: scratch of a test direction, and behind it"""
 
     TURNED = 12  # (6,) the residual wrench times the rotation by the direction
 
 
-class Pace(IntEnum):
+class Pace(Code):
     """pace: when to go back to Python."""
 
     DEADLINE = 0  # [s]
     EFFORT = 1  # since the last look at the clock
 
 
-class Grid(IntEnum):
+class Grid(Code):
     """terrain_place: a height field in the plane (contact/height_field.py)."""
 
     DIRECTION = 0  # (2,) of the first axis
@@ -247,7 +247,7 @@ class Grid(IntEnum):
     CURVATURE = 7  # bound of the second derivatives of F [1/m]
 
 
-class CoupleRank(IntEnum):
+class CoupleRank(Code):
     """couple_rank: the system of loops, gears and pairs."""
 
     RANK = 0
@@ -256,21 +256,21 @@ class CoupleRank(IntEnum):
     DEFICIENCY = 3  # least of this motion
 
 
-class Bound(IntEnum):
+class Bound(Code):
     """bound, bound_step and bound_trial: variables of a limit."""
 
     SLACK = 0
     IMPULSE = 1
 
 
-class BoundRow(IntEnum):
+class BoundRow(Code):
     """bound_row: a cone limit, by rotation."""
 
     TORQUE = 0  # (3,) per unit of impulse
     RATE = 3  # (3,) d(gap)/d(v25)
 
 
-class StepSetting(IntEnum):
+class StepSetting(Code):
     """The settings of a step in an array, as loops over time read them (integrators/rollout.py)."""
 
     TIME_STEP = 0  # [s]
@@ -282,7 +282,7 @@ class StepSetting(IntEnum):
     LOSS = 6
 
 
-class StepReport(IntEnum):
+class StepReport(Code):
     """The report of a step."""
 
     STATUS = 0  # Status
@@ -294,7 +294,7 @@ class StepReport(IntEnum):
     EARLIER = 6  # iterations of the steps before, in closed loops
 
 
-class ContactRow(IntEnum):
+class ContactRow(Code):
     """The report of a contact after a step, in world axes (contact/contact_report.py)."""
 
     IMPULSE = 0  # (3,) [N s]

@@ -14,13 +14,13 @@ Glossary, one meaning each, everywhere in `sim`:
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import NamedTuple
 
+from solvers.codes import Code
 from solvers.types import IntegerMatrix, Integers, Matrix, Vector
 
 
-class Law(IntEnum):
+class Law(Code):
     """Contact law."""
 
     IMPACT = 0  # normal impulse only
@@ -28,7 +28,7 @@ class Law(IntEnum):
     NONLINEAR = 2  # friction in the exact second-order cone
 
 
-class InputKind(IntEnum):
+class InputKind(Code):
     """The target of an input."""
 
     JOINT = 0  # one joint coordinate

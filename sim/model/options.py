@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import NamedTuple
 
+from solvers.codes import Code
 from solvers.status import Status
 from solvers.types import Vector
 
@@ -44,7 +44,7 @@ class Outcome(NamedTuple):
     violation: float  # largest |product - kappa| of complementary pairs
 
 
-class FeatureChoice(IntEnum):
+class FeatureChoice(Code):
     """When the active features of two shapes are chosen: the faces, edges and corners that are in contact."""
 
     ONCE = 0  # where an attempt starts
@@ -52,7 +52,7 @@ class FeatureChoice(IntEnum):
     WITH_PREVIOUS = 2  # where an attempt starts, beside the previous features that pressed
 
 
-class Verdict(IntEnum):
+class Verdict(Code):
     """The verdict of the energy balance and the shapes on a solution of the equations."""
 
     VALID = 0
@@ -61,7 +61,7 @@ class Verdict(IntEnum):
     ENERGY_GAIN = 3  # the step gained energy
 
 
-class LawForm(IntEnum):
+class LawForm(Code):
     """Forms of a contact law in a matrix."""
 
     PLAIN = 0  # as it stands

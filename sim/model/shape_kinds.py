@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
 from itertools import product
+
+from solvers.codes import Code
 
 SIZES = 4  # room for the sizes of one shape in the vector that `collide` takes
 SWAPPED = 64  # added to a Pair: the two have changed places
@@ -14,7 +15,7 @@ CROSSINGS = 9  # points of a cylinder and another shape other than corners: plac
 RIM_POINTS = 8  # points on a rim that a plane may touch
 
 
-class Shape(IntEnum):
+class Shape(Code):
     """Shape of a collision, with its sizes [m]. Centred on the origin of its frame, long along z."""
 
     SPHERE = 0  # radius
@@ -28,7 +29,7 @@ class Shape(IntEnum):
     STRING = 5  # as shape a: greatest length; against a STRING b without sizes: the other end
 
 
-class Size(IntEnum):
+class Size(Code):
     """How the surface of a shape moves where it is touched, per unit of one of its sizes (sizes.py)."""
 
     BALL = 0  # radius around a point, a segment, or a polytope: along the normal
@@ -45,7 +46,7 @@ class Size(IntEnum):
     SEMI_Z = 11
 
 
-class Pair(IntEnum):
+class Pair(Code):
     """Kind of a collision: shape a against shape b, in this order."""
 
     SPHERE_SPHERE = 0

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
+from solvers.codes import Code
 
 
-class Slot(IntEnum):
+class Slot(Code):
     """The number of each optional kernel: machine code on disk holds it, never the order of imports."""
 
     # kernels of all scenes, compiled once

@@ -6,12 +6,12 @@ z[i, BodyColumn.QUATERNION + 1]   first columns, for kernels
 
 from __future__ import annotations
 
-from enum import IntEnum
+from solvers.codes import Code
 
 __all__ = ["BaseState", "BodyColumn", "BodyState"]
 
 
-class BodyColumn(IntEnum):
+class BodyColumn(Code):
     """First column of each part of the maximal state of a body."""
 
     POSITION = 0  # (3,) of the centre of mass, world axes [m]

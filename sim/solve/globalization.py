@@ -9,7 +9,6 @@ beyond folds, such as those of legs that jam between a joint limit and the groun
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +27,7 @@ from sim.solve.merit import residuals
 from sim.solve.prediction import predict, predictable
 from sim.solve.step_length import largest_turn
 from sim.solve.trial_velocity import INFEASIBLE, set_trial_velocity
+from solvers.codes import Code
 from solvers.compiler import inlined, kernel
 from solvers.types import Vector
 
@@ -41,7 +41,7 @@ _GOLDEN = 0.6180339887498949
 _BEYOND = 2.0  # [rad] from a fold to a start on its other side
 
 
-class Start(IntEnum):
+class Start(Code):
     """Where an attempt starts."""
 
     KNOWN = 0  # with the iterate of `known_start`

@@ -182,6 +182,31 @@ def test_torch_agrees_with_its_own_differences_and_names_the_error() -> None:
         whole(torch.tensor([0.0, 100.0]).double(), torch.zeros(1).double())
 
 
+def test_torch_maps_rows_and_refuses_second_derivatives() -> None:
+    torch = pytest.importorskip("torch")
+    _, rollout = dojo.bridges.to_torch(PENDULUM)
+    xs, us = torch.tensor(np.eye(2)), torch.tensor(np.arange(8.0).reshape(2, 4, 1) / 8.0)
+    assert torch.equal(torch.vmap(rollout)(xs, us), rollout(xs, us))
+    assert torch.equal(torch.vmap(rollout, in_dims=(None, 1))(xs[0], us.movedim(0, 1)), rollout(xs[0], us))
+    jacobians = torch.vmap(torch.func.jacrev(rollout))(xs, us)
+    expected = torch.autograd.functional.jacobian(rollout, (xs[1], us[1]))[0]
+    torch.testing.assert_close(jacobians[1], expected, rtol=0.0, atol=1e-12)
+    assert torch.equal(torch.compile(rollout, backend="eager")(xs, us), rollout(xs, us))
+    with pytest.raises(NotImplementedError, match="a gradient has no gradient of its own"):
+        torch.autograd.functional.hessian(lambda x: rollout(x, us[0]).sum(), xs[0])  # linear in the states
+
+
+def test_torch_names_arguments_without_numbers() -> None:
+    torch = pytest.importorskip("torch")
+    _, rollout = dojo.bridges.to_torch(PENDULUM)
+    x, us = torch.zeros(2).double(), torch.zeros((4, 1)).double()
+    for wrong in (None, "a", x.to_sparse(), x.to("meta")):
+        with pytest.raises(TypeError, match="to_torch: argument x0: expected a (dense )?tensor"):
+            rollout(wrong, us)
+    with pytest.raises(ValueError, match=r"leading axes that broadcast, got x0 \(3,\), us \(4,\), theta \(\)"):
+        rollout(x.expand(3, 2), us.expand(4, 4, 1))
+
+
 @pytest.mark.parametrize(("name", "extra"), [("to_jax", "jax"), ("to_torch", "torch")])
 def test_a_framework_that_is_not_there_is_named(name: str, extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, extra, None)

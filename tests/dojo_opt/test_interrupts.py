@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from dojo_opt.planning.subproblem import Subproblem
 from solvers.compiler import local_kernel
 from solvers.status import Status
-from support.interrupts import heard
+from support.interrupts import dropped, heard
 from support.programs import HOME
 
 ENDLESS: dict[str, Any] = {"tolerance": 1e-12, "violation": 1e-14}
@@ -93,6 +94,38 @@ def test_ctrl_c_from_outside_never_crashes_a_plan() -> None:
             child.send_signal(signal.SIGINT)
         out, _ = child.communicate()
         assert (child.returncode, out) == (0, "Interrupted INTERRUPTED\n")
+
+
+HOPPER = dojo.Simulator(dojo.models.raiberthopper(), 0.02)
+REST, PUSHES = HOPPER.neutral(), np.full((8, HOPPER.nu), 0.5)
+CALLS = {
+    "step": lambda: HOPPER.step(REST),
+    "rollout": lambda: HOPPER.rollout(REST, PUSHES),
+    "batch": lambda: HOPPER.rollout_batch(np.tile(REST, (2, 1)), np.tile(PUSHES, (2, 1, 1))),
+    "rows": lambda: HOPPER.step_batch(np.tile(REST, (2, 1)), PUSHES[:2], derivatives=True),
+    "derivatives": lambda: HOPPER.linearize_trajectory(np.tile(REST, (8, 1)), PUSHES),
+    "gradient": lambda: HOPPER.vjp((np.tile(REST, (9, 1)), PUSHES), np.zeros((9, HOPPER.ndx))),
+    "accuracy": lambda: HOPPER.replace(accuracy=1e-3).rollout(REST, PUSHES),
+    "plan": lambda: dojo.ilqr(HOP, max_iterations=1),
+    "comparison": lambda: np.zeros(2, dtype=np.int64) == dojo.Status.SOLVED,
+    "choice": lambda: np.where(np.zeros(2, dtype=bool), dojo.Status.SOLVED, dojo.Status.SINGULAR),
+}
+HOP = dojo.problems.hop()
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_no_ctrl_c_is_dropped_wherever_it_comes(name: str) -> None:
+    assert dropped(CALLS[name], most=200) == []
+
+
+def test_ctrl_c_before_the_first_iterate_leaves_no_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Subproblem, "forget", stop)
+    with pytest.raises(dojo.Interrupted) as found:
+        dojo.ilqr(HOP)
+    assert found.value.result is None
 
 
 class Pair(NamedTuple):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -89,3 +91,45 @@ def heard_in(call: Callable[[int], Any], steps: int, after: float, *, in_loop: b
             return getattr(found.stop, "result", None)
     assert found.stop is not None, f"the call took less than {after:g} s"
     pytest.fail(f"heard after {found.seconds:.2f} s")
+
+
+class _RaisedAt:
+    """Trace function that raises KeyboardInterrupt where a function begins, which is where Python handles signals."""
+
+    def __init__(self, number: int) -> None:
+        self.count, self._number = 0, number
+        self.where = ""
+
+    def __call__(self, frame: Any, event: str, arg: object) -> None:
+        code = frame.f_code
+        if code.co_flags & inspect.CO_GENERATOR:  # traced as it is closed, too, where Python handles no signals
+            return
+        self.count += 1
+        if self.count == self._number:
+            self.where = f"{code.co_filename}:{code.co_qualname}"
+            sys.settrace(None)
+            raise KeyboardInterrupt
+
+
+class _Raised:
+    """A call with a KeyboardInterrupt as its function of that number begins; 0: none."""
+
+    def __init__(self, call: Callable[[], Any], number: int) -> None:
+        trace, before = _RaisedAt(number), sys.gettrace()
+        self.heard = False
+        sys.settrace(trace)
+        try:
+            call()
+        except KeyboardInterrupt:
+            self.heard = True
+        finally:
+            sys.settrace(before)
+        self.count, self.where = trace.count, trace.where
+
+
+def dropped(call: Callable[[], Any], most: int = 300) -> list[str]:
+    """Functions in which a KeyboardInterrupt during the call is lost, of all, or of `most` spread over it."""
+    call()
+    counted = _Raised(call, 0)
+    numbers = range(1, counted.count + 1, 1 + counted.count // most)
+    return [found.where for found in (_Raised(call, k) for k in numbers) if found.where and not found.heard]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import NamedTuple
 
+from solvers.codes import Code
 from solvers.types import Matrix, Vector
 
 
-class Effect(IntEnum):
+class Effect(Code):
     """The target of an elementary change; index and component of its term in brackets."""
 
     MASS = 0  # of a body, its inertia fixed [body]
