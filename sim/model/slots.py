@@ -212,3 +212,10 @@ class Slot(Code):
     # elements of pairs of shapes: chosen, and where a step begins
     CHOOSE_SHAPES = 172
     OPEN_PAIRS = 173
+    # the prediction of a step: contacts and limits that it reaches
+    CHOOSE_REACHED = 174
+    DELASSUS = 175
+    REACHED_RATES = 176
+    REACHED_IMPULSES = 177
+    # sizes of the rows of loops
+    ADD_LOOP_SIZES = 178

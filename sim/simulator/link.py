@@ -98,7 +98,7 @@ from sim.dynamics.loops.branch_motion import (
     stay_regular,
 )
 from sim.dynamics.loops.closure import apply_loops, keep_loops, move_loops, start_loops
-from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling, solve_coupling_panel
+from sim.dynamics.loops.coupling_system import add_loop_sizes, factor_coupling, solve_coupling, solve_coupling_panel
 from sim.dynamics.loops.gears import (
     apply_gears,
     gear_derivatives,
@@ -111,13 +111,19 @@ from sim.dynamics.loops.loop_work import loop_slack, loops_gained
 from sim.integrators.closed_interval import close_interval
 from sim.model.model import Law, Model
 from sim.model.shape_kinds import CHOSEN, SWAPPED, Pair
-from sim.solve.delassus import contact_answers, contact_rates
+from sim.solve.delassus import contact_answers, contact_rates, delassus
 from sim.solve.energy_balance import energies_gained
 from sim.solve.inequalities import add_stiffness
 from sim.solve.interior_point import interior_point
 from sim.solve.loop_branch import solve_loops
 from sim.solve.newton import newton
-from sim.solve.prediction import choose_contacts, take_contacts
+from sim.solve.prediction import (
+    choose_contacts,
+    choose_reached,
+    reached_impulses,
+    reached_rates,
+    take_contacts,
+)
 from sim.step import step
 from solvers.compiler import link
 from solvers.riccati import backward_knots
@@ -167,7 +173,8 @@ _DRY = (
     return_dry,
     start_dry,
 )
-_PREDICTION = (has_pyramids, contact_rates, contact_answers, choose_contacts, take_contacts)
+_PREDICTION = (choose_reached, delassus, reached_rates, reached_impulses)
+_PREDICTION_OF_CONTACTS = (has_pyramids, contact_rates, contact_answers, choose_contacts, take_contacts)
 _COUPLING = (factor_coupling, solve_coupling)
 _LOOPS = (
     start_loops,
@@ -245,6 +252,12 @@ def _has_ball_springs(model: Model) -> bool:
     return bool(np.any(model.dof_spring[first[model.joint_nrot == 3]] > 0.0))
 
 
+def _is_predicted(model: Model) -> bool:
+    """Whether `predictable` may be true of a state in which contacts or limits act."""
+    uncovered = len(model.loop_ntrans) + len(model.gear_dof) + len(model.dry_dof)
+    return uncovered == 0 and len(model.contact_height) + len(model.limit_dof) > 0
+
+
 def _has_strings(model: Model) -> bool:
     return bool(np.any(model.pair_kind % SWAPPED == int(Pair.STRING)))
 
@@ -260,7 +273,7 @@ def link_poses(model: Model) -> None:
 def link_nodes(model: Model) -> None:
     """Link the kernels of velocities and energies at nodes: those of loops follow from their constraints."""
     if len(model.loop_ntrans) + len(model.gear_dof):
-        link(model.optional, *_COUPLING, close_velocity)
+        link(model.optional, *_COUPLING, add_loop_sizes, close_velocity)
         if np.any(model.dof_damper):
             link(model.optional, close_interval)
     if len(model.gear_dof):
@@ -304,7 +317,9 @@ def link_terms(model: Model) -> None:
     if len(model.contact_body):
         link(model.optional, *_CONTACTS)
     if len(model.contact_height):
-        link(model.optional, *_GROUND, *_PREDICTION)
+        link(model.optional, *_GROUND, *_PREDICTION_OF_CONTACTS)
+    if _is_predicted(model):
+        link(model.optional, *_PREDICTION)
     if np.any(model.limit_cone):
         link(model.optional, cone_gap, cone_block)
     if len(model.dry_dof):

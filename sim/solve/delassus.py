@@ -117,7 +117,7 @@ def limit_answers(model: Model, data: Data, k: int, b: int, size: int) -> None:
     _answer(model, data, i, b, size)
 
 
-@kernel
+@optional(Slot.DELASSUS)
 def delassus(model: Model, data: Data, h: float, points: int, size: int) -> None:
     """Columns of G, as rows of data.delassus, of the contacts and limits in data.reach_of.
 

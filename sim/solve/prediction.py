@@ -73,7 +73,7 @@ def limit_rate(model: Model, data: Data, h: float, k: int) -> float:
 
 @optional(Slot.CHOOSE_CONTACTS, default=0)
 def choose_contacts(model: Model, data: Data, h: float, kappa: float) -> int:
-    """Contacts that may touch, into reach_of, with w and l; and their rows, three each. See `choose`."""
+    """Contacts that may touch, into reach_of, with w and l; and their rows, three each. See `choose_reached`."""
     most = data.reach_of.shape[0]
     n = 0
     for m in range(data.active_ground_count[0]):
@@ -94,8 +94,8 @@ def choose_contacts(model: Model, data: Data, h: float, kappa: float) -> int:
     return n
 
 
-@kernel
-def choose(model: Model, data: Data, h: float, kappa: float) -> tuple[int, int]:
+@optional(Slot.CHOOSE_REACHED, default=(0, -1))
+def choose_reached(model: Model, data: Data, h: float, kappa: float) -> tuple[int, int]:
     """Contacts and limits that may touch, into reach_of, with w and l; and their number: (contacts, rows). The others
     get the impulses of their gaps.
 
@@ -131,16 +131,16 @@ def take_contacts(model: Model, data: Data, h: float, points: int) -> None:
         _take_contact(data, j, c, contact_rate(model, data, c))
 
 
-@kernel
-def rates(model: Model, data: Data, h: float, points: int, size: int) -> None:
+@optional(Slot.REACHED_RATES)
+def reached_rates(model: Model, data: Data, h: float, points: int, size: int) -> None:
     """w and l of the contacts and limits chosen, after the last solve."""
     take_contacts(model, data, h, points)
     for j in range(3 * points, size):
         _take_limit(data, j, data.reach_of[j], limit_rate(model, data, h, data.reach_of[j]))
 
 
-@kernel
-def impulses(model: Model, data: Data, h: float, kappa: float, points: int, size: int) -> bool:
+@optional(Slot.REACHED_IMPULSES, default=False)
+def reached_impulses(model: Model, data: Data, h: float, kappa: float, points: int, size: int) -> bool:
     """Impulses of the contacts and limits chosen, into cone and bound; whether they have settled."""
     l = data.reach_impulse
     settled = gauss_seidel(data.delassus, data.reach_friction, h, kappa, points, size, data.reach_rate, l)
@@ -175,7 +175,7 @@ def predict(
     if not factor_free(model, data, h, q, v):
         return INFEASIBLE
     descend(model, data)
-    points, size = choose(model, data, h, kappa)
+    points, size = choose_reached(model, data, h, kappa)
     if size < 0:
         return INFEASIBLE
     delassus(model, data, h, points, size)
@@ -183,7 +183,7 @@ def predict(
     step = 1
     while True:
         if size > 0:
-            settled = impulses(model, data, h, kappa, points, size)
+            settled = reached_impulses(model, data, h, kappa, points, size)
             residuals(model, data, h, q, v, u)
             descend(model, data)
         for d in range(v.shape[0]):
@@ -196,4 +196,4 @@ def predict(
             return balance
         step += 1
         descend(model, data)
-        rates(model, data, h, points, size)
+        reached_rates(model, data, h, points, size)

@@ -28,6 +28,7 @@ from numba.core.typed_passes import NativeLowering
 from solvers.compiler.arithmetic import ARITHMETIC, choice
 from solvers.compiler.array_words import DATA, SHAPE, STRIDES, WORD, ArrayWords
 from solvers.compiler.operators import OPERATORS
+from solvers.compiler.ranges import RANGE, RangeIterator, RangeRound, RangeValue
 from solvers.compiler.records import RecordType, field_words
 
 __all__ = ["KernelLowering"]
@@ -83,7 +84,7 @@ class _Lower(Lower):
 
     def _as_value(self, value: Any, kind: Any) -> Any:
         """Of words one value."""
-        if isinstance(value, ArrayWords):
+        if isinstance(value, ArrayWords | RangeValue | RangeIterator | RangeRound):
             return value.value(self.builder, self.context.get_value_type(kind))
         return value
 
@@ -134,17 +135,38 @@ class _Lower(Lower):
                 value = cgutils.pack_array(self.builder, sizes)
                 self._items[value] = sizes
                 return value
+        elif expr.op in ("getiter", "iternext", "pair_first", "pair_second"):
+            value = self._lower_loop(resty, expr)
+            if value is not None:
+                return value
         value = super().lower_expr(resty, expr)
         if expr.op == "build_tuple":
             kinds = zip(expr.items, resty, strict=True)
             self._items[value] = [self._cast_var(item, kind) for item, kind in kinds]
         return value
 
+    def _lower_loop(self, resty: Any, expr: Any) -> Any:
+        """A part of a loop over a range; None: of another loop."""
+        held = self._blk_local_varmap.get(expr.value.name)
+        if isinstance(held, RangeValue) and expr.op == "getiter":
+            return held.begin(self.builder)
+        if isinstance(held, RangeIterator) and expr.op == "iternext":
+            return held.go_on(self.builder)
+        if isinstance(held, RangeRound) and expr.op == "pair_first":
+            return self.context.cast(self.builder, held.number, types.int64, resty)
+        return held.follows if isinstance(held, RangeRound) and expr.op == "pair_second" else None
+
     def _lower_call_normal(self, fnty: Any, expr: Any, signature: Any) -> Any:
         """A call: of a kernel with its words as they are, and with the caller's place for an exception."""
         if isinstance(fnty, types.Function) and (write := choice(fnty.typing_key, signature.args)):
             values = [self._cast_var(var, kind) for var, kind in zip(expr.args, signature.args, strict=True)]
             return write(self.builder, *values)
+        if isinstance(fnty, types.Function) and fnty.typing_key is range and signature.return_type == RANGE:
+            found = RangeValue.of(
+                [self._cast_var(var, kind) for var, kind in zip(expr.args, signature.args, strict=True)]
+            )
+            if found is not None:
+                return found
         code = fnty.dispatcher.overloads.get(tuple(signature.args)) if isinstance(fnty, types.Dispatcher) else None
         plain = not (expr.vararg or expr.kws) and len(expr.args) == len(signature.args)
         if code is None or not plain or isinstance(signature.return_type, types.Optional):

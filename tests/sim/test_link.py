@@ -18,6 +18,10 @@ GROUND = (
     Slot.REPORT_CONTACTS,
     Slot.CHOOSE_CONTACTS,
     Slot.CONTACT_RATES,
+    Slot.CHOOSE_REACHED,
+    Slot.DELASSUS,
+    Slot.REACHED_RATES,
+    Slot.REACHED_IMPULSES,
     Slot.ADD_SLIP_JACOBIANS,
     Slot.ALL_STIFF,
 )
@@ -57,3 +61,13 @@ def test_a_scene_without_pairs_links_none_of_their_kernels() -> None:
 def test_shapes_of_one_contact_link_no_choice_of_elements() -> None:
     assert Slot.OVERLAPPING not in linked(dojo.Sphere(0.1), ground=False)
     assert Slot.OVERLAPPING in linked(dojo.Box(0.1, 0.1, 0.1), ground=False)
+
+
+@pytest.mark.parametrize("features", [{}, {"limits": (-0.5, 0.5)}, {"friction": 0.1, "limits": (-0.5, 0.5)}])
+def test_a_joint_links_the_prediction_only_if_it_has_limits_that_the_prediction_covers(features: dict) -> None:
+    joint = dojo.Joint("revolute", None, "a", child_point=(0.0, 0.0, -0.1), **features)
+    sim = dojo.Simulator(dojo.Mechanism([dojo.Body("a", 1.0, (0.1, 0.2, 0.3))], [joint]), time_step=0.01)
+    sim.step(sim.neutral())
+    filled = set(np.flatnonzero(sim.model.optional))
+    assert ({Slot.CHOOSE_REACHED, Slot.DELASSUS} <= filled) == ([*features] == ["limits"])
+    assert Slot.CHOOSE_CONTACTS not in filled

@@ -52,6 +52,34 @@ def _deep(c, t, out):
     tail[0] = 7.0
 
 
+@kernel
+def _ranges(n, m, k, out):
+    """Ranges up and down, with steps of more than one and steps that are not written as numbers, left early, chosen."""
+    for i in range(n):
+        out[0] += i
+    for i in range(m, n, 3):
+        out[0] += 7 * i
+    for i in range(n, m, -1):
+        out[1] += 5 * i
+    for i in range(n, m, -2):
+        out[1] += 11 * i
+    for i in range(m, n, k):
+        out[2] += 13 * i
+    for i in range(n):
+        if i == 3:
+            break
+        for j in range(i):
+            if j == 1:
+                continue
+            out[3] += i - j
+    else:
+        out[3] += 1000
+    chosen = range(n) if m > 0 else range(m, n)
+    for i in chosen:
+        out[3] += 17 * i
+    out[2] += len(range(m, n))
+
+
 class _Column(IntEnum):
     """Names of columns."""
 
@@ -158,6 +186,12 @@ _CASES = [
     (_compared, lambda: (2.0, 2.0)),
     (_loop, lambda: (_matrix(),)),
     (_loop, lambda: (-_matrix(),)),
+    *(
+        (_ranges, lambda n=n, m=m, k=k: (n, m, k))
+        for n in (-3, 0, 1, 5, 10)
+        for m in (-4, 0, 3, 12)
+        for k in (1, 2, -1)
+    ),
 ]
 
 
@@ -202,3 +236,20 @@ def test_columns_by_name_take_the_instructions_of_numbers():
         (text,) = compiled.inspect_llvm().values()
         code.append({word: text.count(word) for word in (" icmp ", " select ", " add ", " load ")})
     assert code[0] == code[1]
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="looks at compiled code")
+@pytest.mark.skipif(os.environ.get("DOJO_OPT_PLAIN_NUMBA", "0") not in ("", "0"), reason="Numba writes sixty")
+def test_a_loop_over_a_range_takes_few_instructions_before_it_is_optimised():
+    def total(n: int) -> int:
+        found = 0
+        for i in range(n):
+            found += i
+        return found
+
+    form = local_kernel(total).inner
+    form.compile((numba.types.int64,))
+    (code,) = form.overloads.values()
+    blocks = [[*block.instructions] for f in code.library._final_module.functions for block in f.blocks]
+    assert sum(map(len, blocks)) <= 25
+    assert not any(i.opcode in ("srem", "sdiv") for block in blocks for i in block)

@@ -105,7 +105,7 @@ def _fill(model: Model, data: Data, whole: bool) -> None:
                     store(data.couple_T, p, left, -1.0 * row_responses(model, data, p, LANES * k))
         rows = data.couple_start[m + 1] - data.couple_start[m]
         if not is_apart(model):
-            _add_sizes(model, data, rows)
+            add_loop_sizes(model, data, rows)
         for e in range(rows if is_pair(model, k) else 0):
             p = data.couple_start[m] + e
             data.couple_T[p, left + e] += data.couple_E[data.couple_live[p, 0]]
@@ -124,8 +124,8 @@ def _answers(model: Model, data: Data, m: int, c: int) -> None:
         solve_tree(model, data, moved_tree(model, k, side), data.couple_Y, c, data.couple_Z)
 
 
-@kernel
-def _add_sizes(model: Model, data: Data, columns: int) -> None:
+@optional(Slot.ADD_LOOP_SIZES)
+def add_loop_sizes(model: Model, data: Data, columns: int) -> None:
     """couple_scale of the rows of loops = their largest `response_size`."""
     for p in range(data.couple_start[data.couple_count[0]]):
         m = data.couple_live[p, 1]
