@@ -24,8 +24,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from chaos_processes import FORKS, LONG, SMALL, Heard, Victim, answer, environment
 from command import deliver, number, parser, progress
-from victims import FORKS, LONG, SMALL, Heard, Victim, answer, environment
 
 from dojo_opt.report.result import Report, Table
 

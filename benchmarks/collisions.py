@@ -21,7 +21,7 @@ from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Cell, Report, Table
-from support.encounters import ALL, approaching, two
+from support.two_bodies import ALL, approaching, two
 
 BALLS = [f"b{k}" for k in range(20)]
 GAIN = 1e-2  # [J] more than kappa pushes from afar

@@ -20,7 +20,7 @@ from command import deliver, parser, progress
 from numpy.typing import NDArray
 
 import dojo_opt as dojo
-from dojo_opt.report.clock import interleave
+from dojo_opt.report.interleaved_rounds import interleave
 from dojo_opt.report.result import Cell, Report, Row, Table
 from support.towers import EDGE, tower
 

@@ -24,7 +24,7 @@ import numpy as np
 from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
-from dojo_opt.plant.loop import ClosedLoop
+from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.tasks.suite import SuiteTask

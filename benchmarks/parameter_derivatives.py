@@ -17,8 +17,8 @@ from command import deliver, number, parser
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Report
+from sim.derivatives.parameters.damper_inertia_effects import with_damper_inertia
 from sim.derivatives.parameters.parameters import KINDS, all_parameters
-from sim.derivatives.parameters.seen_terms import with_seen
 from sim.derivatives.parameters.selection import by_names, select
 from sim.simulator.sensitivity import parameter_columns
 
@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> Report:
     sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.02)
     x, u = sim.neutral(), np.zeros(sim.nu)
     calls = sim._engine
-    known = with_seen(sim.model, all_parameters(sim.mechanism, sim.time_step))
+    known = with_damper_inertia(sim.model, all_parameters(sim.mechanism, sim.time_step))
     every, plan = select("benchmark", by_names(known), sim.parameters().names)
     T = 5 if args.quick else 50
     us = np.zeros((T, sim.nu))

@@ -19,7 +19,7 @@ from dojo_opt.identification.parameter_space import ParameterSpace as ParameterS
 from dojo_opt.learn.environment import Environment as Environment
 from dojo_opt.mpc.adaptation import Adaptation as Adaptation
 from dojo_opt.mpc.controller import MPC as MPC
-from dojo_opt.mpc.moving import Sampled as Sampled
+from dojo_opt.mpc.moving_reference import Sampled as Sampled
 from dojo_opt.planning.ilqr import ilqr as ilqr
 from dojo_opt.planning.options import Options as Options, Stage as Stage
 from dojo_opt.planning.plan import Plan as Plan
@@ -27,7 +27,7 @@ from dojo_opt.planning.problem import Problem as Problem
 from dojo_opt.planning.residual import kernel as kernel
 from dojo_opt.planning.tracking import tracking_gains as tracking_gains
 from dojo_opt.plant.disturbances import Disturbances as Disturbances
-from dojo_opt.plant.loop import ClosedLoop as ClosedLoop, closed_loop as closed_loop
+from dojo_opt.plant.closed_loop import ClosedLoop as ClosedLoop, closed_loop as closed_loop
 from dojo_opt.report.identification import identification_report as identification_report
 from dojo_opt.plant.perturbation import Perturbation as Perturbation, Push as Push
 from dojo_opt.plant.plant import Plant as Plant
@@ -37,7 +37,10 @@ from sim.mechanism.gear import Gear as Gear
 from sim.mechanism.mechanism import Mechanism as Mechanism
 from sim.io.mjcf import MjcfMechanism as MjcfMechanism, MjcfWarning as MjcfWarning, load_mjcf as load_mjcf
 from sim.derivatives.parameters.parameters import Parameters as Parameters
-from sim.mechanism.parts import Body as Body, Contact as Contact, Input as Input, Joint as Joint
+from sim.mechanism.body import Body as Body
+from sim.mechanism.contact import Contact as Contact
+from sim.mechanism.input import Input as Input
+from sim.mechanism.joint import Joint as Joint
 from sim.mechanism.polytope import Polytope as Polytope
 from sim.simulator.reactions import Reactions as Reactions
 from sim.simulator.results import (

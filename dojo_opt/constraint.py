@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.planning.names import chosen_components, chosen_inputs, component_name
+from dojo_opt.planning.component_names import chosen_components, chosen_inputs, component_name
 from dojo_opt.planning.residual import ResidualKernels, check_residual
 from dojo_opt.planning.task_space.body_tasks import CenterOfMass, Frame, Momentum, Point, Velocity
 from dojo_opt.planning.task_space.contact_tasks import Clearance, ContactForce, FrictionUse, Slip, TorqueRate
@@ -30,7 +30,7 @@ from dojo_opt.planning.term import (
     state_table,
     table,
 )
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
 
 Integers = NDArray[np.int64]
@@ -71,7 +71,7 @@ class Goal(Spec):
     components: Any = None
     knots: Any = -1
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         knots = knot_list("Goal(knots=...)", self.knots, horizon, last=True)
@@ -118,7 +118,7 @@ class StateBounds(Spec):
     components: Any = None
     knots: Any = None
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         knots = knot_list("StateBounds(knots=...)", self.knots, horizon, last=True)
@@ -147,7 +147,7 @@ class SpeedLimits(Spec):
     share: float = 1.0
     knots: Any = None
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         mech = sim.mechanism
@@ -178,7 +178,7 @@ class ControlBounds(Spec):
     components: Any = None
     knots: Any = None
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         del layout
@@ -208,7 +208,7 @@ class ResidualConstraint(Spec):
     jacobian: Callable[..., Any] | None = None
     knots: Any = None
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         check_residual("ResidualConstraint", self.function, self.dimension, self.jacobian, sim)
@@ -230,7 +230,7 @@ class Periodic(Spec):
     shift: ArrayLike = 0.0
     components: Any = None
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         shift = table("Periodic(shift=...)", self.shift, 1, sim.ndx)[0]

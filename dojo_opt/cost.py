@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.planning.names import input_weight, state_weight
+from dojo_opt.planning.component_names import input_weight, state_weight
 from dojo_opt.planning.residual import ResidualKernels, check_residual
 from dojo_opt.planning.task_space.body_tasks import CenterOfMass, Frame, Momentum, Point, Velocity
 from dojo_opt.planning.task_space.contact_tasks import Clearance, ContactForce, FrictionUse, Slip, TorqueRate
 from dojo_opt.planning.task_space.joint_limits import JointLimits
 from dojo_opt.planning.term import Pick, PickTerm, ResidualTerm, Spec, StateTerm, Term, knot_list, state_table, table
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
 
 Integers = NDArray[np.int64]
@@ -73,7 +73,7 @@ class Tracking(Spec):
     knots: Any = None
     scale: float = 1.0
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         knots = knot_list("Tracking(knots=...)", self.knots, horizon, last=True)
@@ -97,7 +97,7 @@ class Effort(Spec):
     reference: ArrayLike = 0.0
     scale: float = 1.0
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         del layout
@@ -135,7 +135,7 @@ class ResidualCost(Spec):
     knots: Any = None
     scale: float = 1.0
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         check_residual("ResidualCost", self.function, self.dimension, self.jacobian, sim)

@@ -6,10 +6,10 @@ from sim.contact.contact_report import worst_contact
 from sim.dynamics.loops.closure import start_loops
 from sim.dynamics.loops.loop_work import loops_gained
 from sim.dynamics.momentum_balance import begin_step, ends_below_half
-from sim.model.columns import StepReport
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import Guess, Outcome, StepOptions
+from sim.model.record_columns import StepReport
 from sim.model.slots import Slot
 from sim.solve.energy_balance import step_gained
 from sim.solve.loop_branch import solve_loops

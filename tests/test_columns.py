@@ -1,4 +1,4 @@
-"""No number stands for a column of Model and Data that has a name (sim/model/columns.py)."""
+"""No number stands for a column of Model and Data that has a name (sim/model/record_columns.py)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import inspect
 import re
 from pathlib import Path
 
-from sim.model import columns
+from sim.model import record_columns
 from sim.model.layout import CARRY_FIELDS, DATA_FIELDS, MODEL_FIELDS
 from solvers.codes import Code
 
-SIM = Path(columns.__file__).parents[1]
+SIM = Path(record_columns.__file__).parents[1]
 WIDTHS = {name: shape[-1] for name, shape in {**MODEL_FIELDS, **CARRY_FIELDS, **DATA_FIELDS}.items()}
 MATRICES = {name for name, shape in {**MODEL_FIELDS, **CARRY_FIELDS, **DATA_FIELDS}.items() if len(shape) == 2}
 COMPONENTS = (1, 3, 4, 6, 9, 36)  # one number, vectors, quaternions, twists and wrenches, matrices of 3 or 6 rows
@@ -22,7 +22,7 @@ PADDED = ("couple_x",)  # one column, in lanes
 
 def _named() -> set[str]:
     """Fields whose columns have names, which the docstrings of the enumerations begin with."""
-    enums = [thing for thing in vars(columns).values() if inspect.isclass(thing) and issubclass(thing, Code)]
+    enums = [thing for thing in vars(record_columns).values() if inspect.isclass(thing) and issubclass(thing, Code)]
     texts = [inspect.getdoc(thing) or "" for thing in enums if thing is not Code]
     return {name for text in texts for name in re.findall(r"\w+", text.partition(":")[0]) if name in WIDTHS}
 

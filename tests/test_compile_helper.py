@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from solvers.compiler import helper
+from solvers.compiler import helper_process
 from support.programs import python
 
 
@@ -53,14 +53,14 @@ def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A file with the jobs that a helper was given; two cores are assumed."""
     path = tmp_path / "told"
     path.write_text("")
-    monkeypatch.setattr(helper, "_PROGRAM", RECORDING.replace("PATH", repr(str(path))))
-    monkeypatch.setattr(helper, "_possible", lambda: True)
+    monkeypatch.setattr(helper_process, "_PROGRAM", RECORDING.replace("PATH", repr(str(path))))
+    monkeypatch.setattr(helper_process, "_possible", lambda: True)
     yield path
 
 
 def test_each_job_is_done_once_and_those_of_the_helper_come_last(told: Path) -> None:
     seen = []
-    for job in helper.divided(JOBS):
+    for job in helper_process.divided(JOBS):
         seen.append(job.name)
         while job.name == "a:large" and told.read_text().count("\n") < 2:  # as long as the helper does two of them
             time.sleep(0.01)
@@ -71,9 +71,9 @@ def test_each_job_is_done_once_and_those_of_the_helper_come_last(told: Path) -> 
 
 
 def test_a_helper_that_fails_leaves_its_jobs(told: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(helper, "_PROGRAM", "print('done', flush=True); input(); raise SystemExit(1)")
+    monkeypatch.setattr(helper_process, "_PROGRAM", "print('done', flush=True); input(); raise SystemExit(1)")
     seen = []
-    for job in helper.divided(JOBS):
+    for job in helper_process.divided(JOBS):
         seen.append(job.name)
         time.sleep(0.2)
     assert sorted(seen) == sorted(job.name for job in JOBS)
@@ -81,7 +81,7 @@ def test_a_helper_that_fails_leaves_its_jobs(told: Path, monkeypatch: pytest.Mon
 
 def test_an_interrupted_compilation_ends_the_helper(told: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program = f"import time; open({str(told)!r}, 'w').write('here'); print('done', flush=True); time.sleep(100.0)"
-    monkeypatch.setattr(helper, "_PROGRAM", program)
+    monkeypatch.setattr(helper_process, "_PROGRAM", program)
     started: list[subprocess.Popen[str]] = []
 
     class Watched(subprocess.Popen):  # type: ignore[type-arg]
@@ -89,8 +89,8 @@ def test_an_interrupted_compilation_ends_the_helper(told: Path, monkeypatch: pyt
             super().__init__(*args, **settings)
             started.append(self)
 
-    monkeypatch.setattr(helper.subprocess, "Popen", Watched)
-    with closing(helper.divided(JOBS)) as queue:
+    monkeypatch.setattr(helper_process.subprocess, "Popen", Watched)
+    with closing(helper_process.divided(JOBS)) as queue:
         next(queue), next(queue)
         while not told.read_text():
             time.sleep(0.01)

@@ -5,7 +5,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.learn.network import Network
-from sim.mechanism import memory
+from sim.mechanism import memory_limit
 from support.refusals import check_refused
 
 N = 10**12
@@ -83,17 +83,17 @@ def test_it_is_refused(case):
 def test_the_memory_is_that_of_the_machine_its_container_and_the_process(monkeypatch, tmp_path):
     limit = tmp_path / "memory.max"
     limit.write_text("1048576\n")
-    monkeypatch.setattr(memory, "_GROUPS", (str(limit),))
-    memory.memory.cache_clear()
+    monkeypatch.setattr(memory_limit, "_GROUPS", (str(limit),))
+    memory_limit.memory.cache_clear()
     try:
-        assert memory.memory() == 2**20
+        assert memory_limit.memory() == 2**20
         limit.write_text("max\n")
-        memory.memory.cache_clear()
-        assert 2**20 < memory.memory() < float("inf")
+        memory_limit.memory.cache_clear()
+        assert 2**20 < memory_limit.memory() < float("inf")
         with pytest.raises(ValueError, match=r"f\(n\): 1e\+15 of them take .* GiB of memory at least, .* take fewer"):
-            memory.room_for("f(n)", 10**15, 8.0)
+            memory_limit.room_for("f(n)", 10**15, 8.0)
     finally:
-        memory.memory.cache_clear()
+        memory_limit.memory.cache_clear()
 
 
 def test_an_input_that_is_held_for_ever_ends_with_a_status(monkeypatch):

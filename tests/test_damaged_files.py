@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
-from support.damage import Bomb, damaged_npz
+from dojo_opt.learn.training_result import Learned
+from support.damaged_files import Bomb, damaged_npz
 
 SIM = dojo.Simulator(dojo.models.pendulum(), time_step=0.05)
 PLAN = dojo.ilqr(

@@ -23,7 +23,7 @@ from benchmarks import compare
 from dojo_opt import __main__ as cli
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.models.catalogue import Entry
-from dojo_opt.mpc.moving import References
+from dojo_opt.mpc.moving_reference import References
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.mpc.settings import MPCSettings
 from dojo_opt.plant import monte_carlo, tick

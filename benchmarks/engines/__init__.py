@@ -5,8 +5,8 @@ from __future__ import annotations
 from importlib import import_module
 from importlib.util import find_spec
 
+from dojo_opt.report.dojo_engine import Ours
 from dojo_opt.report.engine import PhysicsEngine, Run
-from dojo_opt.report.ours import Ours
 
 __all__ = ["PhysicsEngine", "Ours", "Run", "installed"]
 

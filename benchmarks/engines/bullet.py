@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.engines import bullet_scene
-from benchmarks.engines.apart import apart
 from benchmarks.engines.bullet_scene import World
-from benchmarks.engines.ended import ended
+from benchmarks.engines.failed_runs import ended
 from benchmarks.engines.mujoco_scene import is_free
+from benchmarks.engines.separate_process import apart
 from dojo_opt.report.engine import Run, clocked, held, nodes, observe
 from sim.mechanism.mechanism import Mechanism
 from sim.model.model import InputKind, Model

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.engines import drake_scene
-from benchmarks.engines.apart import apart
 from benchmarks.engines.drake_scene import DrakePlant
-from benchmarks.engines.ended import ended
+from benchmarks.engines.failed_runs import ended
+from benchmarks.engines.separate_process import apart
 from dojo_opt.report.engine import Run, clocked, held, nodes, observe
 from sim.mechanism.mechanism import Mechanism
 from sim.model.model import InputKind, Model

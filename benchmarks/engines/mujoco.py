@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.engines import mujoco_scene
-from benchmarks.engines.apart import apart
-from benchmarks.engines.ended import ended
+from benchmarks.engines.failed_runs import ended
 from benchmarks.engines.mujoco_warnings import quiet
+from benchmarks.engines.separate_process import apart
 from dojo_opt.report.engine import Run, clocked, held, nodes, observe
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator

@@ -63,15 +63,15 @@ def stop_torques(sim: Simulator, x: Array) -> Array:
 
 
 def _under(feet: Feet, state: Array) -> tuple[Array, Array, Array]:
-    """d(gaps)/dq (k, nv), generalised forces (k, nv) of unit vertical forces, and the normals' share of those (k,)."""
+    """d(gaps)/dq (k, nv), generalised forces (k, nv) of unit vertical forces, and the cosines of the slopes (k,)."""
     normal = feet.normals(state)
     gaps = np.einsum("kc,kcv->kv", normal, feet.jacobian(state))
     return gaps, feet.touching(state).jacobian(state)[:, 2], normal[:, 2]
 
 
-def _check_friction(name: str, feet: Feet, share: Array, force: Array) -> None:
+def _check_friction(name: str, feet: Feet, cosines: Array, force: Array) -> None:
     """Refuse vertical forces outside the friction cones."""
-    for contact, cosine, loaded in zip(feet.contacts, share, force > 0.0, strict=True):
+    for contact, cosine, loaded in zip(feet.contacts, cosines, force > 0.0, strict=True):
         limit = 0.0 if contact.law == "impact" else contact.friction
         slope = float(np.sqrt(max(0.0, 1.0 - cosine**2)) / max(cosine, 1e-12))
         if loaded and slope > limit + 1e-12:
@@ -88,8 +88,8 @@ def _pressed(sim: Simulator, feet: Feet, state: Array, free: NDArray[np.bool_]) 
     forces that share a load most evenly are nearly, and not quite, those of a state.
     """
     for _ in range(_ROUNDS):
-        gap, (down, up, share) = feet.gaps(state), _under(feet, state)
-        force = sim.kappa / (sim.time_step * share * np.maximum(gap, 1e-12))
+        gap, (down, up, cosine) = feet.gaps(state), _under(feet, state)
+        force = sim.kappa / (sim.time_step * cosine * np.maximum(gap, 1e-12))
         left = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ force
         if np.abs(left[free]).max(initial=0.0) < 1e-9 * np.abs(left).max() or gap.min() <= 0.0:
             break
@@ -150,14 +150,14 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         return state, _held(sim, state, potential_gradient(sim, state) - stop_torques(sim, state), "inputs")
     feet, weight = Feet(sim, names), float(np.abs(potential_gradient(sim, state)).max())
     for _ in range(iterations):
-        down, up, share = _under(feet, state)
+        down, up, cosine = _under(feet, state)
         gap = feet.gaps(state)
         touching = gap < gap.min() + _NEAR
-        afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * share * np.maximum(gap, _NEAR)))
+        afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * cosine * np.maximum(gap, _NEAR)))
         load = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ afar
         force = least_pushes(up[:, free] * touching[:, None], load[free], _EVEN)
         loaded = force > 1e-3 * weight
-        wanted = sim.kappa / (sim.time_step * (share * force)[loaded])
+        wanted = sim.kappa / (sim.time_step * (cosine * force)[loaded])
         error = wanted - gap[loaded]
         if np.abs(error).max(initial=0.0) < 1e-6 * wanted.min(initial=1.0):
             break
@@ -169,8 +169,8 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     if gap.min() <= 0.0:
         name = feet.names[int(gap.argmin())]
         raise ValueError(f"equilibrium({mech.name}): {name!r} is {-gap.min():.3g} m deep in the ground near x")
-    _, up, share = _under(feet, state)
+    _, up, cosine = _under(feet, state)
     left = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ force
     u = _held(sim, state, left, f"vertical forces at {', '.join(map(repr, feet.names))}")
-    _check_friction(mech.name, feet, share, np.where(force > 1e-3 * weight, force, 0.0))
+    _check_friction(mech.name, feet, cosine, np.where(force > 1e-3 * weight, force, 0.0))
     return state, u

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from dojo_opt.gaits.equilibrium import input_map, least_pushes
 from dojo_opt.gaits.feet import Feet
-from sim.mechanism.brief import brief_repr
-from sim.mechanism.parts import Input, Joint
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.servos import passive
+from sim.mechanism.short_repr import short_repr
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
@@ -51,7 +52,7 @@ class Gait:
     contact: Booleans
     foot_names: tuple[str, ...]
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def then(self, other: Gait) -> Gait:
         """This motion, followed by another one that begins where this one ends.

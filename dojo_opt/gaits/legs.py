@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from dojo_opt.gaits.feet import Feet
 from sim.mechanism import checks
+from sim.mechanism.contact import Contact
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Contact, Joint
 from sim.model.state_columns import BodyState
 from sim.simulator.inverse_kinematics import ik
 from sim.simulator.kinematics import Kinematics

@@ -18,7 +18,7 @@ from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.footfall import Footfall
 from dojo_opt.gaits.gait import Gait, assemble
 from sim.mechanism import checks
-from sim.mechanism.memory import room_for
+from sim.mechanism.memory_limit import room_for
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 

@@ -29,8 +29,8 @@ from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.identification.windows import Predictor, Window, WindowErrors, cut_windows
 from dojo_opt.planning.executors import check_executor, results_in_order
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_table
-from sim.mechanism.memory import room_for
+from sim.mechanism.memory_limit import room_for
+from sim.mechanism.short_repr import short_table
 from sim.simulator.results import Trajectory
 from sim.simulator.simulator import Simulator
 from solvers.status import MESSAGES, Status
@@ -123,7 +123,7 @@ class Identified:
         return f"Identified({self.closing_line()})"
 
     def _repr_html_(self) -> str:
-        return brief_table(self.closing_line(), ("parameter", "value", "deviation", "before"), self._rows())
+        return short_table(self.closing_line(), ("parameter", "value", "deviation", "before"), self._rows())
 
     def _rows(self) -> list[tuple[Any, ...]]:
         return list(zip(self.labels, self.values, self.deviation, self.start, strict=True))
@@ -185,7 +185,7 @@ class _Fit:
     ) -> None:
         self.space, self.windows, self.predictor, self.outlier, self.prior = space, windows, predictor, outlier, prior
         self.theta, self.base = space.values.copy(), space.simulator(space.values)
-        self.share = 1.0  # of the prior
+        self.prior_weight = 1.0  # of the prior
         self.starts = [w.x[0].copy() for w in windows]
         # coordinates differ in size by orders of magnitude
         self.unit = np.maximum(np.abs(space.values), 1e-3)
@@ -216,19 +216,19 @@ class _Fit:
 
     def pull(self, theta: Floats) -> float:
         """Cost of the distance from the prior."""
-        return self.share * self.prior.cost(theta)
+        return self.prior_weight * self.prior.cost(theta)
 
     def rest(self, cost: float, found: list[WindowErrors], usable: list[bool]) -> float:
         """The cost of the data and the prior, whose share is chosen anew."""
         values = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
-        self.share = max(1.0, cost / max(values, 1))
+        self.prior_weight = max(1.0, cost / max(values, 1))
         return cost + self.pull(self.theta)
 
     def step(self, equations: NormalEquations, damping: float) -> tuple[Floats, list[Floats], float]:
         """New parameters, within their bounds, new starts, and the decrease of the cost in the linear model."""
         H, g, back = equations.reduced(damping)
-        H += self.share * np.diag(self.prior.precision * self.unit**2)
-        g += self.share * self.prior.precision * (self.theta - self.prior.mean) * self.unit
+        H += self.prior_weight * np.diag(self.prior.precision * self.unit**2)
+        g += self.prior_weight * self.prior.precision * (self.theta - self.prior.mean) * self.unit
         low, high = (self.space.low - self.theta) / self.unit, (self.space.high - self.theta) / self.unit
         H = H + np.diag(damping * np.diag(H) + 1e-14 * max(np.trace(H), 1e-14))
         free = np.ones(len(g), dtype=np.bool_)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.planning.manifold import tangent_layout
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 from sim.simulator.results import Linearization, Trajectory, path_of
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
@@ -35,7 +35,7 @@ class Window:
     x: Floats  # (T + 1, nx) measured states
     u: Floats  # (T, nu)
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
 
 def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None) -> list[Window]:
@@ -114,7 +114,7 @@ class WindowErrors:
     by_theta: Floats  # (m, d, n)
     solved: bool
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
 
 class Predictor:

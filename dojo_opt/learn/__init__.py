@@ -8,14 +8,14 @@ from importlib.util import find_spec
 from dojo_opt.learn.evaluation import Evaluation, evaluate
 from dojo_opt.learn.gymnasium_tasks import ant, cartpole, half_cheetah, hopper, humanoid, pendulum, walker2d
 from dojo_opt.learn.imitate import ImitationOptions, imitate
-from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import PolicyGradient, PolicyRollout, roll_policy_batch
+from dojo_opt.learn.policy_search import GradientSearchOptions, RandomSearchOptions, ars, gradient_search
 from dojo_opt.learn.randomisation import Randomisation
-from dojo_opt.learn.search import GradientSearchOptions, RandomSearchOptions, ars, gradient_search
-from dojo_opt.learn.seeds import best_of, seeds
+from dojo_opt.learn.seed_runs import best_of, seeds
 from dojo_opt.learn.shac import ShacOptions, shac
 from dojo_opt.learn.task import Task
+from dojo_opt.learn.training_result import Learned
 from dojo_opt.learn.velocity_task import quadruped, velocity_error
 from dojo_opt.learn.waypoint_tasks import quadrotor, uuv, youbot
 

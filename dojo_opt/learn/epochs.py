@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from dojo_opt.learn.learned import Learned, LearningProgress
 from dojo_opt.learn.task import Task
+from dojo_opt.learn.training_result import Learned, LearningProgress
 from dojo_opt.planning.executors import check_executor
 from sim.mechanism import checks
 from solvers.status import Status

@@ -11,7 +11,7 @@ from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.randomisation import Drawn
 from sim.mechanism.checks import whole_number
-from sim.mechanism.memory import room_for
+from sim.mechanism.memory_limit import room_for
 from solvers.status import Status
 
 Floats = NDArray[np.float64]

@@ -21,8 +21,10 @@ from dojo_opt.learn.task import Task, never
 from dojo_opt.planning.residual import kernel
 from sim.io.mjcf.load import load_mjcf
 from sim.io.mjcf.report import MjcfMechanism, MjcfWarning
+from sim.mechanism.body import Body
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Input, Joint
 from sim.mechanism.stance import gaps
 from sim.simulator.simulator import Simulator
 

@@ -20,15 +20,15 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.learn.common_options import check_common
 from dojo_opt.learn.epochs import learn
 from dojo_opt.learn.evaluation import Evaluation
-from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import Adam, Network, clipped
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.training import Training
+from dojo_opt.learn.training_result import Learned
 from dojo_opt.planning.plan import Plan
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 
 Floats = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ class ImitationOptions:
     verbose: bool = False
     stream: Any = None
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         check_common("imitate", self)

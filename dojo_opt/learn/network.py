@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mechanism import checks
-from sim.mechanism.memory import check_room
+from sim.mechanism.memory_limit import check_room
 from solvers.compiler import kernel
 from solvers.types import Integers, Vector
 

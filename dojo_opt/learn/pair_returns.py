@@ -12,7 +12,7 @@ from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
-from dojo_opt.learn.shared import Shared
+from dojo_opt.learn.shared_object import Shared
 from solvers.status import Status
 
 Floats = NDArray[np.float64]

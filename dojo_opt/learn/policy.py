@@ -15,7 +15,7 @@ from dojo_opt.learn.network import Network, number_of, perceptron
 from dojo_opt.learn.onnx_file import write_onnx
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 from sim.simulator.npz_file import check_head, check_shapes, read_npz, reading, write_npz
 
 Floats = NDArray[np.float64]
@@ -46,7 +46,7 @@ class LearnedPolicy:
     deviation: Floats
     task: Task | None = field(default=None, repr=False)
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         sizes = self.network.sizes

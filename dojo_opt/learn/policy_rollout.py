@@ -13,7 +13,7 @@ from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.randomisation import Drawn, Randomisation
 from dojo_opt.learn.task import Task
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 from solvers.status import Status
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,7 @@ class Noise:
     observations: Floats  # (T, n, no)
     pushes: Floats | None = None  # (T, n, nv) [m/s, rad/s]
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     @classmethod
     def draw(
@@ -67,7 +67,7 @@ class PolicyGradient:
     clipped: int
     largest: float
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
 
 class PolicyRollout:

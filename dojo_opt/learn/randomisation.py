@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
-from sim.mechanism.memory import room_for
+from sim.mechanism.memory_limit import room_for
+from sim.mechanism.short_repr import short_repr
 from sim.simulator.row_batch import BatchStep
 from sim.simulator.simulator import Simulator
 
@@ -49,7 +49,7 @@ class Randomisation:
     pushes: tuple[float, ArrayLike] | None = None
     delays: tuple[int, ...] = ()
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for field_ in ("values", "factors"):
@@ -131,7 +131,7 @@ class Drawn:
     noise: float
     delay: int = 0  # of actions [control steps]
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def step(self, xs: Floats, inputs: Floats, derivatives: bool = False, kappa: float | None = None) -> BatchStep:
         """One action of every row, from states of the task to states of the task; a kappa instead of that of rows."""

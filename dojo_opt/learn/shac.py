@@ -21,7 +21,6 @@ from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.common_options import check_common
 from dojo_opt.learn.discounted_sum import DiscountedSum
 from dojo_opt.learn.epochs import learn
-from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import Adam, Network, clipped
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
@@ -29,6 +28,7 @@ from dojo_opt.learn.policy_rollout import Noise, PolicyRollout, roll_policy_batc
 from dojo_opt.learn.randomisation import Models, Randomisation
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.training import Training
+from dojo_opt.learn.training_result import Learned
 from sim.mechanism import checks
 
 Floats = NDArray[np.float64]
@@ -111,7 +111,7 @@ class ShacOptions:
         for name in ("environments", "passes", "batches", *lengths):
             checks.whole_number(f"shac({name}=...)", getattr(self, name))
         for name in ("gamma", "trace", "blend"):
-            checks.share(f"shac({name}=...)", getattr(self, name))
+            checks.fraction(f"shac({name}=...)", getattr(self, name))
         kappa = () if self.kappa_grad is None else ("kappa_grad",)
         for name in ("critic_rate", "norm", "costate", *kappa):
             checks.number(f"shac({name}=...)", getattr(self, name), above=0.0)

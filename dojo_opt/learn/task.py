@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.planning.captured import fingerprint
+from dojo_opt.planning.function_fingerprint import fingerprint
 from dojo_opt.planning.manifold import displace, tangent_layout
 from dojo_opt.planning.residual import kernel
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
 from solvers.compiler import reduced, users_loop
 
@@ -188,7 +188,7 @@ class Task:
     hold: int | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if not isinstance(self.sim, Simulator):

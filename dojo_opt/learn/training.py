@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.learn.evaluation import Evaluation, evaluate
-from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.task import Task
-from sim.mechanism.memory import check_room
+from dojo_opt.learn.training_result import Learned
+from sim.mechanism.memory_limit import check_room
 
 Floats = NDArray[np.float64]
 

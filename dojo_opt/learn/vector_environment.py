@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dojo_opt.learn.randomisation import Drawn
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
-from sim.mechanism.memory import room_for
+from sim.mechanism.memory_limit import room_for
 from solvers.status import Status
 
 try:

@@ -14,8 +14,8 @@ from dojo_opt.learn.task import Task
 from dojo_opt.models.quadruped import quadruped as default_quadruped
 from dojo_opt.planning.residual import kernel
 from sim.mechanism import checks
+from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Input
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 

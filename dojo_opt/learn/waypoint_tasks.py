@@ -15,8 +15,8 @@ from dojo_opt.models.quadrotor import quadrotor as quadrotor_model
 from dojo_opt.models.uuv import uuv as uuv_model
 from dojo_opt.models.youbot import youbot as youbot_model
 from dojo_opt.planning.residual import kernel
+from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Input
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]

@@ -7,8 +7,8 @@ from dataclasses import replace
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.npendulum import npendulum
+from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Input
 
 
 def acrobot(

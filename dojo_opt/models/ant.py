@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, Mount, bodies, degrees, grounded, joints, rod, touch
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Input, Joint
 from sim.mechanism.shapes import Sphere
 
 RADIUS = 0.08  # of the legs [m]

@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, Mount, bodies, grounded, joints, padded, touch
 from sim.mechanism import checks
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Contact, Input, Joint
 from sim.mechanism.shapes import Box
 
 TRUNK = {

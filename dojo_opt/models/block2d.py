@@ -6,8 +6,10 @@ from itertools import product
 
 from numpy.typing import ArrayLike
 
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Joint
 from sim.mechanism.shapes import Box
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dojo_opt.models.links import LINK_BYTES
-from sim.mechanism.memory import room_for
-from sim.mechanism.parts import Body, Joint
+from sim.mechanism.body import Body
+from sim.mechanism.joint import Joint
+from sim.mechanism.memory_limit import room_for
 from sim.mechanism.shapes import Box
 
 Point = tuple[float, float, float]

@@ -5,8 +5,10 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
+from sim.mechanism.body import Body
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Input, Joint
 from sim.mechanism.shapes import Capsule
 
 CART_INERTIA = (0.106974, 0.106974, 0.00636812)

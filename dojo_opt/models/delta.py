@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.models.links import from_z
+from sim.mechanism.body import Body
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Input, Joint
 from sim.mechanism.pose import quaternion
 from sim.mechanism.shapes import Box, Cylinder, rotation_matrix
 

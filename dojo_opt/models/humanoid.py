@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, Mount, bodies, from_z, grounded, joints, padded, touch
 from sim.mechanism import checks
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Input, Joint
 from sim.mechanism.shapes import Capsule, Shape
 
 FOOT_RADIUS = 0.027  # [m]

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.io.urdf.inertia import RigidInertia, combined
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import WORLD, Body, Contact, Joint
 from sim.mechanism.pose import Pose, quaternion, roll_pitch_yaw
 from sim.mechanism.shapes import Capsule, Shape
 from sim.mechanism.stance import gaps

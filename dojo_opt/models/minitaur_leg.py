@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Input, Joint
 from sim.mechanism.shapes import Box
 
 Y = (0.0, 1.0, 0.0)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import LINK_BYTES
+from sim.mechanism.body import Body
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.memory import room_for
-from sim.mechanism.parts import Body, Joint
+from sim.mechanism.memory_limit import room_for
 from sim.mechanism.shapes import Box
 
 

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, Mount, bodies, grounded, joints, touch
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Input, Joint
 
 Ball = tuple[str, str, ArrayLike, float]  # name, link, point in its frame [m], radius [m]
 

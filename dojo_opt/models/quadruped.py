@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Joint
 from sim.mechanism.shapes import Box, Cylinder
 
 # leg: (front or rear, left or right) as signs of x and y

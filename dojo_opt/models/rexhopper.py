@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, Mount, bodies, grounded, joints, touch
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Input, Joint
 from sim.mechanism.shapes import Box, Cylinder
 
 BASE = Link(

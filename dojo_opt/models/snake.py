@@ -5,8 +5,8 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.box_chain import box_chain
+from sim.mechanism.contact import Contact
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Contact
 
 
 def snake(

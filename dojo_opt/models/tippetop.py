@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Joint
 from sim.mechanism.shapes import Sphere
 
 

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, bodies, touch
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Input, Joint
 from sim.mechanism.shapes import Box
 
 INERTIA = (0.29874124659, -0.03211874071, 0.00179507011, 0.50529405748, -0.00095289894, 0.62284393213)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, Mount, bodies, joints
+from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Input
 from sim.mechanism.shapes import Box, Cylinder
 
 PLATFORM = Link(

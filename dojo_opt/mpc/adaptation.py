@@ -22,9 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.identification.windows import slopes_along
-from dojo_opt.mpc.ground import Ground
+from dojo_opt.mpc.ground_estimate import Ground
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -63,7 +63,7 @@ class Adaptation:
     memory: float = 20.0
     bounds: Mapping[str, tuple[float, float]] | None = None
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         call = "Adaptation"

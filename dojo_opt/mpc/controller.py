@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.mpc.adaptation import ParameterEstimator
 from dojo_opt.mpc.delay import Delay, Prediction
-from dojo_opt.mpc.ground import Ground
-from dojo_opt.mpc.horizon import shift_multipliers, tail
+from dojo_opt.mpc.ground_estimate import Ground
 from dojo_opt.mpc.measurement import Measurement
-from dojo_opt.mpc.moving import References
+from dojo_opt.mpc.moving_reference import References
 from dojo_opt.mpc.policy import Policy
+from dojo_opt.mpc.receding_horizon import shift_multipliers, tail
 from dojo_opt.mpc.servo import ModelServo, Servo
 from dojo_opt.mpc.settings import MPCSettings
 from dojo_opt.planning.ilqr import Iterate, Iteration, Solver
@@ -54,8 +54,8 @@ class MPC:
             plan only, which is solved to the end, with the settings `first`; `reference` overwrites its references.
         iterations: iterations of the planner per tick (default 1). One is enough for costs, control limits and
             equalities. Inequalities take about 3, because an iteration from the feasible side ignores them.
-        reference: states to track over time, see `dojo_opt.mpc.moving.References` (default None: the reference of the
-            problem at every tick).
+        reference: states to track over time, see `dojo_opt.mpc.moving_reference.References` (default None: the
+            reference of the problem at every tick).
         plan: the first plan, at the time of the first call (default None: that of `ilqr` without refinement).
         **settings: period, kappa, kappa_grad, guess, gain_scale, delay, computation, servo, feedforward, time_limit,
             mean_velocity, friction, learn_ground, adapt, options, first, log; see

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -46,7 +46,7 @@ class Policy:
     substeps: int = 1
     lead: tuple[float, Vector] | None = None
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     @property
     def knot_time(self) -> float:

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 from dojo_opt.mpc.adaptation import Adaptation
 from dojo_opt.planning.options import Options, Stage
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.short_repr import short_repr
 
 # penalties that grew with every tick would never stop; a second line search would take its time
 OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6, shooting=0.0)
@@ -74,7 +74,7 @@ class MPCSettings:
     first: Options | None = None
     log: int | None = 10_000
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if self.guess not in GUESSES:

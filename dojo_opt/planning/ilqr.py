@@ -23,11 +23,11 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.planning.executors import check_executor
 from dojo_opt.planning.ilqr_search import Iterate, Search
 from dojo_opt.planning.ilqr_start import FreeStart, at_rest, fitting_stage, periodic_gains
+from dojo_opt.planning.multi_start import multi_start
 from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.plan import History, Plan
 from dojo_opt.planning.problem import Problem
-from dojo_opt.planning.starts import multi_start
 from dojo_opt.planning.subproblem import Subproblem
 from sim.mechanism import checks
 from sim.simulator.results import Interrupted, Linearization

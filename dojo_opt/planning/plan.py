@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from dojo_opt.planning.options import Options
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_table, drawn
 from sim.mechanism.checks import whole_number
+from sim.mechanism.short_repr import drawn, short_table
 from sim.simulator.motion_file import archived, export, opened, restored
 from sim.simulator.npz_file import check_head, check_shapes, reading, write_npz
 from sim.simulator.results import Shot
@@ -133,7 +133,7 @@ class Plan:
 
     def _repr_html_(self) -> str:
         rows = [[r[name] for name in RECORDED] for r in self.history]
-        return drawn(self) + brief_table(self.closing_line(), COLUMNS, rows)
+        return drawn(self) + short_table(self.closing_line(), COLUMNS, rows)
 
     @property
     def time(self) -> Matrix:

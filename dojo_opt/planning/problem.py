@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.planning.component_names import chosen_components
 from dojo_opt.planning.manifold import tangent_layout
-from dojo_opt.planning.names import chosen_components
 from dojo_opt.planning.term import Spec, numbers, state_table, table
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
-from sim.mechanism.memory import check_room
+from sim.mechanism.memory_limit import check_room
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.planning.captured import fingerprint
+from dojo_opt.planning.function_fingerprint import fingerprint
 from dojo_opt.planning.manifold import displace
-from sim.model.pace import rows
+from sim.model.interruptible_loops import rows
 from sim.simulator.simulator import Simulator
 from solvers.compiler import CompilationError, users_kernel, users_loop
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.planning.damping import Damping
 from dojo_opt.planning.ilqr_search import Direction, Iterate
 from dojo_opt.planning.ilqr_start import FreeStart
 from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import Options
 from dojo_opt.planning.problem import Problem
+from dojo_opt.planning.regularisation import Damping
 from sim.simulator.horizon import Horizon
 from solvers.riccati import Promise, Quadratic, Regularization, backward, value_hessian, work_size
 from solvers.status import MESSAGES, Status

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.planning.component_names import component_name
 from dojo_opt.planning.manifold import state_residual
-from dojo_opt.planning.names import component_name
 from dojo_opt.planning.penalty import add_dense_expansion, add_expansion, penalty, penalty_derivatives
 from dojo_opt.planning.residual import ResidualKernels
 from sim.mechanism import checks

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.plant.perturbation import Perturbation, Push
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
 from sim.mechanism.checks import whole_number
+from sim.mechanism.short_repr import short_repr
 
 __all__ = ["Disturbances"]
 
@@ -45,7 +45,7 @@ class Disturbances:
     delay: float = 0.0
     noise: ArrayLike = 0.0
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         call = "Disturbances"

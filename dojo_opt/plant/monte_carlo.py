@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.planning.executors import check_executor, results_in_order
-from dojo_opt.plant.loop import closed_loop, steps_of
+from dojo_opt.plant.closed_loop import closed_loop, steps_of
 from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import Tick, milliseconds
-from sim.mechanism.brief import brief_repr, brief_table
 from sim.mechanism.checks import whole_number
-from sim.mechanism.memory import room_for
+from sim.mechanism.memory_limit import room_for
+from sim.mechanism.short_repr import short_repr, short_table
 from sim.simulator.results import Interrupted
 
 Vector = NDArray[np.float64]
@@ -54,7 +54,7 @@ class MonteCarloRun:
     perturbation: Perturbation
     softened: int
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -71,11 +71,11 @@ class MonteCarlo:
     duration: float
     seed: int
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def _repr_html_(self) -> str:
         rows = [(i, o.survived, o.duration, o.rms, o.message) for i, o in enumerate(self.outcomes)]
-        return brief_table(self.summary(), ("run", "survived", "duration [s]", "rms [m, rad]", "message"), rows)
+        return short_table(self.summary(), ("run", "survived", "duration [s]", "rms [m, rad]", "message"), rows)
 
     @property
     def survived(self) -> int:

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
 from sim.mechanism.checks import whole_number
+from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Input
+from sim.mechanism.short_repr import short_repr
 from sim.mechanism.terrain import Terrain
 from sim.model.state_columns import BaseState
 from sim.simulator.contact_settings import with_contacts
@@ -86,7 +86,7 @@ class Perturbation:
     control_limits: tuple[ArrayLike, ArrayLike] | None = None
     seed: int = 0
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         call = "Perturbation"

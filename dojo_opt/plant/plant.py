@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.plant.perturbation import Perturbation
 from sim.mechanism import checks
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Joint
 from sim.mechanism.shapes import rotation_matrix
 from sim.model.state_columns import BodyState
 from sim.simulator.results import StepResult

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 from solvers.status import Status
 
 Vector = NDArray[np.float64]
@@ -50,7 +50,7 @@ class Tick:
     x: Vector = field(repr=False)
     first: bool = False
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
 
 def milliseconds(log: Sequence[Tick], cpu: bool = False) -> Vector:

@@ -6,9 +6,9 @@ trajectory, gait, closed_loop, study and identification are whole figures; the o
 matplotlib is imported when the first figure is made, without pyplot: no window, no global state.
 """
 
+from dojo_opt.plots.closed_loops import base_height, base_path, closed_loop, study, survival, tick_times, tracking
 from dojo_opt.plots.gait import foot_paths, friction_use, gait, gait_diagram, normal_forces
 from dojo_opt.plots.identification import identification
-from dojo_opt.plots.loop import base_height, base_path, closed_loop, study, survival, tick_times, tracking
 from dojo_opt.plots.thumbnail import thumbnail
 from dojo_opt.plots.trajectory import contact_forces, controls, paths, state, trajectory, velocities
 

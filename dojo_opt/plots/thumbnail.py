@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim.mechanism.forward_kinematics import body_poses
+from sim.mechanism.joint import WORLD
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import WORLD
-from sim.mechanism.poses import poses
 from sim.mechanism.shapes import Solid, rotation_matrix
 
 Floats = NDArray[np.float64]
@@ -34,7 +34,7 @@ def thumbnail(mechanism: Mechanism, q: ArrayLike | None = None, *, size: float =
     from matplotlib.figure import Figure
     from matplotlib.patches import Circle, Polygon
 
-    at = poses(mechanism.joints, np.asarray(mechanism.neutral if q is None else q, dtype=np.float64))
+    at = body_poses(mechanism.joints, np.asarray(mechanism.neutral if q is None else q, dtype=np.float64))
     right, up, depth = _camera()
     figure = Figure(figsize=(size, size))
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))

@@ -8,7 +8,7 @@ import numpy as np
 
 from dojo_opt.plots.axes import finish as _finish
 from dojo_opt.plots.axes import input_units, label_lines, panel, units
-from dojo_opt.plots.branches import Branch, branches, dof_limits, draw_limits, input_panel, joint_panel
+from dojo_opt.plots.legs_over_time import Branch, branches, dof_limits, draw_limits, input_panel, joint_panel
 from dojo_opt.viewer.motion import Motion, motion
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 from dojo_opt.prebuild.tasks import CONTENTS, run, tasks
-from dojo_opt.prebuild.workers import BuildError, Done, compile_tasks, work
+from dojo_opt.prebuild.worker_processes import BuildError, Done, compile_tasks, work
 from solvers.compiler import compiled, shipped
 from solvers.compiler.cache import ship
 from solvers.compiler.shipped import FOLDER

@@ -286,7 +286,7 @@ _SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to co
 
 def _kernels() -> dict[str, OptionalKernel]:
     """Kernels that a scene may link, by name."""
-    import_module("sim.simulator.link")
+    import_module("sim.simulator.link_kernels")
     return {kernel.name: kernel for kernel in optional_kernels()}
 
 

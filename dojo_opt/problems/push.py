@@ -13,9 +13,10 @@ from dojo_opt.gaits.equilibrium import input_map, potential_gradient
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shape_contacts import shape_contacts
 from sim.mechanism.shapes import Solid, Sphere
 from sim.simulator.inverse_kinematics import ik

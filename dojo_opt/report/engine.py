@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.dynamics import bodies
+from sim.dynamics import maximal_energy
 from sim.mechanism.mechanism import Mechanism
 from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
@@ -127,8 +127,8 @@ def observe_bodies(
 ) -> Run:
     """The run of maximal states z (n, nbody, 13) with velocities at the nodes, and their potential energies (n,)."""
     velocity = np.concatenate([z[..., BodyState.VELOCITY], z[..., BodyState.SPIN]], axis=2)
-    energy = bodies.kinetic_energy(sim.model, z) + potential
-    momentum = bodies.momentum(sim.model, z)
+    energy = maximal_energy.kinetic_energy(sim.model, z) + potential
+    momentum = maximal_energy.momentum(sim.model, z)
     place, turn = z[..., BodyState.POSITION], z[..., BodyState.QUATERNION]
     return Run(times, place, turn, velocity, energy, momentum, seconds, steps, message)
 

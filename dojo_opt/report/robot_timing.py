@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.report.accuracy.starting_pose import start
-from dojo_opt.report.clock import interleave
-from dojo_opt.report.costs import median_us
+from dojo_opt.report.interleaved_rounds import interleave
 from dojo_opt.report.result import Cell, Report, Row, Table
+from dojo_opt.report.step_cost import median_us
 from dojo_opt.report.study import Progress
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.gaits.gait import Gait
-from dojo_opt.mpc.moving import Sampled
+from dojo_opt.mpc.moving_reference import Sampled
 from sim.mechanism import checks
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator

@@ -13,7 +13,7 @@ from dojo_opt.planning.ilqr import ilqr
 from dojo_opt.planning.options import Stage
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 
 __all__ = ["PlannedOutcome", "PlanTask", "continuation"]
 
@@ -52,7 +52,7 @@ class PlanTask:
     stages: tuple[Stage, ...]
     judge: Callable[[Plan], tuple[bool, dict[str, float]]] = field(repr=False)
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def run(self, controls: ArrayLike | None = None, **options: Any) -> Plan:
         """Plan the task.

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.cost import ResidualCost, Tracking
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.mpc.servo import ModelServo
-from dojo_opt.plant.loop import ClosedLoop, closed_loop
+from dojo_opt.plant.closed_loop import ClosedLoop, closed_loop
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import milliseconds
-from sim.mechanism.brief import brief_repr
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.short_repr import short_repr
 from sim.mechanism.stance import gaps
 from sim.simulator.simulator import Simulator
 
@@ -77,7 +77,7 @@ class SuiteTask:
     rise: int | None = None
     lost: Callable[[Vector], bool] | None = field(default=None, repr=False)
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def begin(self, seed: int | None = None) -> Vector:
         """A first state.

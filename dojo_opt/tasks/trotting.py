@@ -11,7 +11,7 @@ from dojo_opt import gaits, models
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.mpc.controller import MPC
-from dojo_opt.mpc.moving import Sampled
+from dojo_opt.mpc.moving_reference import Sampled
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from sim.mechanism.checks import whole_number

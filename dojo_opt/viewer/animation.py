@@ -13,12 +13,14 @@ from typing import Any
 import numpy as np
 
 from dojo_opt.viewer import drawing, overlays
-from dojo_opt.viewer.frames import FRAMES, sparse
+from dojo_opt.viewer.key_frames import FRAMES, sparse
 from dojo_opt.viewer.motion import Motion, motion
 from dojo_opt.viewer.page import group_of, label, page, spacing
 from sim.mechanism import checks, shapes
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.joint import WORLD
 from sim.mechanism.pack import contact_frame
-from sim.mechanism.parts import WORLD, Body, Contact
 from sim.mechanism.shapes import PLATE
 from sim.mechanism.terrain import Terrain
 from sim.simulator.simulator import Simulator

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from sim.io.meshes.shading import clustered, shaded
 from sim.io.meshes.triangles import MeshError, TriangleMesh, read_mesh
+from sim.mechanism.joint import WORLD
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import WORLD
 from sim.mechanism.shapes import Capsule, Primitive, Solid, Sphere, rotation_matrix
 from sim.mechanism.visual import STEEL, Visual
 

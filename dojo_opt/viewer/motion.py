@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from dojo_opt.constraint import Goal
-from dojo_opt.planning.names import chosen_components
+from dojo_opt.planning.component_names import chosen_components
 from dojo_opt.viewer.drawing import Piece, extent, pieces
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.poses import poses
 from sim.mechanism.shapes import rotation_matrix
+from sim.mechanism.short_repr import short_repr
 from sim.model.state_columns import BodyState
 from sim.simulator.results import Trajectory
 from sim.simulator.simulator import Simulator
@@ -76,7 +76,7 @@ class Motion:
         low, high = self.bounds
         return max(0.1, 0.5 * float((high - low).max()))
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def points(self, body: int, point: Any) -> Array:
         """Path of a point of a body.
@@ -157,7 +157,7 @@ def _goal(result: Any, sim: Simulator) -> Array | None:
 def _standing(mech: Mechanism) -> Motion:
     """One knot: the neutral state."""
     q = np.asarray(mech.neutral, dtype=np.float64)
-    found = poses(mech.joints, q)
+    found = body_poses(mech.joints, q)
     at = [found[name] for name in mech.body_names]
     none = np.zeros((0, len(mech.contact_names)))
     return Motion(

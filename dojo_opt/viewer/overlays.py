@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.viewer import drawing
-from dojo_opt.viewer.frames import FRAMES, sparse
+from dojo_opt.viewer.key_frames import FRAMES, sparse
 from dojo_opt.viewer.motion import Motion
 
 Floats = NDArray[np.float64]

@@ -15,7 +15,7 @@ import numpy as np
 import dojo_opt as dojo
 from sim.mechanism import checks
 from sim.mechanism.checks import nearest
-from sim.mechanism.memory import check_room
+from sim.mechanism.memory_limit import check_room
 
 __all__ = ["add_show", "show"]
 

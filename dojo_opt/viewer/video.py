@@ -18,7 +18,7 @@ from dojo_opt.viewer.animation import html_of
 from dojo_opt.viewer.motion import Motion, motion
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
-from sim.mechanism.memory import check_room
+from sim.mechanism.memory_limit import check_room
 from sim.simulator.simulator import Simulator
 
 Pixels = NDArray[np.uint8]

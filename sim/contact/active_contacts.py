@@ -39,10 +39,10 @@ from sim.contact.pairs.pair_stiffness import pair_constants
 from sim.contact.terrain_contact import add_frame_matrix
 from sim.dynamics.elimination import dot_six, subtree_sums
 from sim.dynamics.pose_jacobians import add_slip_jacobian
-from sim.model.columns import Bounce, Cone, Kin
 from sim.model.data import Data
 from sim.model.model import Law, Model
 from sim.model.options import LawForm, NewtonTarget
+from sim.model.record_columns import Bounce, Cone, Kin
 from sim.model.slots import Slot
 from solvers.compiler import optional
 from solvers.types import Matrix
@@ -79,23 +79,25 @@ def apply_contacts(model: Model, data: Data) -> float:
 
 
 @optional(Slot.CONDENSE_CONTACTS)
-def condense_contacts(model: Model, data: Data, h: float, kappa: float, share: float, form: int, out: Matrix) -> None:
+def condense_contacts(
+    model: Model, data: Data, h: float, kappa: float, indefinite: float, form: int, out: Matrix
+) -> None:
     """out += contacts with the ground, condensed at kappa.  (nbody, 36)
 
-    share: of the terms that can make the matrix indefinite, the growth of the friction with the normal impulse and the
-    turning of the arms of the impulses; 1 for the derivative.
+    indefinite: factor of the terms that can make the matrix indefinite, the growth of the friction with the normal
+    impulse and the turning of the arms of the impulses; 1 for the derivative.
     form: LawForm.PLAIN, LawForm.STICKING or LawForm.SOFT, see `condense_contact`.
     """
     for m in range(data.active_ground_count[0]):
         c = data.active[m]
         contact_jacobian(model, data, h, c)
-        condense_contact(model, data, h, c, kappa, share, form)
+        condense_contact(model, data, h, c, kappa, indefinite, form)
         fn, f1, f2 = contact_impulse(model, data, c)
         if form != LawForm.SOFT or data.bounce[c, Bounce.RESTITUTION] == 0.0:  # for impacts see restitution_gradient.py
             add_contact_law(model, data, c, out)
-        add_contact_turn(model, data, c, share * fn, share * f1, share * f2, out)
+        add_contact_turn(model, data, c, indefinite * fn, indefinite * f1, indefinite * f2, out)
         if model.contact_terrain[c] > 0:
-            add_frame_matrix(model, data, c, share * fn, share * f1, share * f2, out)
+            add_frame_matrix(model, data, c, indefinite * fn, indefinite * f1, indefinite * f2, out)
 
 
 @optional(Slot.ADD_SLIP_JACOBIANS)
@@ -169,13 +171,13 @@ def contact_constants(model: Model, data: Data, target: NewtonTarget) -> None:
 
 
 @optional(Slot.RECOVER_CONTACTS)
-def recover_contacts(model: Model, data: Data, share: float) -> None:
+def recover_contacts(model: Model, data: Data, gap_fraction: float) -> None:
     """Steps of the cone variables from the twists and rates of the last solve."""
     ground = model.contact_height.shape[0]
     for m in range(data.active_count[0]):
         c = data.active[m]
         rate = contact_rate(model, data, c) if c < ground else pair_rate(model, data, c)
-        recover_contact(model, data, c, rate, share)
+        recover_contact(model, data, c, rate, gap_fraction)
 
 
 @optional(Slot.KEEP_CONTACTS)

@@ -17,9 +17,9 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.model.columns import Cone, ConeScale, Kin
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Cone, ConeScale, Kin
 from solvers.compiler import kernel
 from solvers.types import Vector
 
@@ -65,7 +65,7 @@ def within_cone(b0: float, x: float, y: float) -> tuple[float, float]:
 
 
 @kernel
-def condense_cone(model: Model, data: Data, c: int, kappa: float, share: float, linear: bool) -> None:
+def condense_cone(model: Model, data: Data, c: int, kappa: float, indefinite: float, linear: bool) -> None:
     """d(beta)/d(gap, slip) by the law linearised at kappa, in the form that suits the contact.
 
     Far from the solution the violation that the line search looks at, that of the first form, may grow along a step of
@@ -79,16 +79,16 @@ def condense_cone(model: Model, data: Data, c: int, kappa: float, share: float, 
     b0 = mu * z[Cone.IMPULSE]
     room = b0 * b0 - z[Cone.FRICTION1] * z[Cone.FRICTION1] - z[Cone.FRICTION2] * z[Cone.FRICTION2]
     if linear and room > _INSIDE * b0 * b0:
-        condense_sticking(z, k, b0, kappa, share, W, q)
+        condense_sticking(z, k, b0, kappa, indefinite, W, q)
     else:
-        condense_sliding(z, k, b0, kappa, share, W, q)
+        condense_sliding(z, k, b0, kappa, indefinite, W, q)
     W[3] = mu * W[0] * q[ConeScale.GROWTH]
     W[6] = mu * W[0] * q[ConeScale.GROWTH + 1]
 
 
 @kernel
-def condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
-    """psi dbeta = -(b I + beta v_t^T/r) dv_t - share (v_t + beta dpsi/db) db - residual,   r = psi - a"""
+def condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, indefinite: float, W: Vector, q: Vector) -> None:
+    """psi dbeta = -(b I + beta v_t^T/r) dv_t - indefinite (v_t + beta dpsi/db) db - residual,   r = psi - a"""
     psi, r = cone_slip(b0, k[Kin.SLIP1], k[Kin.SLIP2], kappa)
     a = psi - r
     b1, b2 = within_cone(b0, z[Cone.FRICTION1], z[Cone.FRICTION2])
@@ -98,15 +98,15 @@ def condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, share: float
     W[7] = -i * b2 * k[Kin.SLIP1] / r
     W[8] = -i * (b0 + b2 * k[Kin.SLIP2] / r)
     g = -(a / b0) * (1.0 + a / r)  # dpsi/db
-    q[ConeScale.GROWTH] = -i * share * (k[Kin.SLIP1] + b1 * g)
-    q[ConeScale.GROWTH + 1] = -i * share * (k[Kin.SLIP2] + b2 * g)
+    q[ConeScale.GROWTH] = -i * indefinite * (k[Kin.SLIP1] + b1 * g)
+    q[ConeScale.GROWTH + 1] = -i * indefinite * (k[Kin.SLIP2] + b2 * g)
     q[ConeScale.RESIDUAL] = i * (b0 * k[Kin.SLIP1] + psi * z[Cone.FRICTION1])
     q[ConeScale.RESIDUAL + 1] = i * (b0 * k[Kin.SLIP2] + psi * z[Cone.FRICTION2])
 
 
 @kernel
-def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
-    """(kappa I - 2 s beta^T) dbeta = -c dv_t - share 2 b s db - (c v_t + kappa beta),   c = b^2 - |beta|^2
+def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, indefinite: float, W: Vector, q: Vector) -> None:
+    """(kappa I - 2 s beta^T) dbeta = -c dv_t - indefinite 2 b s db - (c v_t + kappa beta),   c = b^2 - |beta|^2
 
     by the inverse  (I + e s beta^T)/kappa,   e = 2/(kappa - 2 s.beta).   s is the slip v_t if that is near the
     law, against beta and at most twice as fast, and otherwise that of the law, -kappa beta/c: the matrix is definite.
@@ -125,8 +125,8 @@ def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: floa
     W[5] = g * e * s1 * b2
     W[7] = g * e * s2 * b1
     W[8] = g * (1.0 + e * s2 * b2)
-    q[ConeScale.GROWTH] = -share * b0 * e * s1
-    q[ConeScale.GROWTH + 1] = -share * b0 * e * s2
+    q[ConeScale.GROWTH] = -indefinite * b0 * e * s1
+    q[ConeScale.GROWTH + 1] = -indefinite * b0 * e * s2
     d = e * (b1 * r1 + b2 * r2)
     q[ConeScale.RESIDUAL] = (r1 + s1 * d) / kappa
     q[ConeScale.RESIDUAL + 1] = (r2 + s2 * d) / kappa

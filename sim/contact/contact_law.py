@@ -20,10 +20,10 @@ from sim.contact.pyramid import (
     start_pyramid,
 )
 from sim.contact.softening import soften
-from sim.model.columns import Bounce, Cone, ContactRow, Kin, Pyramid
 from sim.model.data import Data
 from sim.model.model import Law, Model
 from sim.model.options import LawForm, NewtonTarget
+from sim.model.record_columns import Bounce, Cone, ContactRow, Kin, Pyramid
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.cones import onto_path, orthant_step, return_pair
@@ -182,10 +182,10 @@ def return_contact(model: Model, data: Data, h: float, c: int, kappa: float) -> 
 
 
 @kernel
-def condense_contact(model: Model, data: Data, h: float, c: int, kappa: float, share: float, form: int) -> None:
+def condense_contact(model: Model, data: Data, h: float, c: int, kappa: float, indefinite: float, form: int) -> None:
     """W = d(impulse)/d(gap, slip) by the law linearised at kappa, W_nn = -gamma/s; fills contact_W, contact_scale.
 
-    share: of the growth of the friction with the normal impulse, 1 for the derivative of the exact cone.
+    indefinite: factor of the growth of the friction with the normal impulse, 1 for the derivative of the exact cone.
     form: in the LINEAR one a contact that sticks takes the form of its law that is linear in the slip; the SOFT one is
     that of derivatives (softening.py).
     """
@@ -195,7 +195,7 @@ def condense_contact(model: Model, data: Data, h: float, c: int, kappa: float, s
     W[0] = -data.cone[c, Cone.IMPULSE] / data.cone[c, Cone.SLACK]
     law = law_of(model, c)
     if law == Law.NONLINEAR:
-        condense_cone(model, data, c, kappa, share, form == LawForm.STICKING)
+        condense_cone(model, data, c, kappa, indefinite, form == LawForm.STICKING)
     elif law == Law.LINEAR:
         condense_pyramid(model, data, c)
     if form == LawForm.SOFT:
@@ -214,7 +214,7 @@ def contact_constant(model: Model, data: Data, c: int, target: NewtonTarget) -> 
     r = target.kappa - z[Cone.SLACK] * z[Cone.IMPULSE]
     if target.corrected > 0.0:
         r -= target.corrected * d[Cone.SLACK] * d[Cone.IMPULSE]
-    w[0] = (r - z[Cone.IMPULSE] * target.share * (data.contact_kin[c, Kin.GAP] - z[Cone.SLACK])) / z[Cone.SLACK]
+    w[0] = (r - z[Cone.IMPULSE] * target.gap_fraction * (data.contact_kin[c, Kin.GAP] - z[Cone.SLACK])) / z[Cone.SLACK]
     w[1] = 0.0
     w[2] = 0.0
     law = law_of(model, c)
@@ -225,18 +225,18 @@ def contact_constant(model: Model, data: Data, c: int, target: NewtonTarget) -> 
 
 
 @kernel
-def recover_contact(model: Model, data: Data, c: int, rate: Vec3, share: float) -> None:
+def recover_contact(model: Model, data: Data, c: int, rate: Vec3, gap_fraction: float) -> None:
     """cone_step of contact c, where its gap and slip change by `rate`: contact_rate, or pair_rate between bodies."""
     z = data.cone[c]
     d = data.carry.cone_step[c]
     a, x, y = rate
-    d[Cone.SLACK] = a + share * (data.contact_kin[c, Kin.GAP] - z[Cone.SLACK])
+    d[Cone.SLACK] = a + gap_fraction * (data.contact_kin[c, Kin.GAP] - z[Cone.SLACK])
     d[Cone.IMPULSE] = data.contact_W[c, 0] * a + data.contact_w[c, 0]
     law = law_of(model, c)
     if law == Law.NONLINEAR:
         recover_cone(data, c, a, x, y)
     elif law == Law.LINEAR:
-        recover_pyramid(model, data, c, x, y, share)
+        recover_pyramid(model, data, c, x, y, gap_fraction)
 
 
 @kernel

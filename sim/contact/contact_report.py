@@ -6,9 +6,9 @@ from sim.contact.contact_law import contact_error, report_contact, slip_violatio
 from sim.contact.ground_contact import contact_kinematics
 from sim.contact.inactive import sunk_contact
 from sim.contact.pairs.pair_report import report_pairs
-from sim.model.columns import Bound
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Bound
 from sim.model.slots import Slot
 from solvers.compiler import inlined, optional
 from solvers.types import Matrix

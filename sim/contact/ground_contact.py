@@ -6,7 +6,8 @@
 The impulse f = n gamma + T^T beta acts at r from the centre of mass, as the wrench (f, r x f) in world axes (expressing
 the torque in the frame of configuration 3, as Dojo does, breaks angular momentum at O(h |omega|)).
 
-Columns of contact_kin: sim/model/columns.py. Of a half-space, the rows of the Jacobian by the translation are n, T/h.
+Columns of contact_kin: sim/model/record_columns.py. Of a half-space, the rows of the Jacobian by the
+translation are n, T/h.
 
 contact_frame holds the rows n, T: those of the half-space, or on terrain those of the place (terrain_contact.py).
 """
@@ -14,9 +15,9 @@ contact_frame holds the rows n, T: those of the half-space, or on terrain those 
 from __future__ import annotations
 
 from sim.contact.terrain_contact import place_on_terrain, turn_on_terrain
-from sim.model.columns import Kin
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Kin
 from solvers.compiler import kernel
 from solvers.rotation import cross, put_three, rotate, three, transposed_times
 from solvers.types import Matrix, Vector

@@ -7,15 +7,15 @@ Between the grid lines i and i + 1, at the fraction t, F is the sum of four coef
 along either direction; one row of coefficients lies outside of the grid on every side. Beyond it all coefficients are
 those of the edge: the ground becomes level within three cells.
 
-Columns of terrain_place: Grid of sim/model/columns.py.
+Columns of terrain_place: Grid of sim/model/record_columns.py.
 """
 
 from __future__ import annotations
 
 from math import floor
 
-from sim.model.columns import Grid, TerrainSize
 from sim.model.model import Model
+from sim.model.record_columns import Grid, TerrainSize
 from solvers.compiler import kernel
 from solvers.rotation import Vec3
 from solvers.types import Vector

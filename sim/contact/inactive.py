@@ -26,7 +26,7 @@ iterate the impulses are those of the law there, up to the tolerance in all (`ch
 it, cluster by cluster, from the motion of the body since they were evaluated). A gap below a at the solution activates
 the cluster, and the step is solved again.
 
-Columns of `inactive` and `cluster`: Inactive and Cluster of sim/model/columns.py.
+Columns of `inactive` and `cluster`: Inactive and Cluster of sim/model/record_columns.py.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from math import sqrt
 from sim.contact.ground_contact import contact_kinematics
 from sim.contact.pairs.inactive_pairs import COUPLED, enlist_pairs
 from sim.contact.terrain_contact import terrain_gap
-from sim.mechanism.confined import SUNK
+from sim.mechanism.immovable_contacts import SUNK
 from sim.mechanism.pack_clusters import STIFFNESS
-from sim.model.columns import Cluster, Inactive
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import StepOptions
+from sim.model.record_columns import Cluster, Inactive
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import rotate, three
@@ -73,7 +73,7 @@ def cluster_gap(model: Model, data: Data, c: int, height: float, third: bool) ->
 
 @optional(Slot.SUNK_CONTACT, default=-1)
 def sunk_contact(model: Model) -> int:
-    """A contact that no motion lifts out of the ground (confined.py), or -1."""
+    """A contact that no motion lifts out of the ground (immovable_contacts.py), or -1."""
     for c in range(model.contact_hold.shape[0]):
         if model.contact_hold[c] == SUNK:
             return c

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from sim.dynamics.displacements import third_quaternion
-from sim.model.columns import Cluster, Inactive
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Cluster, Inactive
 from solvers.compiler import kernel
 from solvers.types import Vector
 

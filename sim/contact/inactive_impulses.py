@@ -12,9 +12,9 @@ from sim.contact.contact_law import contact_impulse, start_contact
 from sim.contact.inactive_bounds import ANGLE, NEARER, bound_changes, keep_motion
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.dynamics.displacements import third_quaternion
-from sim.model.columns import Cluster, Cone, Inactive, Kin
 from sim.model.data import Data
 from sim.model.model import Law, Model
+from sim.model.record_columns import Cluster, Cone, Inactive, Kin
 from solvers.compiler import inlined, kernel
 from solvers.rotation import Vec3, cross, put_three, rotate, three, transposed_times
 from solvers.types import Vector
@@ -51,16 +51,16 @@ def changes(model: Model, data: Data, h: float, c: int) -> tuple[float, float]:
 @kernel
 def update_inactive(model: Model, data: Data, h: float) -> None:
     """Impulses of the inactive clusters at configuration 3, to a share of the tolerance: turned or evaluated again."""
-    share = data.inactive_share[0]
+    fraction = data.inactive_share[0]
     for m in range(data.inactive_count[0]):
         c = data.inactive_first[m]
         law, arms = changes(model, data, h, c)
         if model.contact_terrain[c] > 0:
-            if not law + arms <= share:
+            if not law + arms <= fraction:
                 evaluate_on_terrain(model, data, h, c)
-        elif not law <= share:
+        elif not law <= fraction:
             _evaluate(model, data, h, c)
-        elif data.inactive[c, Inactive.TURNED] > 0.0 or law + arms > share:
+        elif data.inactive[c, Inactive.TURNED] > 0.0 or law + arms > fraction:
             data.inactive[c, Inactive.TURNED] = 1.0
             turn_arms(model, data, c)
 

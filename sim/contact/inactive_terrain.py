@@ -7,9 +7,9 @@ from math import sqrt
 from sim.contact.contact_law import contact_impulse, start_contact
 from sim.contact.ground_contact import contact_kinematics
 from sim.contact.inactive_bounds import NEARER, bound_changes, keep_motion
-from sim.model.columns import Cluster, Grid, Inactive, Kin
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Cluster, Grid, Inactive, Kin
 from sim.model.slots import Slot
 from solvers.compiler import optional
 from solvers.rotation import cross, put_three, three

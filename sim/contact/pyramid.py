@@ -9,10 +9,10 @@ g = 1/(s_psi + psi sum k_i), in contact_scale: PyramidScale.
 
 from __future__ import annotations
 
-from sim.model.columns import Kin, Pyramid, PyramidScale
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import NewtonTarget
+from sim.model.record_columns import Kin, Pyramid, PyramidScale
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.cones import orthant_step, return_pair
@@ -176,12 +176,12 @@ def pyramid_constant(model: Model, data: Data, c: int, target: NewtonTarget) -> 
         if target.corrected > 0.0:
             r -= target.corrected * d[Pyramid.FRICTION + e] * d[Pyramid.SLIP + e]
         error = side(e, k[Kin.SLIP1], k[Kin.SLIP2]) + z[Pyramid.SPEED] - z[Pyramid.SLIP + e]
-        q[PyramidScale.FRICTION + e] = (r - z[Pyramid.FRICTION + e] * target.share * error) / z[Pyramid.SLIP + e]
+        q[PyramidScale.FRICTION + e] = (r - z[Pyramid.FRICTION + e] * target.gap_fraction * error) / z[Pyramid.SLIP + e]
         total += q[PyramidScale.FRICTION + e]
     r = target.kappa - z[Pyramid.SPEED] * z[Pyramid.CAP]
     if target.corrected > 0.0:
         r -= target.corrected * d[Pyramid.SPEED] * d[Pyramid.CAP]
-    total -= target.share * cap_error(model, data, c)
+    total -= target.gap_fraction * cap_error(model, data, c)
     q[PyramidScale.SPEED] = (r + z[Pyramid.SPEED] * total) * q[PyramidScale.INVERSE]
     p = q[PyramidScale.SPEED] - z[Pyramid.SPEED] * q[PyramidScale.INVERSE] * model.contact_friction[c] * w[0]
     w[1] = q[PyramidScale.FRICTION] - q[PyramidScale.FRICTION + 1] - q[PyramidScale.SUM] * p
@@ -189,7 +189,7 @@ def pyramid_constant(model: Model, data: Data, c: int, target: NewtonTarget) -> 
 
 
 @optional(Slot.RECOVER_PYRAMID)
-def recover_pyramid(model: Model, data: Data, c: int, x: float, y: float, share: float) -> None:
+def recover_pyramid(model: Model, data: Data, c: int, x: float, y: float, gap_fraction: float) -> None:
     """Steps of the ten variables from the rates (x, y) of the slip, after the step of gamma."""
     z = data.cone[c]
     d = data.carry.cone_step[c]
@@ -204,6 +204,8 @@ def recover_pyramid(model: Model, data: Data, c: int, x: float, y: float, share:
     for e in range(4):
         t = side(e, x, y) + p
         d[Pyramid.FRICTION + e] = q[PyramidScale.FRICTION + e] - q[e] * t
-        d[Pyramid.SLIP + e] = t + share * (side(e, k[Kin.SLIP1], k[Kin.SLIP2]) + z[Pyramid.SPEED] - z[Pyramid.SLIP + e])
+        d[Pyramid.SLIP + e] = t + gap_fraction * (
+            side(e, k[Kin.SLIP1], k[Kin.SLIP2]) + z[Pyramid.SPEED] - z[Pyramid.SLIP + e]
+        )
         total += d[Pyramid.FRICTION + e]
-    d[Pyramid.CAP] = mu * d[Pyramid.IMPULSE] - total + share * cap_error(model, data, c)
+    d[Pyramid.CAP] = mu * d[Pyramid.IMPULSE] - total + gap_fraction * cap_error(model, data, c)

@@ -36,10 +36,10 @@ from math import sqrt
 from sim.contact.contact_law import contact_impulse
 from sim.contact.ground_contact import contact_jacobian, contact_kinematics
 from sim.contact.pairs.pair_contact import gap_normal, is_absent, pair_arm, pair_force, pair_kinematics
-from sim.model.columns import Bounce, Kin, PairFrame
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice
+from sim.model.record_columns import Bounce, Kin, PairFrame
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, transposed_times
@@ -99,12 +99,12 @@ def least_closing(model: Model, data: Data, h: float, c: int) -> float:
 
 
 @kernel
-def raise_floors(model: Model, data: Data, h: float, share: float) -> None:
-    """Floors of the impacts of this step, with a share of the restitution."""
+def raise_floors(model: Model, data: Data, h: float, remaining: float) -> None:
+    """Floors of the impacts of this step, with a fraction of the restitution."""
     for m in range(data.active_count[0]):
         c = data.active[m]
         b = data.bounce[c]
-        e = share * model.contact_restitution[c]
+        e = remaining * model.contact_restitution[c]
         floor = (1.0 - e) * b[Bounce.GAP2] + e * b[Bounce.GAP1]
         fast = b[Bounce.GAP1] - b[Bounce.GAP2] > least_closing(model, data, h, c)
         impact = e > 0.0 and fast and 2.0 * b[Bounce.GAP2] < b[Bounce.GAP1] and floor > 0.0
@@ -193,7 +193,7 @@ def impacts_gained(model: Model, data: Data, h: float) -> bool:
     lost = _FINEST
     while lost < least:
         lost *= 2.0
-    share = max(1.0 - lost, 0.0)
-    data.bounce_share[0] = share
-    raise_floors(model, data, h, share)
+    remaining = max(1.0 - lost, 0.0)
+    data.bounce_share[0] = remaining
+    raise_floors(model, data, h, remaining)
     return True

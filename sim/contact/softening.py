@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.model.columns import Bounce, Cone, ConeScale, Kin, PairFrame
 from sim.model.data import Data
 from sim.model.model import Law, Model
+from sim.model.record_columns import Bounce, Cone, ConeScale, Kin, PairFrame
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, three
 from solvers.types import Vector

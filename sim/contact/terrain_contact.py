@@ -18,9 +18,9 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.height_field import height_field
-from sim.model.columns import Bounce, Grid, Kin
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Bounce, Grid, Kin
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, rotate, three, transposed_times

@@ -12,7 +12,7 @@ from sim.dynamics.angular_momentum import angular_momentum, angular_momentum_jac
 from sim.dynamics.elimination import subtree_sums
 from sim.dynamics.energy import node_momentum
 from sim.dynamics.joints.ball_spring import spring_turns, turn_product
-from sim.dynamics.joints.terms import add_swing_curvature
+from sim.dynamics.joints.joint_forces import add_swing_curvature
 from sim.dynamics.pose_jacobians import add_skew, columns_to_origin, pose2_to_origin, rows_to_origin, sum_composites
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from sim.dynamics.elimination import dot_six, numbers, times_row
-from sim.model.columns import DirectionRow
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import DirectionRow
 from solvers.compiler import kernel
 from solvers.lanes import LANES, Lanes, dot_lanes, keep, load, six, spread, store
 from solvers.rotation import cross

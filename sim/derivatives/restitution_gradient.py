@@ -14,9 +14,9 @@ from sim.contact.ground_contact import add_contact_law
 from sim.contact.pairs.pair_contact import pair_arm, pair_force
 from sim.contact.pairs.pair_stiffness import slip_rate
 from sim.derivatives.coupling_gradient import add_column
-from sim.model.columns import Bounce, Kin
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Bounce, Kin
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.dense import dot

@@ -14,9 +14,9 @@ from sim.derivatives.restitution_gradient import add_bounce_composites, add_boun
 from sim.dynamics.elimination import factor_of
 from sim.dynamics.elimination_panel import solve_panel
 from sim.dynamics.external_forces import input_wrench
+from sim.dynamics.joints.joint_forces import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.dynamics.joints.limits import add_limit_derivatives
 from sim.dynamics.joints.servo_gradient import add_drive_derivatives, add_drive_inputs
-from sim.dynamics.joints.terms import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.dynamics.kinematics import velocity_columns
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling_panel
 from sim.dynamics.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites

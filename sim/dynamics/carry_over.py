@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sim.dynamics.displacements import third_quaternion
-from sim.dynamics.joints.motion import axis_column
+from sim.dynamics.joints.joint_motion import axis_column
 from sim.dynamics.kinematics import tree_poses
 from sim.model.data import Data
 from sim.model.model import Model

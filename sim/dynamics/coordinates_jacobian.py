@@ -7,8 +7,8 @@ dz    per body [position, velocity, rotation, angular velocity], (12 nbody,): ro
 from __future__ import annotations
 
 from sim.dynamics.coordinates import body_turn, node_poses, poses_of_maximal
+from sim.dynamics.joints.coordinate_rows import joint_rows
 from sim.dynamics.joints.coordinates import joint_frame
-from sim.dynamics.joints.rows import joint_rows
 from sim.dynamics.kinematics import velocity_columns
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view

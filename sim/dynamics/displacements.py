@@ -3,7 +3,7 @@
 A velocity is a displacement over h. As a difference of two poses it would carry their rounding, eps |x|/h; here every
 displacement is that of the parent plus that of the joint, rounded to eps |h v|:
 
-    turn       T = T_parent exp(h sum_k v_k a_k),  a_k the axes of the joint at 2;  see joints/motion.py
+    turn       T = T_parent exp(h sum_k v_k a_k),  a_k the axes of the joint at 2;  see joints/joint_motion.py
     rotation   R = R2 + E R2,   E = R(T) - I
     joint      dx = dx_parent + E_parent (R_parent p_parent) + sum_k q_k E_parent t_k + h v_k (t_k + E_parent t_k)
     body       dx - E (R2 p_child)
@@ -11,7 +11,7 @@ displacement is that of the parent plus that of the joint, rounded to eps |h v|:
 
 from __future__ import annotations
 
-from sim.dynamics.joints.motion import Increment, lead_on, moved_columns, slide, turn_on
+from sim.dynamics.joints.joint_motion import Increment, lead_on, moved_columns, slide, turn_on
 from sim.dynamics.kinematics import displace
 from sim.model.data import Data
 from sim.model.model import Model

@@ -8,9 +8,9 @@ eliminated as one block of up to six unknowns, with pivoting, as in Featherstone
 
 from __future__ import annotations
 
-from sim.model.columns import JointFactor
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import JointFactor
 from solvers.compiler import inlined, kernel
 from solvers.lanes import Six, dot_lanes, load, minus_outer, plus, put, six, store, zeros
 from solvers.lu import lu_factor, lu_sign, lu_solve, lu_solve_lanes

@@ -6,9 +6,9 @@ the nearest cache.
 
 from __future__ import annotations
 
-from sim.model.columns import JointFactor
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import JointFactor
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.lanes import LANES, dot_lanes, load, plus, plus_outer, put, six, store, zeros

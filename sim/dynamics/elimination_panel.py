@@ -13,9 +13,9 @@ so that the last block of columns needs no care.
 from __future__ import annotations
 
 from sim.dynamics.elimination_deep import solve_deep_panel
-from sim.model.columns import JointFactor
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import JointFactor
 from solvers.compiler import kernel
 from solvers.lanes import LANES, SIDE, Lanes, dot_lanes, keep, load, six, spread, store
 from solvers.lu import lu_solve_lanes

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.model.columns import JointFactor
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import JointFactor
 from solvers.compiler import kernel
 from solvers.lanes import dot_lanes, load, plus, plus_outer, put, six, spread, store, zeros
 from solvers.lu import lu_solve_lanes

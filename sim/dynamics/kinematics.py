@@ -6,7 +6,7 @@ ancestors times their rates, and the wrench on a subtree the plain sum of the wr
 
 from __future__ import annotations
 
-from sim.dynamics.joints.motion import joint_rotation, lead_along, rotation_columns, translate
+from sim.dynamics.joints.joint_motion import joint_rotation, lead_along, rotation_columns, translate
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
@@ -46,7 +46,7 @@ def tree_poses(model: Model, data: Data, q: Vector) -> None:
 
         joint frame   Q = quat_parent offset,   o = pos_parent + R_parent p_parent + displacement of the joint
         body          quat = Q quat_joint(q),   pos = o - R p_child
-        columns       see joints/motion.py
+        columns       see joints/joint_motion.py
 
     Fills pos2, quat2, rot2, S2, and arm = (R_parent p_parent, R p_child), without R_parent where that is the world.
     """

@@ -15,7 +15,7 @@ from sim.dynamics.angular_momentum import angular_momentum, angular_momentum_jac
 from sim.dynamics.carry_over import advance, follows_on
 from sim.dynamics.displacements import move_back, tree_moves
 from sim.dynamics.joints.damper import damper_lag
-from sim.dynamics.joints.motion import Increment
+from sim.dynamics.joints.joint_motion import Increment
 from sim.dynamics.kinematics import tree_poses
 from sim.model.data import Data
 from sim.model.model import InputKind, Model

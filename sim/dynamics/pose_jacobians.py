@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from sim.dynamics.angular_momentum import angular_momentum, angular_momentum_jacobian
 from sim.dynamics.momentum_balance import body_jacobian
-from sim.model.columns import Kin
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Kin
 from solvers.compiler import kernel
 from solvers.lanes import load, store
 from solvers.rotation import cross, three, transposed_times

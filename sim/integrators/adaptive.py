@@ -6,7 +6,7 @@ A sub-step of length h from a node is accepted where its estimate e of the error
 
 order 8    e from the embedded formulas of order 5 and 3 of Dormand and Prince (Hairer, Norsett, Wanner, II.10)
 order 2    e = |q - q'|/2 of two steps of h/2 and one of h, node_step.py; in contact eight times that, with an impact
-           |v - v'| t besides, t the rest of the stretch, half a second at least
+           |v - v'| t besides, t the rest of the step, half a second at least
 
 and the next one has the length h (e/allowed)^-1/k times a PI controller's share (Gustafsson, ACM TOMS 17, 1991).
 
@@ -27,18 +27,18 @@ from math import sqrt
 
 from sim.contact.pairs.clearance import pairs_reached
 from sim.dynamics.external_forces import set_external
+from sim.integrators.contact_events import NEVER
 from sim.integrators.halved_step import FAILED, LANDS, shorten_impact, try_short
 from sim.integrators.hamilton import coordinate_rates
-from sim.integrators.landing import NEVER
 from sim.integrators.phases import leave, left_out, report_apart
 from sim.integrators.runge_kutta import advance
 from sim.integrators.runge_kutta import begin as begin_node
-from sim.integrators.stretch import AccuracyGoal, Clock, Embedded, Stretch, begin_stretch, keep, rest_contacts
-from sim.model.columns import Apart, StepReport
+from sim.integrators.substeps import AccuracyGoal, Clock, Embedded, SubstepState, begin_substeps, keep, rest_contacts
 from sim.model.data import Data
+from sim.model.interruptible_loops import is_due, note_deadline
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
-from sim.model.pace import is_due, start_pace
+from sim.model.record_columns import Apart, StepReport
 from solvers.compiler import Table, kernel
 from solvers.dense import clear, copy_vector
 from solvers.status import Status
@@ -49,7 +49,7 @@ NEAR = -1  # in place of a Status: a contact or limit is near at the end of the 
 _SOLVED = int(Status.SOLVED)
 _TOLERANCE_STEP = int(Status.TOLERANCE_STEP)
 _NOT_FINITE, _CONTACT_SUNK = int(Status.NOT_FINITE), int(Status.CONTACT_SUNK)
-_KINK, _KINKS = 0.05, 0.2  # error of a step with a kink, and of all in a stretch, in accuracies
+_KINK, _KINKS = 0.05, 0.2  # error of a step with a kink, and of all in a step, in accuracies
 _INSTANT = 1e-13  # [s] between a landing and the node before it
 _SUDDEN = 8.0  # ratio of the lengths of steps on a kink and before it
 
@@ -69,7 +69,7 @@ def _embedded_error(model: Model, data: Data, embedded: Embedded, h: float) -> f
 
 
 @kernel
-def stand(models: Table, works: Table, line: Stretch, goal: Vector) -> float:
+def stand(models: Table, works: Table, line: SubstepState, goal: Vector) -> float:
     """Time for which a flight from the node may go on before something could touch, 0 where it is near [s]."""
     model, data = model_view(models[0]), data_view(works[1])
     nq = data.theta1.shape[0]
@@ -92,7 +92,7 @@ def stand(models: Table, works: Table, line: Stretch, goal: Vector) -> float:
 
 @kernel
 def try_long(
-    models: Table, works: Table, goal: Vector, line: Stretch, embedded: Embedded, h: float
+    models: Table, works: Table, goal: Vector, line: SubstepState, embedded: Embedded, h: float
 ) -> tuple[int, float]:  # fmt: skip
     """line.trial = the node a step of order 8 after line.x, at which `stand` stands; (Status or NEAR, error ratio)."""
     model, data = model_view(models[0]), data_view(works[1])
@@ -135,7 +135,7 @@ def _allows(clock: Vector, h: float, shortest: float, ratio: float) -> bool:
 
 @kernel
 def take_short(
-    models: Table, works: Table, settings: Vector, goal: Vector, line: Stretch, embedded: Embedded, h: float
+    models: Table, works: Table, settings: Vector, goal: Vector, line: SubstepState, embedded: Embedded, h: float
 ) -> int:  # fmt: skip
     """One attempt of order 2, kept where its error is allowed; the Status.
 
@@ -178,7 +178,7 @@ def take_short(
 
 @kernel
 def take_long(
-    models: Table, works: Table, goal: Vector, line: Stretch, embedded: Embedded, h: float
+    models: Table, works: Table, goal: Vector, line: SubstepState, embedded: Embedded, h: float
 ) -> int:  # fmt: skip
     """One attempt of order 8, kept where its error is allowed; the Status."""
     clock = line.clock
@@ -205,7 +205,7 @@ def take_long(
 
 @kernel
 def attempt(
-    models: Table, works: Table, settings: Vector, goal: Vector, embedded: Embedded, line: Stretch
+    models: Table, works: Table, settings: Vector, goal: Vector, embedded: Embedded, line: SubstepState
 ) -> int:  # fmt: skip
     """One attempt at the next sub-step, of order 8 or 2; the Status."""
     clock = line.clock
@@ -230,16 +230,16 @@ def attempt(
 
 @kernel
 def go_on(
-    models: Table, works: Table, settings: Vector, goal: Vector, embedded: Embedded, line: Stretch
+    models: Table, works: Table, settings: Vector, goal: Vector, embedded: Embedded, line: SubstepState
 ) -> int:  # fmt: skip
-    """Sub-steps until the end of the stretch, a full list of them or the deadline; the Status.
+    """Sub-steps until the end of the step, a full list of them or the deadline; the Status.
 
     models: tables of the Model for order 8 and for order 2; works: of two Data.
     """
     data, clock = data_view(works[0]), line.clock
-    start_pace(data, settings)
+    note_deadline(data, settings)
     if clock[Clock.BEGUN] == 0.0:
-        begin_stretch(line, goal[AccuracyGoal.END])
+        begin_substeps(line, goal[AccuracyGoal.END])
     line.taken[0] = 0
     while clock[Clock.TIME] < goal[AccuracyGoal.END] and line.taken[0] < line.lengths.shape[0]:
         effort = line.report[StepReport.ITERATIONS]

@@ -1,6 +1,6 @@
-"""The loop over time of steps with an accuracy: each is a stretch of sub-steps (adaptive.py) under its own input.
+"""The loop over time of steps with an accuracy: each is a sequence of sub-steps (adaptive.py) under its own input.
 
-A motion that returns to Python within a stretch continues from there: the stretch keeps its state (Clock).
+A motion that returns to Python within a step continues from there: the step keeps its state (Clock).
 """
 
 from __future__ import annotations
@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.integrators.adaptive import attempt
-from sim.integrators.stretch import AccuracyGoal, Clock, Embedded, Stretch, begin_stretch
-from sim.model.columns import StepReport
+from sim.integrators.substeps import AccuracyGoal, Clock, Embedded, SubstepState, begin_substeps
+from sim.model.interruptible_loops import is_due, note_deadline
 from sim.model.layout import data_view
-from sim.model.pace import is_due, start_pace
+from sim.model.record_columns import StepReport
 from solvers.compiler import Table, kernel
 from solvers.dense import copy, copy_vector
 from solvers.status import Status
@@ -21,7 +21,7 @@ _SOLVED = int(Status.SOLVED)
 _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
 
 
-class Stretches(NamedTuple):
+class SubstepMotion(NamedTuple):
     """A motion, step by step."""
 
     us: Matrix  # (T, nu) in
@@ -34,18 +34,18 @@ class Stretches(NamedTuple):
 
 
 @kernel
-def _begin(line: Stretch, path: Stretches, end: float, t: int) -> None:
-    """The stretch of step t."""
+def _begin(line: SubstepState, path: SubstepMotion, end: float, t: int) -> None:
+    """The sub-steps of step t."""
     copy_vector(path.xs[t], line.x)
     copy_vector(path.us[t], line.u)
     if t < path.wrenches.shape[0]:
         copy(path.wrenches[t], line.wrench[0])
-    begin_stretch(line, end)
+    begin_substeps(line, end)
     path.substeps[t] = 0
 
 
 @kernel
-def _end(line: Stretch, path: Stretches, end: float, t: int, status: int) -> None:
+def _end(line: SubstepState, path: SubstepMotion, end: float, t: int, status: int) -> None:
     """The results of step t."""
     copy_vector(line.report, path.reports[t])
     path.reports[t, StepReport.STATUS], path.reports[t, StepReport.WORST] = status, -1.0
@@ -57,14 +57,14 @@ def _end(line: Stretch, path: Stretches, end: float, t: int, status: int) -> Non
 
 
 @kernel
-def roll_stretches(
+def roll_substeps(
     models: Table,
     works: Table,
     settings: Vector,
     goal: Vector,
     embedded: Embedded,
-    line: Stretch,
-    path: Stretches,
+    line: SubstepState,
+    path: SubstepMotion,
     first: int,
 ) -> int:
     """Steps from `first` on, of which that one may have begun; the number of steps taken at the end, or the deadline.
@@ -72,7 +72,7 @@ def roll_stretches(
     Where a step is not solved, its report has the Status.
     """
     data, end = data_view(works[0]), goal[AccuracyGoal.END]
-    start_pace(data, settings)
+    note_deadline(data, settings)
     for t in range(first, path.us.shape[0]):
         if line.clock[Clock.BEGUN] == 0.0:
             _begin(line, path, end, t)

@@ -11,16 +11,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.derivatives.parameters.columns import clear_columns, fill_columns
 from sim.derivatives.parameters.directions import At, Effect
 from sim.derivatives.parameters.height_columns import add_height_gradient
+from sim.derivatives.parameters.residual_columns import clear_columns, fill_columns
 from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
 from sim.integrators.rollout import Linearized, linearize
-from sim.model.columns import StepReport, StepSetting
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
+from sim.model.record_columns import StepReport, StepSetting
 from solvers.compiler import Table, kernel, seconds
 from solvers.rotation import left_jacobian
 from solvers.status import Status

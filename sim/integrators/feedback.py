@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.dynamics.state import integrate_state, state_difference
+from sim.dynamics.state_manifold import integrate_state, state_difference
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import inlined, kernel

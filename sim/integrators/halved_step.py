@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from sim.contact.contact_report import report_contacts
-from sim.dynamics.state import configuration_difference
-from sim.integrators.landing import landing
+from sim.dynamics.state_manifold import configuration_difference
+from sim.integrators.contact_events import landing
 from sim.integrators.node_step import begin_part, mean_of_node, node_of_mean, part_of, step_mean
 from sim.integrators.slip_stop import stopping_error
-from sim.integrators.stretch import AccuracyGoal, Clock, Embedded, Stretch
+from sim.integrators.substeps import AccuracyGoal, Clock, Embedded, SubstepState
 from sim.model.layout import data_view, model_view
 from sim.model.options import StepOptions
 from solvers.compiler import Table, kernel
@@ -34,7 +34,7 @@ def shorten_impact(clock: Vector, tried: float, h: float) -> None:
 
 
 @kernel
-def _two_halves(model_at: Table, data_at: Table, options: StepOptions, line: Stretch) -> int:
+def _two_halves(model_at: Table, data_at: Table, options: StepOptions, line: SubstepState) -> int:
     """line.trial = the node two steps after line.x, line.mean = its mean state, line.parts their contacts; Status."""
     model, data, h = model_view(model_at), data_view(data_at), options.h
     begin_part(data, line.wrench)
@@ -50,7 +50,7 @@ def _two_halves(model_at: Table, data_at: Table, options: StepOptions, line: Str
 
 @kernel
 def _step_ahead(
-    model_at: Table, data_at: Table, options: StepOptions, line: Stretch, x: Vector, out: Vector
+    model_at: Table, data_at: Table, options: StepOptions, line: SubstepState, x: Vector, out: Vector
 ) -> int:  # fmt: skip
     """out = the mean state one step after the node x, in which the ground acts on both alike; the Status."""
     model, data = model_view(model_at), data_view(data_at)
@@ -64,7 +64,7 @@ def _step_ahead(
 
 @kernel
 def _difference(
-    model_at: Table, data_at: Table, options: StepOptions, goal: Vector, line: Stretch, embedded: Embedded
+    model_at: Table, data_at: Table, options: StepOptions, goal: Vector, line: SubstepState, embedded: Embedded
 ) -> float:  # fmt: skip
     """Largest e = |q - q'|/2 + |v - v'| t of the coordinates after a step and after its two halves [m, rad].
 
@@ -73,7 +73,7 @@ def _difference(
 
     v, v': after an impact, as means of another step, in which the ground has acted. Without an impact these do not
     count: they are as different as the gap of a contact is, over the length of the step.
-    t: the rest of the stretch, at least half a second: the time over which an error of the velocity counts.
+    t: the rest of the step, at least half a second: the time over which an error of the velocity counts.
     """
     model, data = model_view(model_at), data_view(data_at)
     nq, hits = data.theta1.shape[0], line.clock[Clock.HIT] > 0.0
@@ -94,7 +94,7 @@ def _difference(
 
 @kernel
 def try_short(
-    models: Table, works: Table, settings: Vector, goal: Vector, line: Stretch, embedded: Embedded, h: float
+    models: Table, works: Table, settings: Vector, goal: Vector, line: SubstepState, embedded: Embedded, h: float
 ) -> tuple[int, float]:  # fmt: skip
     """line.trial = the node one step of order 2, in two halves, after line.x; (Status or LANDS, error over allowed)."""
     model, data, options = model_view(models[1]), data_view(works[0]), part_of(goal, settings, h, 2)

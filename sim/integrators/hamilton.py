@@ -22,7 +22,7 @@ from sim.dynamics.external_forces import outer_wrenches
 from sim.dynamics.joints.ball_spring import relative_to_rest
 from sim.dynamics.joints.swing import swing_curvature
 from sim.dynamics.kinematics import tree_poses
-from sim.dynamics.mass import solve_mass
+from sim.dynamics.mass_matrix import solve_mass
 from sim.dynamics.momentum_balance import world_inertia
 from sim.dynamics.velocity import joint_twists
 from sim.model.data import Data

@@ -21,14 +21,14 @@ from sim.dynamics.elimination import add_children, dot_six
 from sim.dynamics.energy import solve_mass_matrix
 from sim.dynamics.external_forces import input_wrench, set_external
 from sim.dynamics.loops.loop_velocity import close_velocity
-from sim.integrators.closed_interval import close_interval
+from sim.integrators.mean_velocity import close_interval
 from sim.integrators.rollout import begin
-from sim.integrators.stretch import AccuracyGoal
-from sim.model.columns import StepReport, StepSetting
+from sim.integrators.substeps import AccuracyGoal
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import InputKind, Model
 from sim.model.options import Guess, StepOptions
+from sim.model.record_columns import StepReport, StepSetting
 from sim.solve.start_velocity import meet_momentum, momentum_error, momentum_of_velocity
 from sim.step import step
 from solvers.compiler import Table, kernel

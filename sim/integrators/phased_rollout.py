@@ -12,16 +12,16 @@ from typing import NamedTuple
 
 from sim.dynamics.energy import node_velocity
 from sim.dynamics.external_forces import set_external
-from sim.dynamics.state import normalise_state
+from sim.dynamics.state_manifold import normalise_state
 from sim.integrators import rollout, runge_kutta
 from sim.integrators.phases import NEAR, fly
 from sim.integrators.rollout import UNIT, MotionBuffers, options_of, report_step
-from sim.model.columns import StepReport
 from sim.model.data import Data
+from sim.model.interruptible_loops import is_due, note_deadline
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.options import Guess, StepOptions
-from sim.model.pace import is_due, start_pace
+from sim.model.record_columns import StepReport
 from sim.solve.start_velocity import interval, start_state
 from sim.step import step
 from solvers.compiler import Table, kernel
@@ -88,7 +88,7 @@ def roll_phases(models: Table, works: Table, settings: Vector, path: Phases, fir
     """
     flight, second, data, near = model_view(models[0]), model_view(models[1]), data_view(works[0]), data_view(works[1])
     options = options_of(near, settings, False)
-    start_pace(data, settings)
+    note_deadline(data, settings)
     for t in range(first, path.motion.us.shape[0]):
         report, stays, status = path.motion.reports[t], t > 0 and path.near[t - 1] == 1, NEAR
         if path.flies:

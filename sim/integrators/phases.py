@@ -8,7 +8,7 @@ g0, g1 are lower bounds of a gap where the step begins and where it ends, and d 
 a path no longer than d between two places g0 and g1 from the ground is nowhere nearer to it than g. Paths are no longer
 than d while accelerations hardly change within a step. A step that turns out to be near is not taken.
 
-Columns of `inactive` here, at the first contact of a cluster: Apart of sim/model/columns.py.
+Columns of `inactive` here, at the first contact of a cluster: Apart of sim/model/record_columns.py.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from sim.contact.pairs.clearance import largest_speed, least_gap, measure_pairs,
 from sim.dynamics.external_forces import set_external
 from sim.integrators.rollout import MotionBuffers
 from sim.integrators.runge_kutta import advance
-from sim.mechanism.confined import IDLE
-from sim.model.columns import Apart, Bounce, Cluster, StepReport, StepSetting
+from sim.mechanism.immovable_contacts import IDLE
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Apart, Bounce, Cluster, StepReport, StepSetting
 from solvers.compiler import kernel
 from solvers.dense import copy, copy_vector
 from solvers.rotation import quat_matrix, quat_turn

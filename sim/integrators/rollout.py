@@ -7,7 +7,7 @@
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
 
 Every function takes the tables of a Model and a Data (solvers/compiler); every loop stops at the first step that is
-not SOLVED, and after the first one that ends behind the deadline: sim/model/pace.py explains how it resumes.
+not SOLVED, and after the first one that ends behind the deadline: model/interruptible_loops.py explains how it resumes.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from sim.derivatives.parameters.directions import At
 from sim.derivatives.parameters.parameter_jacobian import parameter_jacobian
 from sim.derivatives.step_gradient import gradient
 from sim.dynamics.external_forces import set_external
-from sim.dynamics.state import normalise_state
+from sim.dynamics.state_manifold import normalise_state
 from sim.integrators.feedback import Following, begin_knot, end_knot
-from sim.model.columns import StepReport, StepSetting
 from sim.model.data import Data
+from sim.model.interruptible_loops import is_due, note_deadline
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.options import Guess, StepOptions
-from sim.model.pace import is_due, start_pace
+from sim.model.record_columns import StepReport, StepSetting
 from sim.step import step
 from solvers.compiler import Table, kernel
 from solvers.dense import clear, copy_vector, is_finite
@@ -80,7 +80,7 @@ class ParameterColumns(NamedTuple):
 @kernel
 def options_of(data: Data, settings: Vector, begins: bool) -> StepOptions:
     """Options of the steps of a motion that begins here, or continues after a pause."""
-    start_pace(data, settings)
+    note_deadline(data, settings)
     if begins:
         begin(data)
     return StepOptions(

@@ -26,7 +26,7 @@ from sim.integrators.hamilton import (
     place,
     velocity_of_momenta,
 )
-from sim.integrators.tangents import (
+from sim.integrators.runge_kutta_gradient import (
     Tangents,
     first_tangents,
     keep_tangents,
@@ -35,10 +35,10 @@ from sim.integrators.tangents import (
     tangent_rates,
     tangents_of,
 )
-from sim.model.columns import StepReport
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import Guess, StepOptions
+from sim.model.record_columns import StepReport
 from sim.model.slots import Slot
 from sim.solve.energy_balance import LARGEST_GAIN
 from solvers.compiler import kernel, optional

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.integrators.landing import BEGINS
-from sim.model.columns import ContactRow
+from sim.integrators.contact_events import BEGINS
 from sim.model.model import Model
+from sim.model.record_columns import ContactRow
 from solvers.compiler import kernel
 from solvers.types import Cube, Vector
 

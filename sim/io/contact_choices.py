@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.mechanism import checks
-from sim.mechanism.parts import LAWS
+from sim.mechanism.contact import LAWS
 
 __all__ = ["ContactChoices", "contact_choices"]
 

@@ -23,12 +23,12 @@ __all__ = ["VERSION", "packed_part", "part_of"]
 
 VERSION = 1
 PARTS = {cls.__name__: cls.__module__ for cls in Solid.__subclasses__() if cls.__module__ == Solid.__module__} | {
-    "Body": "sim.mechanism.parts",
+    "Body": "sim.mechanism.body",
     "Collision": "sim.mechanism.collision",
-    "Contact": "sim.mechanism.parts",
+    "Contact": "sim.mechanism.contact",
     "Gear": "sim.mechanism.gear",
-    "Input": "sim.mechanism.parts",
-    "Joint": "sim.mechanism.parts",
+    "Input": "sim.mechanism.input",
+    "Joint": "sim.mechanism.joint",
     "LinkFrame": "sim.io.urdf.report",
     "Mechanism": "sim.mechanism.mechanism",
     "MjcfMechanism": "sim.io.mjcf.report",

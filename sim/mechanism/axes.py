@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.mechanism.parts import Joint
+from sim.mechanism.joint import Joint
 
 Floats = NDArray[np.float64]
 

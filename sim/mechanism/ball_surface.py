@@ -35,16 +35,16 @@ def raised(coefficients: Floats, spacing: Floats, here: Floats, radius: float) -
             value = reach(other)[0]
             better = value > best
             best, arm = np.where(better, value, best), np.where(better[..., None], other, arm)
-    share = np.ones(best.shape)
+    step_size = np.ones(best.shape)
     for _ in range(100):
         slope = reach(arm)[1]
         goal = radius * slope / np.sqrt(1.0 + np.sum(slope**2, axis=-1, keepdims=True))
-        other = arm + share[..., None] * (goal - arm)
+        other = arm + step_size[..., None] * (goal - arm)
         value = reach(other)[0]
         better = value >= best
         gain = float(np.max(value - best))
         best, arm = np.where(better, value, best), np.where(better[..., None], other, arm)
-        share = np.where(better, np.minimum(1.0, 1.5 * share), 0.5 * share)
+        step_size = np.where(better, np.minimum(1.0, 1.5 * step_size), 0.5 * step_size)
         if gain < 1e-14:
             break
     return best, arm

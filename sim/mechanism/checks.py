@@ -219,12 +219,23 @@ def distinct(call: str, names: Iterable[str]) -> None:
         seen.add(n)
 
 
-def share(call: str, value: Any) -> float:
+def bounds(call: str, pair: Any) -> tuple[float, float]:
+    """(lo, hi) with lo < hi; None stands for no bound."""
+    try:
+        lo, hi = (float(x) if x is not None else s * np.inf for x, s in zip(pair, (-1, 1), strict=True))
+    except (TypeError, ValueError):
+        raise ValueError(f"{call}: expected a pair (lo, hi), got {pair!r}") from None
+    if not lo < hi or lo == np.inf or hi == -np.inf:
+        raise ValueError(f"{call}: expected lo < hi, got ({lo:g}, {hi:g})")
+    return lo, hi
+
+
+def fraction(call: str, value: Any) -> float:
     """A number from 0 to 1."""
-    share = number(call, value, at_least=0.0)
-    if share > 1.0:
-        raise ValueError(f"{call}: expected a number from 0 to 1, got {share:g}")
-    return share
+    fraction = number(call, value, at_least=0.0)
+    if fraction > 1.0:
+        raise ValueError(f"{call}: expected a number from 0 to 1, got {fraction:g}")
+    return fraction
 
 
 def whole_number(call: str, value: Any, least: int = 1) -> int:

@@ -8,7 +8,9 @@ from itertools import product
 from typing import Any
 
 from sim.mechanism import checks
-from sim.mechanism.parts import LAWS, WORLD, Body
+from sim.mechanism.body import Body
+from sim.mechanism.contact import LAWS
+from sim.mechanism.joint import WORLD
 from sim.mechanism.shapes import Solid, String
 
 
@@ -17,8 +19,8 @@ class Collision:
     """A collision of bodies a and b: their shapes touch with friction, and do not overlap.
 
     With a String on both sides, a string connects the bodies instead: the distance of its ends is at most its length,
-    and there is no friction. A taut string moves like a rod (string.py); a string that is jerked taut dissipates the
-    energy of the jerk.
+    and there is no friction. A taut string moves like a rod (taut_string.py); a string that is jerked taut
+    dissipates the energy of the jerk.
 
     A mechanism makes one collision for each shape of a body that has several, called "name.shape" by the name or the
     number of the shape.
@@ -79,7 +81,7 @@ class Collision:
             object.__setattr__(self, "friction", friction)
         checks.one_of(f"{call}, law=...)", self.law, LAWS)
         if self.restitution is not None:
-            object.__setattr__(self, "restitution", checks.share(f"{call}, restitution=...)", self.restitution))
+            object.__setattr__(self, "restitution", checks.fraction(f"{call}, restitution=...)", self.restitution))
         if self.reach is not None:
             object.__setattr__(self, "reach", checks.number(f"{call}, reach=...)", self.reach, above=0.0))
             if isinstance(self.shape_a, String) or isinstance(self.shape_b, String):

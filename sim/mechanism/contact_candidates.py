@@ -10,8 +10,9 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
-from sim.mechanism.parts import WORLD, Body, Joint
+from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.polytope import Polytope, hull_table
 from sim.mechanism.shapes import HalfSpace, Solid, String, rotation_matrix
 from sim.mechanism.signed_distance import SignedDistance

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from sim.mechanism import checks
-from sim.mechanism.parts import Joint
+from sim.mechanism.joint import Joint
 from solvers.types import Integers
 
 _RATE = "v "  # before the name of a degree of freedom: its velocity

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.mechanism import checks
-from sim.mechanism.parts import Joint
+from sim.mechanism.joint import Joint
 
 
 @dataclass(frozen=True)

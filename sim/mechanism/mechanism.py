@@ -11,14 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
-from sim.mechanism.closing import carried
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision, shape_by_shape
+from sim.mechanism.contact import Contact
 from sim.mechanism.contact_candidates import Touch, touches
 from sim.mechanism.dofs import components, dof_names
+from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.gear import Gear, check_gears
+from sim.mechanism.input import Input
+from sim.mechanism.joint import WORLD, Joint
+from sim.mechanism.loop_joints import carried
 from sim.mechanism.naming import name_contacts, name_inputs
-from sim.mechanism.parts import WORLD, Body, Contact, Input, Joint
-from sim.mechanism.poses import poses
 from sim.mechanism.self_collisions import self_collisions
 from sim.mechanism.shape_contacts import shape_contacts
 from sim.mechanism.shapes import Solid, Sphere, rotation_matrix
@@ -520,7 +523,7 @@ def _on_terrain(
 def _standing(mech: Mechanism) -> Floats:
     """Neutral coordinates with every floating root as high as its lowest contact touches the ground."""
     q = np.array(mech.neutral, dtype=np.float64)
-    at = poses(mech.joints, q)
+    at = body_poses(mech.joints, q)
     for joint in mech.joints:
         if joint.parent != WORLD or joint.kind != "floating":
             continue

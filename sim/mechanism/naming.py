@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from sim.mechanism import checks
-from sim.mechanism.parts import Contact, Input, Joint
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 
 
 def renamed(part: Any, name: str) -> Any:

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mechanism.axes import contact_frame, fixed_axes, translation_axes
+from sim.mechanism.contact import Contact
 from sim.mechanism.contact_candidates import couples
+from sim.mechanism.damper_inertia import damper_inertias
+from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack_clusters import pack_clusters
 from sim.mechanism.pack_collisions import pack_collisions, tables_of
-from sim.mechanism.parts import WORLD, Contact, Joint
-from sim.mechanism.seen_inertia import seen_inertias
 from sim.mechanism.servos import is_limited, limited_servos, with_servos
 from sim.mechanism.shapes import rotation_matrix
 from sim.mechanism.terrain import Terrain
@@ -55,7 +56,7 @@ def pack(mech: Mechanism) -> Model:
     model = allocate_model(mechanism_sizes(mech))
     _pack_tree(mech, model)
     _pack_joints(with_servos(mech.joints, mech.inputs or ()), model)
-    model.dof_seen[:] = seen_inertias(model)
+    model.dof_seen[:] = damper_inertias(model)
     _pack_dry(mech, model)
     _pack_branches(model)
     _pack_trees(model)
@@ -214,9 +215,9 @@ def _pack_contacts(mech: Mechanism, model: Model) -> None:
         model.contact_frame[c] = contact_frame(contact.normal).ravel()
         model.contact_height[c] = contact.height
     if mech.contacts:
-        from sim.mechanism.confined import confined  # scenes without contacts do not import it
+        from sim.mechanism.immovable_contacts import immovable_contacts  # scenes without contacts do not import it
 
-        model.contact_hold[:] = confined(model, mech.contacts)
+        model.contact_hold[:] = immovable_contacts(model, mech.contacts)
     pack_clusters(model)
 
 

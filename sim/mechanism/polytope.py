@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
 from sim.mechanism.shapes import Primitive, Solid, Stance, rotation_matrix
+from sim.mechanism.short_repr import short_repr
 from sim.model import shape_kinds
 from sim.model.shape_kinds import Size
 
@@ -40,7 +40,7 @@ class Polytope(Solid):
 
     vertices: ArrayLike
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         from scipy.spatial import ConvexHull, QhullError
@@ -182,7 +182,7 @@ class Polytope(Solid):
 
 
 def hull_table(shape: Solid) -> tuple[Floats, float]:
-    """The table of hull.py, (n, 4), of a shape without its rounding, and the radius of that rounding [m].
+    """The table of polytope_table.py, (n, 4), of a shape without its rounding, and the radius of that rounding [m].
 
     The shape stands on the corners of the hull, or on balls around them.
     """

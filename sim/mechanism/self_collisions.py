@@ -8,10 +8,11 @@ from itertools import combinations, product
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
-from sim.mechanism.parts import WORLD, Body, Joint
+from sim.mechanism.forward_kinematics import body_poses
+from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.pose import Pose
-from sim.mechanism.poses import poses
 from sim.mechanism.shapes import HalfSpace, Solid, String
 
 Floats = NDArray[np.float64]
@@ -39,7 +40,7 @@ def self_collisions(
     Returns:
         (the collisions, the names of the pairs that overlap).
     """
-    at, near = poses(joints, q), _neighbours(bodies, joints, loops)
+    at, near = body_poses(joints, q), _neighbours(bodies, joints, loops)
     reach = _REACH * _extent(bodies, at)
     found, overlapping = [], []
     for a, b in combinations([body for body in bodies if body.shapes], 2):
@@ -121,5 +122,5 @@ def _distance(first: Floats, second: Floats) -> float:
     rows = np.zeros((5, count + len(second)))
     rows[:3, :count], rows[:3, count:] = (first - second[0]).T / unit, -(second - second[0]).T / unit
     rows[3, :count] = rows[4, count:] = _ONE
-    share, _ = nnls(rows, np.array([0.0, 0.0, 0.0, _ONE, _ONE]))
-    return float(np.linalg.norm(rows[:3] @ share)) * unit
+    weights, _ = nnls(rows, np.array([0.0, 0.0, 0.0, _ONE, _ONE]))
+    return float(np.linalg.norm(rows[:3] @ weights)) * unit

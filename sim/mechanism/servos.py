@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.mechanism.parts import Input, Joint
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 
 if TYPE_CHECKING:
     from sim.mechanism.mechanism import Mechanism

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from sim.mechanism.parts import Body, Contact
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
 
 
 def shape_contacts(call: str, body: Body, **options: Any) -> list[Contact]:

@@ -100,7 +100,7 @@ class Solid:
             friction = checks.number(f"{call}(friction=...)", self.friction, at_least=0.0)
             object.__setattr__(self, "friction", friction)
         if self.restitution is not None:
-            restitution = checks.share(f"{call}(restitution=...)", self.restitution)
+            restitution = checks.fraction(f"{call}(restitution=...)", self.restitution)
             object.__setattr__(self, "restitution", restitution)
         if self.name:
             checks.name(f"{call}(name=...)", self.name)

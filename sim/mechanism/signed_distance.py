@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
 from sim.mechanism.distances import distances_to_level, distances_to_mesh
 from sim.mechanism.level_set import LevelSet, level_set
 from sim.mechanism.shapes import Primitive, Solid, Stance, rotation_matrix
+from sim.mechanism.short_repr import short_repr
 from sim.model import shape_kinds
 from sim.model.shape_kinds import Size
 
@@ -60,7 +60,7 @@ class SignedDistance(Solid):
     spacing: float
     offset: float = 0.0
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         super().__post_init__()

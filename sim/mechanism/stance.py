@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.mechanism.forward_kinematics import body_poses
+from sim.mechanism.joint import WORLD
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import WORLD
-from sim.mechanism.poses import poses
 from sim.mechanism.shapes import HalfSpace, rotation_matrix
 
 Floats = NDArray[np.float64]
@@ -26,7 +26,7 @@ def gaps(mech: Mechanism, q: Floats) -> Floats:
     """(ncontact,) distance of every contact from its ground [m]."""
     if not mech.contacts:
         return np.zeros(0)
-    at = poses(mech.joints, q)
+    at = body_poses(mech.joints, q)
     return np.array([float(c.gap(at[c.body].at(c.point))) for c in mech.contacts], dtype=np.float64)
 
 
@@ -35,7 +35,7 @@ def plane_heights(mech: Mechanism, q: Floats) -> list[tuple[float, float]]:
     on_planes = [(c, c.shape_b) for c in mech.collisions if c.b == WORLD and isinstance(c.shape_b, HalfSpace)]
     if not on_planes:
         return []
-    at = poses(mech.joints, q)
+    at = body_poses(mech.joints, q)
     shapes = {body.name: body.shapes for body in mech.bodies}
     out = []
     for c, plane in on_planes:

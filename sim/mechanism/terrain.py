@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.ball_surface import raised
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 from sim.mechanism.spline import spline, spline_coefficients, spline_gradient, spline_shares
 
 Floats = NDArray[np.float64]
@@ -61,7 +61,7 @@ class Terrain:
     name: str = "ground"
     coefficients: Floats = field(init=False, repr=False)
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         heights = np.array(checks.array("Terrain(heights=...)", self.heights, (None, None)))

@@ -9,7 +9,8 @@ from heapq import heappop, heappush
 import numpy as np
 
 from sim.mechanism import checks
-from sim.mechanism.parts import WORLD, Body, Joint
+from sim.mechanism.body import Body
+from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.shapes import rotation_matrix
 
 _ALONG = 1e-9  # sine of the angle, and distance [m], below which two axes are one

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
 from sim.mechanism.shapes import Solid
+from sim.mechanism.short_repr import short_repr
 
 STEEL = (0.56, 0.64, 0.72)  # colour of parts without one
 
@@ -40,7 +40,7 @@ class Visual:
     orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0)
     color: ArrayLike | None = None
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         given: list[Any] = [self.shape is not None, bool(self.mesh), self.triangles is not None]

@@ -211,9 +211,9 @@ class Data(NamedTuple):
     chain: Matrix  # (2 nv, 2 nv + nu) their product with those of the steps before
     step_x: Matrix  # (2, nq + nv) states inside a knot
     report: Vector  # (6,) report of an internal step
-    pace: Vector  # (2,) when to go back to Python, work done since the last look at the clock: sim/model/pace.py
-    # steps of higher order (integrators/runge_kutta.py, tangents.py): high_nv is nv, high_state nq + nv, high_nu nu and
-    # high_n 2 nv + nu, all of them 0 where steps have order 2
+    loop_clock: Vector  # (2,) LoopClock: sim/model/interruptible_loops.py
+    # steps of higher order (integrators/runge_kutta.py, runge_kutta_gradient.py): high_nv is nv, high_state nq + nv,
+    # high_nu nu and high_n 2 nv + nu, all of them 0 where steps have order 2
     held_x: Matrix  # (2, high_state) the state where the step began, and its copy that moves
     held_u: Vector  # (high_nu,) the input of the step
     held_momenta: Vector  # (high_nv,) momenta where the step began

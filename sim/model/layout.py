@@ -106,7 +106,7 @@ DATA_FLOATS = _shapes(
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 24, G nv 24, S_across 18 nwide, F_across 12 nwide,
     triangles nv nwide, triangle_across 12 nwide,
     dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel,
-    step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 6, pace 2,
+    step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 6, loop_clock 2,
     inactive nground 38, inactive_share 1,
     reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach,
     held_x 2 high_state, held_u high_nu, held_momenta high_nv, momenta high_nv, stage_shift high_nv,

@@ -61,7 +61,7 @@ class Model(NamedTuple):
     optional: Integers  # addresses of the optional kernels, by Slot; 0 where the scene has not linked one
     contact_terrain: Integers  # (nground,) 1 + its terrain, 0 for a half-space
     terrain_size: IntegerMatrix  # (nterrain, 3) first of its coefficients, and their number along x and y
-    contact_hold: Integers  # (nground,) IDLE or SUNK of contacts/confined.py, 0 for the others
+    contact_hold: Integers  # (nground,) IDLE or SUNK of mechanism/immovable_contacts.py, 0 for the others
     cluster_end: Integers  # (nground,) one past the last contact of the cluster that begins here (contact/inactive.py)
     pair_coupling: Integers  # (npair,) the coupling of its two bodies
     pair_kind: Integers  # (npair,) of shapes
@@ -106,7 +106,7 @@ class Model(NamedTuple):
     cluster: Matrix  # (nground, 9) in the row of the first contact of a cluster: Cluster
     pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
     pair_far: Matrix  # (npair, 8) at the first pair of a collision, whether it is active: PairBound
-    hull: Matrix  # (nhull, 4) tables of the polytopes that collide (collision/hull.py)
+    hull: Matrix  # (nhull, 4) tables of the polytopes that collide (collision/polytope_table.py)
     body_reach: Vector  # (nbody,) largest distance of the shapes that collide from the centre of mass [m]
     pair_place: Matrix  # (2 npair, 12) centre and rotation of the shapes of a and of b in their bodies
     loop_point: Matrix  # (nloop, 6) joint frame on b, joint point on a, from their centres of mass [m]

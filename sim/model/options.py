@@ -31,7 +31,7 @@ class NewtonTarget(NamedTuple):
     """The target of a Newton step of the interior point."""
 
     kappa: float  # target of the complementarity products
-    share: float  # part of the equality residuals to remove
+    gap_fraction: float  # part of the equality residuals to remove
     corrected: float  # part of the second-order term of the affine step in `cone_step` to subtract
 
 

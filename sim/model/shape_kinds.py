@@ -10,7 +10,7 @@ SIZES = 4  # room for the sizes of one shape in the vector that `collide` takes
 SWAPPED = 64  # added to a Pair: the two have changed places
 OUT = 43  # length of the result of `collide`
 EDGES = 8  # points of two polytopes beside their corners: pairs of edges that cross
-SPARE = 2  # points of a shape without edges beside its corner, for elements that are kept (kept.py)
+SPARE = 2  # points of a shape without edges beside its corner, for elements that are kept (feature_code.py)
 CROSSINGS = 9  # points of a cylinder and another shape other than corners: places where edges, axes and rims cross
 RIM_POINTS = 8  # points on a rim that a plane may touch
 
@@ -23,7 +23,7 @@ class Shape(Code):
     BOX = 2  # half extents along x, y, z
     CYLINDER = 3  # radius, half length
     HALFSPACE = 4  # no sizes: z <= 0 of its frame is solid
-    POLYTOPE = 6  # row of its table (hull.py), radius around it; as others are against one, and all against a cylinder
+    POLYTOPE = 6  # row of its table (polytope_table.py), radius; as others are against one, and all against a cylinder
     ELLIPSOID = 7  # semi-axes along x, y, z
     FIELD = 8  # row of its table (level_set.py), radius around the level set, least extent
     STRING = 5  # as shape a: greatest length; against a STRING b without sizes: the other end
@@ -147,7 +147,7 @@ def _forms(a: Shape | None) -> list[Shape | None]:
 
 
 def tables(kind: int) -> tuple[bool, bool]:
-    """Whether the shapes of a pair are given by tables: of corners (hull.py), or of a field (level_set.py)."""
+    """Whether the shapes of a pair are given by tables: of corners (polytope_table.py), of a field (level_set.py)."""
     return _TABLES.get(Pair(kind % SWAPPED), (False, False))
 
 

@@ -1,4 +1,4 @@
-"""Slots of the optional kernels (optional.py) in the table `Model.optional`; link.py fills the table."""
+"""Slots of the optional kernels (optional.py) in the table `Model.optional`; link_kernels.py fills the table."""
 
 from __future__ import annotations
 

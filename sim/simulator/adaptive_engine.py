@@ -17,22 +17,22 @@ from numpy.typing import NDArray
 from sim.derivatives.momentum_gradient import momentum_jacobian
 from sim.dynamics.joints.damper import node_dampings
 from sim.integrators.adaptive import go_on
-from sim.integrators.adaptive_rollout import Stretches, roll_stretches
+from sim.integrators.adaptive_rollout import SubstepMotion, roll_substeps
 from sim.integrators.hamilton_gradient import Slopes
 from sim.integrators.node_slopes import node_slopes
 from sim.integrators.node_step import begin_work, mean_of_node, node_at
 from sim.integrators.rollout import Linearized, MotionBuffers, linearize, roll
-from sim.integrators.stretch import Clock, Embedded, Stretch
+from sim.integrators.substeps import Clock, Embedded, SubstepState
 from sim.integrators.tableau import embedded
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.servos import limited_servos
-from sim.model.columns import ContactRow, StepReport, StepSetting
+from sim.model.interruptible_loops import pieces
 from sim.model.model import Model
-from sim.model.pace import pieces
+from sim.model.record_columns import ContactRow, StepReport, StepSetting
 from sim.simulator.division import Division
 from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted, refuse
-from sim.simulator.knot_engine import KnotEngine
-from sim.simulator.link import link_flight
+from sim.simulator.link_kernels import link_flight
+from sim.simulator.python_loop_engine import PythonLoopEngine
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
 from solvers.compiler import Table
@@ -66,7 +66,7 @@ class Substeps(NamedTuple):
     error: float  # estimated, over the one allowed
 
 
-class AdaptiveEngine(KnotEngine):
+class AdaptiveEngine(PythonLoopEngine):
     """The kernels of one packed mechanism, with steps of the accuracy of its settings."""
 
     def __init__(self, model: Model, settings: Settings) -> None:
@@ -80,13 +80,13 @@ class AdaptiveEngine(KnotEngine):
         self._settling = (_SETTLED / self._lightest) ** 0.5 / g
         self._kept = threading.local()  # scratch, and `contacts` (ncontact, 11) of the last step
 
-    def _line(self) -> tuple[Table, Embedded, Stretch]:
+    def _line(self) -> tuple[Table, Embedded, SubstepState]:
         """Scratch of this thread."""
         if not hasattr(self._kept, "line"):
             nx, nv, ncontact = self.nx, self.sizes.nv, self.sizes.ncontact
             errors = Embedded(*embedded(), np.zeros(nv), np.zeros(nv))
             x, trial, mean, whole, half, node, ahead = (np.zeros(nx) for _ in range(7))
-            line = Stretch(
+            line = SubstepState(
                 np.zeros(self.nu),
                 self.no_wrenches,
                 x,
@@ -108,7 +108,7 @@ class AdaptiveEngine(KnotEngine):
             )
             models = np.stack([self.linked(link_flight), self._second.step_table()])
             self._kept.line = models, errors, line
-        found: tuple[Table, Embedded, Stretch] = self._kept.line
+        found: tuple[Table, Embedded, SubstepState] = self._kept.line
         return found
 
     def take(self, x: Vector, u: Vector, wrench: Cube, kappa: float | None = None) -> Substeps:
@@ -298,10 +298,10 @@ class AdaptiveEngine(KnotEngine):
         contacts, division = np.zeros((steps, self.sizes.ncontact, CONTACT)), Division.none(steps)
         xs[0], line.clock[Clock.BEGUN], knot = x, 0.0, 0
         line = line._replace(wrench=np.zeros_like(external[:1]))
-        path = Stretches(us, external, xs, reports, contacts, division.substeps, division.errors)
+        path = SubstepMotion(us, external, xs, reports, contacts, division.substeps, division.errors)
         try:
             for _ in pieces(settings, steps + 1):
-                knot = int(roll_stretches(models, works, settings, goal, errors, line, path, knot))
+                knot = int(roll_substeps(models, works, settings, goal, errors, line, path, knot))
                 if knot == steps or reports[knot, StepReport.STATUS] != Status.SOLVED:
                     break
         except KeyboardInterrupt:

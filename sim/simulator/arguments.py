@@ -13,7 +13,7 @@ from sim.integrators.feedback import FeedbackLaw
 from sim.integrators.rollout import UNIT
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.memory import check_room
+from sim.mechanism.memory_limit import check_room
 from sim.model.state_columns import BodyState
 from sim.simulator.engine import CONTACT, REPORT, Engine
 from solvers.status import MESSAGES, Status

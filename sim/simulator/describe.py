@@ -6,10 +6,11 @@ from collections import Counter
 
 import numpy as np
 
+from sim.mechanism.contact import Contact
 from sim.mechanism.contact_candidates import Touch
+from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes
-from sim.mechanism.parts import WORLD, Contact, Joint
 from sim.mechanism.shapes import Solid
 from sim.model.model import Model
 from sim.simulator.omitted_contacts import reach

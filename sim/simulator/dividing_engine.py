@@ -18,14 +18,14 @@ import numpy as np
 
 from sim.integrators.feedback import Following
 from sim.integrators.rollout import MotionBuffers
-from sim.model.columns import StepReport
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import StepReport
 from sim.model.state_columns import BodyState
 from sim.simulator.division import DIVISIBLE, Division
 from sim.simulator.engine import REPORT, Divided, Engine, Floats, chained, knot_inputs, refuse
 from sim.simulator.intervals import Intervals
-from sim.simulator.link import link_step
+from sim.simulator.link_kernels import link_step
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
 from sim.solve.start_velocity import SHORTEST

@@ -2,8 +2,8 @@
 
 Settings, reports and contacts are those of sim/integrators/rollout.py.
 
-Calls that may take long are made in pieces (pace.py). Ctrl-C between two pieces raises Interrupted with the part of
-the result that is done.
+Calls that may take long are made in pieces (interruptible_loops.py). Ctrl-C between two pieces raises Interrupted
+with the part of the result that is done.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.dynamics import coordinates, coordinates_jacobian, energy, state, velocity
-from sim.integrators import batch, rollout
+from sim.dynamics import coordinates, coordinates_jacobian, energy, state_manifold, velocity
+from sim.integrators import parallel_loops, rollout
 from sim.integrators.feedback import FeedbackLaw, Following, Path
 from sim.integrators.rollout import MotionBuffers
-from sim.model.columns import ContactRow, Inactive, StepReport
 from sim.model.data import Data
+from sim.model.interruptible_loops import pieces, rows
 from sim.model.layout import data_view, sizes_of, table
 from sim.model.model import Model
-from sim.model.pace import pieces, rows
+from sim.model.record_columns import ContactRow, Inactive, StepReport
 from sim.model.scratch import Scratch
 from sim.simulator.division import Division
-from sim.simulator.link import link_gradient, link_nodes, link_planner, link_poses, link_step
+from sim.simulator.link_kernels import link_gradient, link_nodes, link_planner, link_poses, link_step
 from sim.simulator.results import Interrupted, SimulationError
 from sim.simulator.settings import Settings, of_call
 from sim.solve import start_velocity
@@ -72,10 +72,10 @@ class Divided(NamedTuple):
         parts = self.rolled.contacts
         out = parts[-1].copy()
         out[:, _IMPULSE] = parts[..., _IMPULSE].sum(axis=0)
-        share = np.linalg.norm(parts[..., _IMPULSE], axis=2)
-        total = share.sum(axis=0)
+        weight = np.linalg.norm(parts[..., _IMPULSE], axis=2)
+        total = weight.sum(axis=0)
         pressed = total > 0.0
-        points, normals = (np.einsum("tc,tcj->cj", share, parts[..., part]) for part in (_POINT, _NORMAL))
+        points, normals = (np.einsum("tc,tcj->cj", weight, parts[..., part]) for part in (_POINT, _NORMAL))
         out[pressed, _POINT] = points[pressed] / total[pressed, None]
         length = np.linalg.norm(normals, axis=1)
         turned = (length > 0.0) & out[:, _NORMAL].any(axis=1)  # without a normal, it is beyond its reach at the end
@@ -398,7 +398,7 @@ class Engine:
             ends = [c * n // len(works) * substeps for c in range(len(works) + 1)]
             done = np.array(ends[:-1])
             for _ in pieces(settings, n * substeps):
-                batch.linearize_knots(model, works, settings, substeps, line, done)
+                parallel_loops.linearize_knots(model, works, settings, substeps, line, done)
                 if done.tolist() == ends[1:]:
                     break
         if np.count_nonzero(reports[:, StepReport.STATUS]):
@@ -433,13 +433,15 @@ class Engine:
         """(states, status and number of solved steps of every rollout), in parallel."""
         n, steps = us.shape[:2]
         xs, reports, knots = np.zeros((n, steps + 1, self.nx)), np.zeros((n, 1, REPORT)), np.zeros(n, dtype=np.int64)
-        motions = batch.BatchBuffers(xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.unknown[:2])
+        motions = parallel_loops.BatchBuffers(
+            xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.unknown[:2]
+        )
         model, works, settings = self.step_table(), self._scratch.chunks(n), self.settings.array()
         status = reports[:, 0, StepReport.STATUS]
         try:
             xs[:, 0] = x0s  # the first touch of much memory takes its time
             for _ in pieces(settings, n * steps):
-                batch.roll_batch(model, works, settings, motions)
+                parallel_loops.roll_batch(model, works, settings, motions)
                 if np.all((knots == steps) | (status != Status.SOLVED)):
                     break
         except KeyboardInterrupt:
@@ -511,20 +513,20 @@ class Engine:
         """x (+) dx of every row."""
         out = np.zeros_like(xs)
         for part in rows(len(xs)):
-            state.integrate_states(self._model, xs[part], dxs[part], out[part])
+            state_manifold.integrate_states(self._model, xs[part], dxs[part], out[part])
         return out
 
     def difference(self, x0s: Floats, x1s: Floats) -> Floats:
         """x1 (-) x0 of every row."""
         out = np.zeros((len(x0s), self.ndx))
         for part in rows(len(x0s)):
-            state.state_differences(self._model, x0s[part], x1s[part], out[part])
+            state_manifold.state_differences(self._model, x0s[part], x1s[part], out[part])
         return out
 
     def normalise(self, xs: Floats, tolerance: float) -> int:
         """Normalise quaternions in place; see `normalise_quaternions`."""
         for part in rows(len(xs)):
-            found = int(state.normalise_quaternions(self._model, xs[part], tolerance))
+            found = int(state_manifold.normalise_quaternions(self._model, xs[part], tolerance))
             if found >= 0:
                 return part.start * self.sizes.nbody + found
         return -1

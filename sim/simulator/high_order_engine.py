@@ -7,7 +7,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from sim.dynamics import bodies, coordinates
+from sim.dynamics import coordinates, maximal_energy
 from sim.integrators.runge_kutta import gradient_by_stages, step_by_stages
 from sim.integrators.tableau import stable, tableau
 from sim.mechanism.mechanism import Mechanism
@@ -15,7 +15,7 @@ from sim.mechanism.servos import limited_servos
 from sim.model.model import InputKind, Model
 from sim.model.state_columns import BodyState
 from sim.simulator.engine import Engine, Floats
-from sim.simulator.link import link_curvature, link_planner
+from sim.simulator.link_kernels import link_curvature, link_planner
 from sim.simulator.settings import Settings
 from solvers.compiler import Table, link
 from solvers.status import Status
@@ -81,11 +81,11 @@ class HighOrderEngine(Engine):
         """(kinetic, potential) energy of every row."""
         potential = super().energies(xs)[:, 1]
         rotors = 0.5 * xs[:, self.sizes.nq :] ** 2 @ self.model.dof_armature
-        return np.stack([bodies.kinetic_energy(self.model, self.bodies(xs)) + rotors, potential], axis=1)
+        return np.stack([maximal_energy.kinetic_energy(self.model, self.bodies(xs)) + rotors, potential], axis=1)
 
     def momenta(self, xs: Floats, h: float | None = None) -> Floats:
         """(linear, angular) momentum of every row."""
-        return bodies.momentum(self.model, self.bodies(xs))
+        return maximal_energy.momentum(self.model, self.bodies(xs))
 
     def maximal(self, xs: Floats, nbody: int, h: float | None = None) -> Floats:
         """z of every row, with velocities at the node."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.integrators.feedback import FeedbackLaw
-from sim.model.columns import StepReport
+from sim.model.record_columns import StepReport
 from sim.simulator.arguments import Arguments
 from sim.simulator.engine import Engine
 from sim.simulator.results import STATUSES, Linearization

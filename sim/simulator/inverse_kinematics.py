@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
 from sim.mechanism.shapes import rotation_matrix
+from sim.mechanism.short_repr import short_repr
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
 
@@ -47,7 +47,7 @@ class IkResult:
     errors: dict[str, float]  # by target
     iterations: int
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
 
 def ik(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
-from sim.mechanism.parts import WORLD
+from sim.mechanism.joint import WORLD
 from sim.mechanism.shapes import rotation_matrices, rotation_matrix
 from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator

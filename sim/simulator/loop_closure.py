@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from sim.dynamics.loops.closest_root import jacobian, nearest, newton
 from sim.dynamics.loops.loop_rank import LoopRank
 from sim.mechanism.axes import contact_frame, fixed_axes
-from sim.mechanism.closing import is_weld
+from sim.mechanism.joint import WORLD, Joint
+from sim.mechanism.loop_joints import is_weld
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import WORLD, Joint
 from sim.mechanism.shapes import rotation_matrices, rotation_matrix
 from sim.model.state_columns import BodyState
 from sim.simulator.engine import Engine
@@ -144,7 +144,7 @@ class Closure:
         return q
 
     def _with_shares(self, x: Floats) -> Floats:
-        """A copy of x with distant shares of bodies (closing.py) moved to the rest of their body."""
+        """A copy of x with distant shares of bodies (loop_joints.py) moved to the rest of their body."""
         gaps = self.gaps(x)
         far = [j for j in self._mechanism.loops if is_weld(j) and np.abs(gaps[j.name]).max() > _APART]
         x = x.copy()

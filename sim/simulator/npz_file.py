@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mechanism import checks
-from sim.mechanism.memory import check_room
+from sim.mechanism.memory_limit import check_room
 
 Arrays = dict[str, NDArray[Any]]
 

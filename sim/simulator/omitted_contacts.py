@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from sim.contact.pairs.inactive_pairs import COUPLED, STEEPEST
 from sim.mechanism.pack_clusters import STIFFNESS
-from sim.model.columns import PairBound
 from sim.model.model import Model
+from sim.model.record_columns import PairBound
 
 
 def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDArray[np.float64]:
@@ -21,8 +21,8 @@ def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDA
     out = np.zeros(len(model.contact_body))
     for first in np.flatnonzero(model.cluster_end):
         _, _, _, _, _, mobility, mu, turn, _ = model.cluster[first]
-        share = len(out) * kappa / (STIFFNESS * tolerance)
-        b, c = share * time_step * (1.0 + mu) * turn, share * (mu * mu + time_step * (1.0 + mu)) * mobility
+        scale = len(out) * kappa / (STIFFNESS * tolerance)
+        b, c = scale * time_step * (1.0 + mu) * turn, scale * (mu * mu + time_step * (1.0 + mu)) * mobility
         out[first : model.cluster_end[first]] = b + np.sqrt(b * b + 4.0 * c)
     ground = len(model.contact_height)
     for j in np.flatnonzero(model.pair_feature == 0):
@@ -31,8 +31,8 @@ def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDA
         if not np.isfinite(bound[PairBound.MOBILITY]):  # a string, whose gap has no ball around it: always active
             out[ground + j : ground + j + points] = limit
             continue
-        mu, share = model.contact_friction[ground + j], points * bound[PairBound.COLLISIONS] * kappa / COUPLED
-        b = share * time_step * (1.0 + mu) * (bound[PairBound.TURNING] + bound[PairBound.MOBILITY] * STEEPEST / limit)
-        c = share * (mu * mu + time_step * (1.0 + mu)) * bound[PairBound.MOBILITY]
+        mu, scale = model.contact_friction[ground + j], points * bound[PairBound.COLLISIONS] * kappa / COUPLED
+        b = scale * time_step * (1.0 + mu) * (bound[PairBound.TURNING] + bound[PairBound.MOBILITY] * STEEPEST / limit)
+        c = scale * (mu * mu + time_step * (1.0 + mu)) * bound[PairBound.MOBILITY]
         out[ground + j : ground + j + points] = min(b + np.sqrt(b * b + 4.0 * c), limit)
     return out

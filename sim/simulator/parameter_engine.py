@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim.derivatives.parameters.damper_inertia_effects import with_damper_inertia
 from sim.derivatives.parameters.parameters import KINDS, ParameterPlan, Parameters, all_parameters
-from sim.derivatives.parameters.seen_terms import with_seen
 from sim.derivatives.parameters.selection import by_names, select, with_values
 from sim.integrators.adjoint import Sweep
 from sim.mechanism import checks
@@ -36,7 +36,7 @@ class ParameterEngine:
 
     def __init__(self, engine: Engine, mechanism: Mechanism, time_step: float) -> None:
         self._engine, self._mechanism, self._time_step = engine, mechanism, time_step
-        self._known = with_seen(engine.model, all_parameters(mechanism, time_step))
+        self._known = with_damper_inertia(engine.model, all_parameters(mechanism, time_step))
         self._table = by_names(self._known)
         # those made so far: finding parameters by name takes longer than their derivatives
         self._selections: dict[tuple[str, ...], tuple[Parameters, ParameterPlan]] = {}

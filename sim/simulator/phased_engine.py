@@ -23,14 +23,14 @@ from sim.integrators import legendre
 from sim.integrators.hamilton_gradient import Slopes
 from sim.integrators.phased_rollout import Phases, roll_phases
 from sim.integrators.rollout import MotionBuffers
-from sim.model.columns import StepReport
+from sim.model.interruptible_loops import pieces
 from sim.model.model import Model
-from sim.model.pace import pieces
+from sim.model.record_columns import StepReport
 from sim.simulator.dividing_engine import DividingEngine
 from sim.simulator.division import DIVISIBLE, Division
 from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted
-from sim.simulator.knot_engine import KnotEngine
-from sim.simulator.link import link_flight
+from sim.simulator.link_kernels import link_flight
+from sim.simulator.python_loop_engine import PythonLoopEngine
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
 from solvers.compiler import Table
@@ -49,7 +49,7 @@ class March(NamedTuple):
     near: NDArray[np.bool_]  # (T,) which those are
 
 
-class PhasedEngine(KnotEngine):
+class PhasedEngine(PythonLoopEngine):
     """The kernels of one packed mechanism with contacts or limits, or with joints that are too stiff.
 
     second_order: why all steps are of order 2; "" if they are so near contacts and limits alone.

@@ -23,14 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
-from sim.mechanism.closing import is_weld
+from sim.mechanism.joint import WORLD, Joint
+from sim.mechanism.loop_joints import is_weld
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import WORLD, Joint
 from sim.mechanism.shapes import rotation_matrix
-from sim.model.columns import StepReport
+from sim.mechanism.short_repr import short_repr
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import StepReport
 from sim.simulator.engine import Divided, Engine
 from sim.simulator.results import Result
 from solvers.status import MESSAGES, Status
@@ -70,7 +70,7 @@ class Reactions(Result):
     status: Status
     detail: str = ""
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     @property
     def active_force(self) -> Floats:

@@ -20,9 +20,9 @@ from sim.contact.collision.witness import ABSENT
 from sim.contact.pairs.limited_reach import BEYOND
 from sim.integrators.feedback import Path
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr, drawn
 from sim.mechanism.mechanism import Mechanism
-from sim.model.columns import ContactRow, StepReport
+from sim.mechanism.short_repr import drawn, short_repr
+from sim.model.record_columns import ContactRow, StepReport
 from sim.model.state_columns import BodyState
 from sim.simulator.motion_file import archived, contact_rows, export, opened, restored
 from sim.simulator.npz_file import reading, write_npz
@@ -202,7 +202,7 @@ class StepResult(Result):
         """Contacts of the step, (ncontact, ...)."""
         return contacts_of(*self.scene)
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, repr=False)
@@ -344,7 +344,7 @@ class Shot(Result):
     residual: float
     detail: str = ""
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, found: tuple[int, Path]) -> Shot:
@@ -383,7 +383,7 @@ class Jacobian(Result):
     detail: str = ""
     by_name: bool = False
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     @property
     def A(self) -> Floats:
@@ -470,7 +470,7 @@ class Linearization(Result):
     accuracy: Floats = field(default_factory=lambda: np.zeros(0))
     detail: str = ""
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -489,7 +489,7 @@ class Gradient(Result, Mapping[str, Floats]):
     status: Status
     detail: str = ""
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.blocks)
@@ -518,7 +518,7 @@ class Batch(Result):
     knot: Integers
     detail: str = ""
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, rows: tuple[Floats, Integers, Integers]) -> Batch:

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.integrators.batch import BatchBuffers, RowTables, linearize_rows, roll_rows
+from sim.integrators.parallel_loops import BatchBuffers, RowTables, linearize_rows, roll_rows
 from sim.integrators.rollout import Linearized, MotionBuffers
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
-from sim.mechanism.memory import room_for
-from sim.model.columns import StepReport, StepSetting
-from sim.model.pace import pieces
+from sim.mechanism.memory_limit import room_for
+from sim.mechanism.short_repr import short_repr
+from sim.model.interruptible_loops import pieces
+from sim.model.record_columns import StepReport, StepSetting
 from sim.simulator.division import DIVISIBLE, Division
 from sim.simulator.engine import REPORT, Engine, finite_rows, refuse
 from sim.simulator.results import Result, ended
@@ -48,7 +48,7 @@ class BatchStep(Result):
         """Numbers of the rows that were not solved."""
         return np.flatnonzero(self.status)
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
 
 def _is_row(values: Any, size: int) -> bool:
@@ -130,7 +130,7 @@ class RowBatch:
     substeps: int
     kappas: Floats  # (n,), NaN for that of the engine
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def step(self, derivatives: bool) -> BatchStep:
         """One knot of every row."""
@@ -182,9 +182,9 @@ class RowBatch:
         rows, chunks = self._tables(derivatives=True)
         line = Linearized(self.xs, self.us, self.engines[0].no_wrenches, A, B, x_next, reports)
         done = np.zeros(len(self.us), dtype=np.int64)
-        pace = np.zeros(len(StepSetting))
-        for _ in pieces(pace, 2):
-            rows.settings[:, StepSetting.DEADLINE] = pace[StepSetting.DEADLINE]
+        deadline = np.zeros(len(StepSetting))
+        for _ in pieces(deadline, 2):
+            rows.settings[:, StepSetting.DEADLINE] = deadline[StepSetting.DEADLINE]
             linearize_rows(rows, self.substeps, line, done, chunks)
             if np.all(done == self.substeps):
                 break
@@ -198,9 +198,9 @@ class RowBatch:
         us = np.repeat(self.us[:, None], self.substeps, axis=1)
         knots = np.zeros(n, dtype=np.int64)
         motions = BatchBuffers(xs, us, reports[:, None], knots, first.no_wrenches, *first.unkept)
-        pace = np.zeros(len(StepSetting))
-        for _ in pieces(pace, 2):
-            rows.settings[:, StepSetting.DEADLINE] = pace[StepSetting.DEADLINE]
+        deadline = np.zeros(len(StepSetting))
+        for _ in pieces(deadline, 2):
+            rows.settings[:, StepSetting.DEADLINE] = deadline[StepSetting.DEADLINE]
             roll_rows(rows, motions, chunks)
             if np.all((knots == self.substeps) | (reports[:, StepReport.STATUS] != Status.SOLVED)):
                 break

@@ -16,11 +16,11 @@ from sim.derivatives.parameters.terrain_parameters import height_gradients
 from sim.integrators.adjoint import Sweep, sweep
 from sim.integrators.rollout import MotionBuffers, ParameterColumns, roll
 from sim.mechanism.mechanism import Mechanism
-from sim.model.columns import StepReport
-from sim.model.pace import pieces
+from sim.model.interruptible_loops import pieces
+from sim.model.record_columns import StepReport
 from sim.simulator.division import DIVISIBLE, Division
 from sim.simulator.engine import CONTACT, REPORT, Divided, Engine, Rolled, refuse
-from sim.simulator.link import link_heights, link_parameters
+from sim.simulator.link_kernels import link_heights, link_parameters
 from solvers.status import Status
 from solvers.types import Vector
 

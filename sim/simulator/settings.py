@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.mechanism import checks
+from sim.mechanism.joint import WORLD
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import WORLD
-from sim.model.columns import StepSetting
+from sim.model.record_columns import StepSetting
 from sim.solve.energy_balance import LARGEST_GAIN
 from solvers.types import Vector
 
@@ -37,8 +37,8 @@ class Settings(NamedTuple):
     accuracy: float = 0.0  # error of coordinates that steps may make [m/s, rad/s]; 0: steps are not divided for it
 
     def array(self, kappa: float | None = None) -> Vector:
-        """As kernels read it, at another kappa when given, with room for a deadline (pace.py); without those
-        that choose an engine.
+        """As kernels read it, at another kappa when given, with room for a deadline (interruptible_loops.py); without
+        those that choose an engine.
         """
         level = self.kappa if kappa is None else kappa
         limits = self.max_iterations, inf, self.gain, self.loss

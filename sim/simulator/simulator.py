@@ -13,14 +13,13 @@ from sim.integrators.rollout import REFUSED
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.memory import room_for
-from sim.model.columns import StepReport
+from sim.mechanism.memory_limit import room_for
+from sim.model.record_columns import StepReport
 from sim.simulator.arguments import is_plain
 from sim.simulator.contact_settings import with_contacts
 from sim.simulator.engine import REPORT, Rolled
 from sim.simulator.feedback_rollout import Feedback, roll_policy
 from sim.simulator.horizon import Horizon
-from sim.simulator.lasting import lasting
 from sim.simulator.reactions import Reactions, reactions
 from sim.simulator.results import (
     STATUSES,
@@ -38,6 +37,7 @@ from sim.simulator.results import (
     path_of,
     sentence,
 )
+from sim.simulator.rollout_duration import simulator_for_duration
 from sim.simulator.row_batch import RowStepping
 from sim.simulator.settings import Settings, default_kappa, with_accuracy
 from solvers.status import Status
@@ -202,7 +202,7 @@ class Simulator(RowStepping):
             Trajectory of the solved steps.
         """
         if duration is not None:
-            sim, steps = lasting(self, self._kappa, us, steps, duration)
+            sim, steps = simulator_for_duration(self, self._kappa, us, steps, duration)
             return sim.rollout(x, us, steps=steps, throw=throw, wrenches=wrenches)
         state = self._arguments.state("rollout", x)
         if callable(us):

@@ -14,8 +14,8 @@ from sim.mechanism import checks
 from sim.mechanism.axes import contact_frame
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes, pack
-from sim.model.columns import StepReport
 from sim.model.model import Model
+from sim.model.record_columns import StepReport
 from sim.simulator.arguments import Arguments, shaped
 from sim.simulator.describe import describe
 from sim.simulator.dividing_engine import DividingEngine
@@ -23,7 +23,7 @@ from sim.simulator.engine import Engine
 from sim.simulator.loop_closure import Closure
 from sim.simulator.results import fastest, sentence
 from sim.simulator.settings import Settings
-from sim.simulator.task_space.calls import TaskSpace
+from sim.simulator.task_space.task_space import TaskSpace
 from solvers.status import Status
 
 if TYPE_CHECKING:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from sim.contact.active_contacts import contacts_boundary, contacts_products, contacts_products_ahead
 from sim.dynamics.joints.dry_friction import dry_boundary, dry_products, dry_products_ahead
-from sim.model.columns import Bound
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Bound
 from solvers.compiler import kernel
 from solvers.cones import orthant_step
 

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from sim.contact.ground_contact import add_contact_wrench
 from sim.dynamics.elimination import dot_six
-from sim.model.columns import JointFactor, Kin
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import JointFactor, Kin
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.lu import lu_solve

@@ -45,14 +45,14 @@ from sim.dynamics.energy import (
 )
 from sim.dynamics.joints.damper import damper_impulse, node_damping
 from sim.dynamics.joints.dry_friction import apply_friction
-from sim.dynamics.joints.terms import add_limit_impulse
+from sim.dynamics.joints.joint_forces import add_limit_impulse
 from sim.dynamics.loops.loop_work import loop_slack
-from sim.dynamics.mass import eliminate_mass, mass_velocities
+from sim.dynamics.mass_matrix import eliminate_mass, mass_velocities
 from sim.dynamics.momentum_balance import world_inertia
-from sim.model.columns import Bound, BoundRow, Cone, Kin
 from sim.model.data import Data
 from sim.model.model import InputKind, Model
 from sim.model.options import StepOptions
+from sim.model.record_columns import Bound, BoundRow, Cone, Kin
 from sim.model.slots import Slot
 from sim.solve.residual import residual_scale
 from solvers.compiler import kernel, optional
@@ -245,11 +245,11 @@ def step_gained(model: Model, data: Data, options: StepOptions, inputs: tuple[Ve
     if turned > _FAR:
         work = constraint_work(model, data, options.h, v)
         work = abs(work) if both else work
-        share = _TELLING * options.gain
-        if not work > share * least_energy(model, data, options.h, v):
+        telling = _TELLING * options.gain
+        if not work > telling * least_energy(model, data, options.h, v):
             return False
         before = 0.5 * momentum_velocity(model, data, options.h, data.move_in, data.turn_in, v)
-        if not work > share * before + noise(model, data, options, v):
+        if not work > telling * before + noise(model, data, options, v):
             return False
     return energies_gained(model, data, options, v, u, both, noise(model, data, options, v))
 

@@ -46,7 +46,7 @@ class Start(Code):
 
     KNOWN = 0  # with the iterate of `known_start`
     INCOMING = 1  # at the incoming velocity, on the central path of kappa0
-    SHARE = 2  # at a share of the incoming velocity
+    FRACTION = 2  # at a fraction of the incoming velocity
     BEYOND_FOLD = 3  # beyond the end of the last attempt, along its Newton step
     BEHIND_FOLD = 4  # before it, against its Newton step
     LAST_ITERATE = 5  # where the last attempt ended
@@ -61,7 +61,7 @@ class Strategy(NamedTuple):
     features: int = int(FeatureChoice.ONCE)
     replace_features: bool = False  # the first repetition drops the previous features; later ones keep those that press
     overlap: bool = False  # accept small overlaps in features that would have to pull
-    share: float = 1.0  # of the incoming velocity
+    velocity_fraction: float = 1.0  # of the incoming velocity
     growth: float = 1.0  # of kappa0
 
 
@@ -72,22 +72,22 @@ _FIRST = (
     # the usual start of a step of which nothing is known
     Strategy(Start.INCOMING, replace_features=True),
     # where friction follows the impulses, the cones of thin contacts jam; from here on it is led down
-    Strategy(Start.SHARE, continuation=True, features=_EVERY_POSE, replace_features=True),
+    Strategy(Start.FRACTION, continuation=True, features=_EVERY_POSE, replace_features=True),
     # attempts end at folds, where the null vector of the Newton matrix leads to the other side
     Strategy(Start.BEHIND_FOLD, continuation=True, features=_EVERY_POSE),
     # shapes that slide from one feature to another within the step overlap a little in whatever was active before
-    Strategy(Start.SHARE, continuation=True, overlap=True),
+    Strategy(Start.FRACTION, continuation=True, overlap=True),
     Strategy(Start.BEYOND_FOLD, continuation=True, overlap=True),
-    Strategy(Start.SHARE, continuation=True, features=_EVERY_POSE, overlap=True),
+    Strategy(Start.FRACTION, continuation=True, features=_EVERY_POSE, overlap=True),
     Strategy(Start.BEHIND_FOLD, continuation=True, features=_EVERY_POSE, overlap=True),
 )
 _ROUND = (
     # some solutions lie beyond folds, and with a damped friction Newton's method only creeps towards them; with a
     # kappa0 of 1 N s m and more, friction that follows the impulses finds hard impacts more often than continuation
-    Strategy(Start.SHARE, undamped=True, overlap=True),
+    Strategy(Start.FRACTION, undamped=True, overlap=True),
     Strategy(Start.BEYOND_FOLD, continuation=True, undamped=True, overlap=True),
     # the same with damped directions, and features that are chosen at every pose
-    Strategy(Start.SHARE, features=_EVERY_POSE, overlap=True),
+    Strategy(Start.FRACTION, features=_EVERY_POSE, overlap=True),
     Strategy(Start.BEHIND_FOLD, continuation=True, features=_EVERY_POSE, overlap=True),
 )
 _ROUNDS = 13
@@ -95,8 +95,8 @@ _ROUNDS = 13
 
 def _numbered(k: int, strategy: Strategy) -> Strategy:
     """Strategy k of the list: shares advance by the golden ratio, modulo 1, and kappa0 grows."""
-    share = _GOLDEN * (k - 2) % 1.0 if strategy.start == Start.SHARE else 1.0
-    return strategy._replace(share=share, growth=_GROWTH ** ((k - 1) % _GROWTHS) if k > 0 else 1.0)
+    fraction = _GOLDEN * (k - 2) % 1.0 if strategy.start == Start.FRACTION else 1.0
+    return strategy._replace(velocity_fraction=fraction, growth=_GROWTH ** ((k - 1) % _GROWTHS) if k > 0 else 1.0)
 
 
 STRATEGIES = tuple(_numbered(k, s) for k, s in enumerate(_FIRST + _ROUNDS * _ROUND))
@@ -109,7 +109,7 @@ _UNDAMPED = np.array([s.undamped for s in STRATEGIES], dtype=np.int64)
 _FEATURES = np.array([s.features for s in STRATEGIES], dtype=np.int64)
 _REPLACE_FEATURES = np.array([s.replace_features for s in STRATEGIES], dtype=np.int64)
 _OVERLAP = np.array([s.overlap for s in STRATEGIES], dtype=np.int64)
-_SHARE = np.array([s.share for s in STRATEGIES])
+_FRACTION = np.array([s.velocity_fraction for s in STRATEGIES])
 _KAPPA_GROWTH = np.array([s.growth for s in STRATEGIES])
 
 
@@ -131,7 +131,7 @@ def strategy(k: int) -> Strategy:
         _FEATURES[k],
         _REPLACE_FEATURES[k] != 0,
         _OVERLAP[k] != 0,
-        _SHARE[k],
+        _FRACTION[k],
         _KAPPA_GROWTH[k],
     )
 
@@ -242,8 +242,8 @@ def start_on_path(model: Model, data: Data, options: StepOptions, q: Vector, v: 
 
     At a fold the Newton matrix is all but singular, and its null vector, the last Newton step, leads to the other side.
     """
-    if s.start == Start.INCOMING or s.start == Start.SHARE:
-        placed = set_trial_velocity(model, data, options.h, q, v, s.share)
+    if s.start == Start.INCOMING or s.start == Start.FRACTION:
+        placed = set_trial_velocity(model, data, options.h, q, v, s.velocity_fraction)
     else:
         if s.start == Start.LAST_ITERATE:
             for d in range(v.shape[0]):

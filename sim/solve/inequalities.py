@@ -50,10 +50,10 @@ from sim.dynamics.joints.limits import (
     return_limits,
 )
 from sim.dynamics.loops.closure import keep_loops, move_loops
-from sim.model.columns import Bound
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import LawForm, NewtonTarget, StepOptions
+from sim.model.record_columns import Bound
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 
@@ -160,10 +160,10 @@ def apply_limits(model: Model, data: Data) -> None:
 
 
 @kernel
-def condense_inequalities(model: Model, data: Data, h: float, kappa: float, share: float, form: int) -> None:
+def condense_inequalities(model: Model, data: Data, h: float, kappa: float, indefinite: float, form: int) -> None:
     """A += contacts, joint_block += limits: their slacks and impulses eliminated.  See `condense_contacts`."""
-    condense_contacts(model, data, h, kappa, share, form, data.A)
-    condense_pairs(model, data, h, kappa, share, form)
+    condense_contacts(model, data, h, kappa, indefinite, form, data.A)
+    condense_pairs(model, data, h, kappa, indefinite, form)
     add_limit_blocks(model, data, h)
     add_dry_blocks(model, data, h)
 
@@ -188,10 +188,10 @@ def inequality_rhs(model: Model, data: Data, target: NewtonTarget) -> None:
 
 
 @kernel
-def recover_inequalities(model: Model, data: Data, h: float, share: float) -> None:
+def recover_inequalities(model: Model, data: Data, h: float, gap_fraction: float) -> None:
     """Steps of all cone variables from the twists and rates of the last solve."""
-    recover_contacts(model, data, share)
-    recover_limits(model, data, h, share)
+    recover_contacts(model, data, gap_fraction)
+    recover_limits(model, data, h, gap_fraction)
     recover_dry(model, data, h)
 
 

@@ -3,8 +3,8 @@
 Algorithm 1 of Howell et al. 2022 (Dojo), a primal-dual method with the predictor and corrector of Mehrotra:
 
     from a start on the central path of kappa0, until residual and products are within their tolerances:
-        linearise and eliminate the equations, contacts and limits condensed              direction.py
-        find the Newton direction: predictor, corrector, centring                         direction.py
+        linearise and eliminate the equations, contacts and limits condensed              newton_direction.py
+        find the Newton direction: predictor, corrector, centring                         newton_direction.py
         search along it, and put pairs that leave their cones back onto the path          step_length.py
 
 It differs in these points (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
@@ -33,7 +33,6 @@ from sim.model.model import Model
 from sim.model.options import FAILED, FeatureChoice, Guess, Outcome, StepOptions, Verdict
 from sim.model.slots import Slot
 from sim.solve.complementarity import products
-from sim.solve.direction import direction, linearize_step
 from sim.solve.energy_balance import step_gained
 from sim.solve.globalization import (
     ATTEMPTS,
@@ -47,6 +46,7 @@ from sim.solve.globalization import (
 )
 from sim.solve.inequalities import choose_inequalities, inequalities_activated
 from sim.solve.merit import Merit, follow, is_near, judge, residuals
+from sim.solve.newton_direction import direction, linearize_step
 from sim.solve.residual import absorb_residual, residual_scale, rounding
 from sim.solve.step_length import search
 from solvers.compiler import inlined, kernel, optional
@@ -195,7 +195,7 @@ def solve_active(
     gained = False
     for k in range(0 if known.found else 1, ATTEMPTS):
         s = strategy(k)
-        if gained and s.start != Start.SHARE:  # beyond folds there are more solutions that gain energy
+        if gained and s.start != Start.FRACTION:  # beyond folds there are more solutions that gain energy
             continue
         data.overlap_allowed[0] = 1 if s.overlap else 0
         out, verdict = attempt(model, data, options, inputs, s, out.iterations, known)

@@ -7,12 +7,12 @@ from sim.dynamics.elimination import solve
 from sim.dynamics.loops.closure import apply_loops, keep_loops, move_loops
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling
 from sim.dynamics.momentum_balance import momentum_balance
-from sim.model.columns import CoupleRank
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FAILED, Guess, Outcome, StepOptions
+from sim.model.record_columns import CoupleRank
 from sim.model.slots import Slot
-from sim.solve.matrix import factor_free
+from sim.solve.newton_matrix import factor_free
 from sim.solve.residual import absorb_residual, balance_to_wrench, norm, project_wrench, residual_scale, rounding
 from solvers.compiler import inlined, kernel, optional
 from solvers.status import Status

@@ -14,15 +14,15 @@ from sim.contact.active_contacts import has_pyramids
 from sim.contact.contact_law import law_of
 from sim.contact.ground_contact import contact_jacobian, contact_rate
 from sim.dynamics.elimination import solve
-from sim.model.columns import Bound, Cone, Kin
 from sim.model.data import Data
 from sim.model.model import Law, Model
 from sim.model.options import StepOptions
+from sim.model.record_columns import Bound, Cone, Kin
 from sim.model.slots import Slot
 from sim.solve.delassus import delassus
 from sim.solve.inequalities import resume_inequalities
-from sim.solve.matrix import factor_free
 from sim.solve.merit import residuals
+from sim.solve.newton_matrix import factor_free
 from sim.solve.residual import residual_scale
 from sim.solve.trial_velocity import INFEASIBLE, set_trial_velocity
 from solvers.compiler import kernel, optional

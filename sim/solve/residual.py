@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sim.dynamics.elimination import project, subtree_sums
-from sim.dynamics.joints.terms import joint_impulses
+from sim.dynamics.joints.joint_forces import joint_impulses
 from sim.dynamics.loops.gears import apply_gears
 from sim.model.data import Data
 from sim.model.model import Model

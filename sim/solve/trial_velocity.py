@@ -15,16 +15,16 @@ INFEASIBLE = (1e300, 1e300)  # residuals where no trial velocity is feasible
 
 
 @kernel
-def set_trial_velocity(model: Model, data: Data, h: float, q: Vector, v: Vector, share: float) -> bool:
-    """nu = share v, slowed down until no body turns by half a turn; False if that fails."""
+def set_trial_velocity(model: Model, data: Data, h: float, q: Vector, v: Vector, fraction: float) -> bool:
+    """nu = fraction v, slowed down until no body turns by half a turn; False if that fails."""
     for _ in range(30):
         for d in range(v.shape[0]):
-            data.nu[d] = share * v[d]
+            data.nu[d] = fraction * v[d]
             data.nu_trial[d] = data.nu[d]
         if momentum_balance(model, data, h, q):
             turn_bodies(data, data.rot3)
             choose_pairs(model, data)
             inequality_kinematics(model, data, h)
             return True
-        share *= 0.7
+        fraction *= 0.7
     return False

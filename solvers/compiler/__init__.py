@@ -32,9 +32,9 @@ from solvers.compiler.kernels import (
     users_kernel,
     users_loop,
 )
-from solvers.compiler.notice import compiled
 from solvers.compiler.optional import link, optional
 from solvers.compiler.parallel import parallel_kernel, prange, threads
+from solvers.compiler.progress import compiled
 from solvers.compiler.records import Field, Part, Table, record, table
 
 __all__ = [

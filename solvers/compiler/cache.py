@@ -40,9 +40,9 @@ from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
-from solvers.compiler.notice import because
 from solvers.compiler.ownership import OTHERS, WORLD, foreign
 from solvers.compiler.pipeline import FAST, inner_result
+from solvers.compiler.progress import because
 from solvers.compiler.shipped import Shipped, open_shipped, write_shipped
 from solvers.compiler.signals import hold_while_translating, signals_held
 

@@ -22,7 +22,7 @@ from solvers.compiler.arithmetic import KernelTyping
 from solvers.compiler.inference import KernelInference
 from solvers.compiler.libraries import EntryLibrary, InnerLibrary, OptionalLibrary, SeldomLibrary
 from solvers.compiler.lowering import KernelLowering
-from solvers.compiler.notice import compiling
+from solvers.compiler.progress import compiling
 
 __all__ = ["EntryCompiler", "InnerCompiler", "OptionalCompiler", "SeldomCompiler"]
 

@@ -37,9 +37,9 @@ from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from solvers.compiler.helper import divided, serve
+from solvers.compiler.helper_process import divided, serve
 from solvers.compiler.kernels import entry, is_kept
-from solvers.compiler.notice import parts
+from solvers.compiler.progress import parts
 from solvers.compiler.records import RECORDS, load_word
 
 __all__ = ["OptionalKernel", "link", "optional", "optional_kernels"]
@@ -218,7 +218,7 @@ def link(table: NDArray[np.int64] | list[Callable[..., Any]], *kernels: Callable
 
     Args:
         table: (slots,) addresses; overwritten in place. A list collects the kernels instead: those of one call divide
-            the work of compilation among two processes (helper.py).
+            the work of compilation among two processes (helper_process.py).
         kernels: functions decorated by `optional`; and kernels that Python will call, which have no slot.
     """
     if isinstance(table, list):

@@ -16,8 +16,8 @@ import numba
 from numba.core.compiler import Compiler, CompileResult
 
 from solvers.compiler.index_typing import IndexTyping
-from solvers.compiler.notice import compiling
 from solvers.compiler.operators import OPERATORS, with_our_cases
+from solvers.compiler.progress import compiling
 
 __all__ = [
     "FAST",

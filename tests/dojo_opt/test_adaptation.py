@@ -5,7 +5,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.mpc.adaptation import ParameterEstimator
-from dojo_opt.mpc.ground import Ground
+from dojo_opt.mpc.ground_estimate import Ground
 from support.scenes import ball, block
 
 NAMES = ("mass:ball", "friction:*")

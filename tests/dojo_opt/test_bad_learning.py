@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
+from dojo_opt.learn.training_result import Learned
 from solvers.status import Status
 from support.refusals import check_refused
 

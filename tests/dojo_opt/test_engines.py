@@ -12,13 +12,13 @@ import pytest
 
 import dojo_opt as dojo
 from benchmarks.engines import Ours, PhysicsEngine, Run, installed
-from benchmarks.engines.ended import ended
+from benchmarks.engines.failed_runs import ended
 from benchmarks.studies import stability
 from benchmarks.studies.stability import StabilityStudy
 from benchmarks.studies.stability import joint_trials as joints
 from dojo_opt.report import Progress
 from dojo_opt.report.engine import nodes
-from support.killing import Killing
+from support.crashing_engine import Killing
 
 ENGINES = [Ours(rounds=1), *installed()]
 SECOND_ORDER = [e for e in ENGINES if e.name in ("dojo-opt", "MuJoCo RK4")]

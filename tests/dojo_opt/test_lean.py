@@ -12,10 +12,10 @@ from benchmarks.studies.lean.lean_scenes import MANY, absent, features, pendulum
 from benchmarks.studies.lean.new_process import new_process
 from dojo_opt import __main__ as cli
 from dojo_opt.report.command import report
-from dojo_opt.report.costs import costs
 from dojo_opt.report.lean import cold_starts, omitted_terms
 from dojo_opt.report.lean.cold_starts import ColdStart
-from dojo_opt.report.lean.variants import without
+from dojo_opt.report.lean.feature_variants import without
+from dojo_opt.report.step_cost import costs
 from dojo_opt.report.study import Progress, study
 
 

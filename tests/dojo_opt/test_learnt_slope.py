@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.mpc.ground import Ground
+from dojo_opt.mpc.ground_estimate import Ground
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.plant.ground_plane import GroundPlane
 from dojo_opt.plant.plant import Plant

@@ -13,7 +13,7 @@ from benchmarks.studies.mechanics import MechanicsStudy
 from benchmarks.studies.mechanics import joint_kinds as joints
 from benchmarks.studies.mechanics.mechanics_study import QUICK_CASES, QUICK_PAIRS
 from dojo_opt.report.study import Progress, study
-from sim.mechanism.parts import KINDS
+from sim.mechanism.joint import KINDS
 from sim.model.shape_kinds import OUT
 from support import collision_checks as collisions
 from support import parameter_errors as parameters

@@ -8,7 +8,7 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt.__main__ import main
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.mpc.moving import Onward
+from dojo_opt.mpc.moving_reference import Onward
 from dojo_opt.mpc.servo import ModelServo
 from dojo_opt.tasks.free_gait import Lead
 from dojo_opt.tasks.suite import servo_effort

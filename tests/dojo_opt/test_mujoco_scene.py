@@ -7,8 +7,11 @@ import pytest
 
 import dojo_opt as dojo
 from benchmarks.engines import mujoco_scene
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Input, Joint
 from sim.model.model import Model
 
 mujoco = pytest.importorskip("mujoco")

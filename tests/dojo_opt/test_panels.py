@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.plots.branches import branches
+from dojo_opt.plots.legs_over_time import branches
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import pytest
 
 import dojo_opt as dojo
 from benchmarks.engines.mujoco_ilqr import MujocoIlqr, MujocoSettings
-from benchmarks.studies.planning import PlanningStudy, families
+from benchmarks.studies.planning import PlanningStudy, setting_families
 from benchmarks.studies.planning import planners as measure
 from benchmarks.studies.planning import planning_cases as cases
 from benchmarks.studies.planning.planners import PlanOutcome
@@ -26,7 +26,7 @@ def test_a_plan_that_exploits_soft_contact_is_detected():
     problem = dojo.problems.block("up")
     soft = measure.ours(problem, stages=(Stage(1e-2, 1e-2),))
     assert soft.success and soft.violation <= 1e-3
-    assert soft.hard[1] > families.TRUE
+    assert soft.hard[1] > setting_families.TRUE
     true = measure.ours(problem)
     assert true.success and true.hard[1] < 1.1e-3 and true.hard[0] == pytest.approx(true.cost, rel=1e-3)
 
@@ -68,7 +68,7 @@ def test_scores_count_solved_true_and_good_plans():
     a, b = Setting("default", "default", {}), Setting("solver", "other", {})
     first = [outcome(1.0), outcome(2.0, success=False), outcome(5.0), outcome(0.1, replayed=np.nan)]
     second = [outcome(1.05, seconds=3.0), outcome(1.0), outcome(3.0), outcome(4.0, replayed=1.0)]
-    x, y = families.score("name", [None] * 4, [(a, first), (b, second)])
+    x, y = setting_families.score("name", [None] * 4, [(a, first), (b, second)])
     assert (x.solved, x.true, x.good) == (3, 2, 1)
     assert (y.solved, y.true, y.good) == (4, 3, 3)
     assert x.excess == pytest.approx(0.5 * (5.0 / 3.0 - 1.0))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.mpc.ground import Ground
+from dojo_opt.mpc.ground_estimate import Ground
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.plant.perturbation import Perturbation, Push
 from dojo_opt.plant.plant import Plant

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.mpc.horizon import shift_multipliers, tail
-from dojo_opt.mpc.moving import References, Sampled
+from dojo_opt.mpc.moving_reference import References, Sampled
 from dojo_opt.mpc.policy import Policy
+from dojo_opt.mpc.receding_horizon import shift_multipliers, tail
 from dojo_opt.plant.ground_plane import GroundPlane
 from support.standing_hopper import HOPPER, random_policy, standing_problem
 

@@ -10,7 +10,7 @@ from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.footfall import Footfall
 from dojo_opt.gaits.legs import Legs
 from dojo_opt.gaits.references import _TROT, _offsets
-from sim.mechanism.parts import Contact
+from sim.mechanism.contact import Contact
 
 
 @pytest.fixture(scope="module")

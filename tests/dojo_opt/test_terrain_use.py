@@ -11,7 +11,7 @@ import dojo_opt as dojo
 from benchmarks.engines.bullet_scene import check
 from benchmarks.engines.mujoco_scene import mjcf
 from dojo_opt.gaits.feet import Feet
-from dojo_opt.mpc.ground import Ground
+from dojo_opt.mpc.ground_estimate import Ground
 from dojo_opt.plant.perturbation import Perturbation
 from support.hills import GRID, WAVES
 from support.scenes import ball

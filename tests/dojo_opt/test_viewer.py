@@ -19,8 +19,8 @@ from dojo_opt.viewer.page import page as page_of
 from dojo_opt.viewer.page import spacing
 from sim.io.meshes.shading import clustered, shaded
 from sim.io.meshes.triangles import TriangleMesh
-from sim.mechanism.brief import brief_table
 from sim.mechanism.shapes import rotation_matrix
+from sim.mechanism.short_repr import short_table
 
 # a browser process that is closed leaves sockets to the garbage collector
 pytestmark = [
@@ -302,7 +302,7 @@ def overlays_of(page):
 @pytest.mark.slow
 def test_names_are_text_in_notebooks_reports_and_figures(page, hostile_motion, tmp_path):
     name = NAMES[-1]
-    table = brief_table(name, (name, name), [(name, 1.0)])
+    table = short_table(name, (name, name), [(name, 1.0)])
     result = hostile_motion._repr_html_()
     assert "<iframe" in result
     body = f"<!DOCTYPE html><html><head><meta charset='utf-8'></head><body>{table}{result}</body></html>"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.mechanism.parts import KINDS
+from sim.mechanism.joint import KINDS
 from sim.simulator.simulator import Simulator
 from support.mechanisms import CASES, chain_with, random_state
 

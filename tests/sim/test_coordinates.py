@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from sim.dynamics.coordinates import maximal_states, minimal_states
 from sim.dynamics.coordinates_jacobian import maximal_jacobian_at, minimal_jacobian_at
-from sim.dynamics.state import integrate_states, state_differences
+from sim.dynamics.state_manifold import integrate_states, state_differences
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import pack
 from sim.model.layout import allocate_data, sizes_of, table
-from sim.simulator.link import link_poses
+from sim.simulator.link_kernels import link_poses
 from support.mechanisms import CASES, chain_with, random_state
 from support.records import arrays_of
 

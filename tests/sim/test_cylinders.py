@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.contact.collision.cylinders import separation_of_cylinder
+from sim.contact.collision.cylinder_contacts import separation_of_cylinder
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Box, Capsule, Cylinder
 from sim.model.shape_kinds import OUT
 from support.collision_checks import chosen, contact, derivative_error, nearest, turn
-from support.encounters import ALL, ROCK, SHAPES, approaching, two
 from support.free_collision import check_motion
 from support.jacobians import check_step
 from support.solids import distance, random_case
+from support.two_bodies import ALL, ROCK, SHAPES, approaching, two
 
 OTHERS = {"capsule": SHAPES["capsule"], "box": SHAPES["box"], "rock": ROCK, "cylinder": Cylinder(0.25, 0.3)}
 PAIRS = ["capsule_cylinder", "box_cylinder", "polytope_cylinder", "cylinder_cylinder"]

@@ -13,7 +13,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import pack
 from sim.mechanism.shapes import rotation_matrix
 from sim.model.layout import allocate_data, sizes_of, table
-from sim.simulator.link import link_poses
+from sim.simulator.link_kernels import link_poses
 from support.mechanisms import CASES, chain_with, random_state
 from support.records import arrays_of
 

@@ -6,7 +6,7 @@ from naive import rotation as rot
 
 import dojo_opt as dojo
 from sim.model.layout import data_view, model_view
-from sim.simulator.link import link_step
+from sim.simulator.link_kernels import link_step
 from sim.solve.energy_balance import arriving_energy, constraint_work, work_at_node
 from solvers.compiler import local_kernel
 from support.benchmark import loaded

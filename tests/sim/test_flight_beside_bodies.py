@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from support.encounters import two
+from support.two_bodies import two
 
 H = 0.02
 BOX = dojo.Box(0.3, 0.2, 0.25)

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from sim.mechanism.body import Body
 from sim.mechanism.gear import Gear
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Box
 from support.jacobians import check_step
 from support.linkage import fourbar

@@ -14,10 +14,10 @@ import pytest
 
 import dojo_opt as dojo
 from sim.mechanism.shapes import String
-from support.case import kind_of
-from support.encounters import SHAPES, approaching, two
 from support.jacobians import check_step, five_point
+from support.parameter_case import kind_of
 from support.scenes import block
+from support.two_bodies import SHAPES, approaching, two
 
 FREE = dojo.Joint("floating", None, "b")
 

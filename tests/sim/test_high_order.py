@@ -13,8 +13,8 @@ import pytest
 
 import dojo_opt as dojo
 from sim.integrators.tableau import stable
-from support.branches import ORDERS, apart, branch, end
 from support.mechanisms import random_state
+from support.smooth_mechanisms import ORDERS, apart, branch, end
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from support.branches import branch
 from support.mechanisms import random_state
+from support.smooth_mechanisms import branch
 
 
 @pytest.mark.parametrize(

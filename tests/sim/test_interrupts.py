@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.model import pace
+from sim.model import interruptible_loops
 from support.interrupts import heard_in
 
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), 0.02)
@@ -177,8 +177,8 @@ def test_pieces_change_no_bit(sim: Any, monkeypatch: pytest.MonkeyPatch) -> None
         return [t.x, t.contacts.impulse, t.iterations, b.x, b.knot, c.x, *(a for k in lines for a in (k.A, k.B)), *rest]
 
     whole = results()
-    monkeypatch.setattr(pace, "PAUSE", 3e-5)  # a few steps
-    monkeypatch.setattr(pace, "_ROWS", 1)
+    monkeypatch.setattr(interruptible_loops, "PAUSE", 3e-5)  # a few steps
+    monkeypatch.setattr(interruptible_loops, "_ROWS", 1)
     for found, expected in zip(results(), whole, strict=True):
         np.testing.assert_array_equal(found, expected)
 
@@ -195,7 +195,7 @@ LATE = {  # calls of a few pieces, each of which begins after its deadline
 @pytest.fixture
 def begun(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The pieces that were begun, at most a thousand."""
-    found, real = [], pace._pieces
+    found, real = [], interruptible_loops._pieces
 
     def counted(settings: Any) -> Any:
         for piece in real(settings):
@@ -203,7 +203,7 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[int]:
             assert len(found) < 1000, "no progress"
             yield piece
 
-    monkeypatch.setattr(pace, "_pieces", counted)
+    monkeypatch.setattr(interruptible_loops, "_pieces", counted)
     return found
 
 
@@ -211,7 +211,7 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def test_a_piece_that_begins_after_its_deadline_makes_progress(
     name: str, begun: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pace, "PAUSE", -1.0)
+    monkeypatch.setattr(interruptible_loops, "PAUSE", -1.0)
     LATE[name]()
     assert len(begun) > 1
 
@@ -221,7 +221,7 @@ def test_knots_that_cannot_be_solved_go_back_to_python(
     steps: int, begun: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sim = HOPPER.replace(max_iterations=1, divide=False)
-    monkeypatch.setattr(pace, "PAUSE", 0.0)
+    monkeypatch.setattr(interruptible_loops, "PAUSE", 0.0)
     knots = sim.linearize_trajectory(*standing(sim, steps))
     assert (knots.status == dojo.Status.MAX_ITERATIONS).all()
     assert len(begun) > 1
@@ -240,6 +240,6 @@ def test_a_robot_at_rest_whose_steps_take_no_iterations_goes_back_to_python(
 ) -> None:
     sim = dojo.Simulator(dojo.models.pendulum(), 0.01)
     assert sim.step(sim.neutral()).iterations == 0
-    monkeypatch.setattr(pace, "PAUSE", 0.0)
+    monkeypatch.setattr(interruptible_loops, "PAUSE", 0.0)
     assert RESTS[name](sim).success
     assert len(begun) > 10

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from support.case import Case
 from support.jacobians import check_jacobian
+from support.parameter_case import Case
 from support.parameter_errors import error
 from support.scenes import pendulum, slider
 

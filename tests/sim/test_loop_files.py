@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.mechanism.parts import KINDS
+from sim.mechanism.joint import KINDS
 from sim.mechanism.pose import roll_pitch_yaw
 from support.linkage import fourbar
 from support.urdf_files import SKEWED, inertial, joint, link, write

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Joint
 from sim.mechanism.shapes import Sphere, rotation_matrix
 from support.jacobians import check_step
 from support.linkage import COUPLER, CRANK, ROCKER, bar, fourbar

@@ -7,8 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import dojo_opt as dojo
+from sim.mechanism.body import Body
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Joint
 from support.linkage import plain_fourbar as fourbar
 from support.linkage import worst_gap
 

@@ -10,9 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.mechanism.axes import contact_frame, translation_axes
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
+from sim.mechanism.joint import KINDS, Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes, pack
-from sim.mechanism.parts import KINDS, Body, Contact, Input, Joint
 from sim.model.model import InputKind, Law
 from support.mechanisms import BALL, CASES, INF, chain_with, hip, two
 

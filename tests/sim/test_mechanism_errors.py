@@ -7,8 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Input, Joint
 from sim.mechanism.shapes import Box
 from support.mechanisms import BALL, INF, hip, two
 

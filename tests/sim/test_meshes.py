@@ -10,9 +10,9 @@ from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
 
 import dojo_opt as dojo
-from sim.io.meshes.fit import fit
-from sim.io.meshes.hull import CORNERS, distances, reduced_hull
+from sim.io.meshes.fitted_shapes import fit
 from sim.io.meshes.paths import find_mesh
+from sim.io.meshes.reduced_hull import CORNERS, distances, reduced_hull
 from sim.io.meshes.triangles import read_mesh
 from support.urdf_files import collision, inertial, link, write
 

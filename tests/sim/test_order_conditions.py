@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim.integrators.tableau import tableau
-from support.branches import ORDERS
+from support.smooth_mechanisms import ORDERS
 
 
 def trees(size: int) -> list[tuple]:

@@ -8,9 +8,10 @@ import pytest
 import dojo_opt as dojo
 from sim.contact.pairs.pair_contact import tangents
 from sim.contact.pairs.pair_jacobian import frame_turn
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Joint
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import Box
 

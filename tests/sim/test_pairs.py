@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
+from sim.mechanism.contact import Contact
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Joint
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import Box, Cylinder, HalfSpace, Sphere, String
-from support.encounters import SHAPES, approaching, two
 from support.towers import tower
+from support.two_bodies import SHAPES, approaching, two
 
 
 def touching(sim: dojo.Simulator, seed: int) -> np.ndarray:

@@ -9,9 +9,9 @@ import pytest
 
 import dojo_opt as dojo
 from sim.derivatives.parameters.parameters import KINDS
-from support.case import Case
 from support.coupled_scenes import COUPLED, kinds
 from support.jacobians import check_jacobian, check_step
+from support.parameter_case import Case
 from support.parameter_errors import error
 from support.situations import CASES
 

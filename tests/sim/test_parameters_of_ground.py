@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from support.case import Case
 from support.couplings import geared
 from support.hills import GRID, WAVES
 from support.jacobians import check_jacobian
+from support.parameter_case import Case
 from support.parameter_errors import error
 from support.scenes import run
 from support.situations import HILLS, falling

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Joint
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import Box
-from support.encounters import ROCK, SHAPES, approaching, two
 from support.free_collision import check_motion
 from support.jacobians import check_step
+from support.two_bodies import ROCK, SHAPES, approaching, two
 
 OTHERS = {**SHAPES, "polytope": Polytope.about_centroid([[0.3, 0, 0], [-0.3, 0.2, 0], [-0.1, -0.3, 0], [0, 0, 0.4]])}
 

@@ -7,7 +7,7 @@ import dojo_opt as dojo
 from sim.contact.ground_contact import add_contact_wrench, contact_rate
 from sim.dynamics.elimination import solve, subtree_sums
 from sim.model.layout import data_view, model_view
-from sim.simulator.link import link_step
+from sim.simulator.link_kernels import link_step
 from sim.solve.delassus import delassus
 from solvers.compiler import local_kernel
 

@@ -12,8 +12,11 @@ from naive.lagrangian import arriving_momentum, leaving_momentum
 
 import dojo_opt as dojo
 from dojo_opt import models
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Input, Joint
 from sim.mechanism.shapes import Box, Sphere
 from support.linkage import fourbar
 

@@ -9,8 +9,8 @@ from dojo_opt import models
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
-from support.encounters import SHAPES, approaching, two
 from support.scenes import block
+from support.two_bodies import SHAPES, approaching, two
 
 PENDULUM = Simulator(models.double_pendulum(), time_step=0.01)
 

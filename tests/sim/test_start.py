@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from dojo_opt import models
+from sim.mechanism.body import Body
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Joint
 from sim.simulator.results import SimulationError
 from sim.simulator.simulator import Simulator
 from solvers.status import Status

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import String
-from support.case import Case
 from support.jacobians import check_step
+from support.parameter_case import Case
 from support.parameter_errors import error
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.mechanism import parts
+from sim.mechanism.forward_kinematics import body_poses
+from sim.mechanism.joint import KINDS as JOINT_KINDS
 from sim.mechanism.pose import Pose, quaternion, roll_pitch_yaw, turn
-from sim.mechanism.poses import poses
 from sim.mechanism.shapes import rotation_matrix
 from support.urdf_files import AXIS, BALL, SKEWED, arm, inertial, joint, link, write
 
@@ -39,7 +39,7 @@ KINDS = {  # type in the file: (kind, nq, nv)
 
 
 def test_no_kind_of_joint_is_without_a_type() -> None:
-    assert {"fixed", "screw"} | {kind for kind, *_ in KINDS.values()} == set(parts.KINDS)
+    assert {"fixed", "screw"} | {kind for kind, *_ in KINDS.values()} == set(JOINT_KINDS)
 
 
 def test_a_screw_is_refused(tmp_path: Path) -> None:
@@ -76,7 +76,7 @@ def test_every_kind_of_joint(tmp_path: Path, given: str) -> None:
     kind, nq, nv = KINDS[given]
     elbow = mech.joints[0]
     assert (elbow.kind, elbow.nq, elbow.nv, elbow.parent, mech.name) == (kind, nq, nv, "world", "robot")
-    at_zero = poses(mech.joints, np.array(mech.neutral))["forearm"]
+    at_zero = body_poses(mech.joints, np.array(mech.neutral))["forearm"]
     np.testing.assert_allclose(at_zero.rotation, roll_pitch_yaw((0.3, -0.4, 0.5)), atol=1e-15)
     np.testing.assert_allclose(at_zero.point, (0.1, -0.2, 0.3), atol=1e-15)
 
@@ -88,7 +88,7 @@ def test_a_joint_moves_along_its_axis(tmp_path: Path) -> None:
         mech = dojo.load_urdf(arm(tmp_path, kind=kind, inside=inside), floating=False)
         frame = Pose(roll_pitch_yaw((0.3, -0.4, 0.5)), np.array([0.1, -0.2, 0.3]))
         moved = Pose(turn(axis, 0.7), np.zeros(3)) if kind == "revolute" else Pose(np.eye(3), 0.7 * axis)
-        expected, found = frame.then(moved), poses(mech.joints, np.array([0.7]))["forearm"]
+        expected, found = frame.then(moved), body_poses(mech.joints, np.array([0.7]))["forearm"]
         np.testing.assert_allclose(found.rotation, expected.rotation, atol=1e-15)
         np.testing.assert_allclose(found.point, expected.point, atol=1e-15)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.mechanism.poses import poses
+from sim.mechanism.forward_kinematics import body_poses
 from support.urdf_files import AXIS, BALL, arm, inertial, joint, link, write
 
 
@@ -16,7 +16,7 @@ def test_a_fixed_base_stands_where_it_is_put(tmp_path: Path) -> None:
     for merge in (True, False):
         mech = dojo.load_urdf(arm(tmp_path), floating=False, merge_fixed=merge, position=(1.0, 2.0, 3.0))
         assert mech.nv == 1
-        np.testing.assert_allclose(poses(mech.joints, np.zeros(1))["forearm"].point, (1.1, 1.8, 3.3), atol=1e-15)
+        np.testing.assert_allclose(body_poses(mech.joints, np.zeros(1))["forearm"].point, (1.1, 1.8, 3.3), atol=1e-15)
         assert mech.joint_names == (("elbow",) if merge else ("fixed_base", "elbow"))
 
 
@@ -75,4 +75,4 @@ def test_a_base_that_floats_in_the_file_is_put_on_the_ground_too(tmp_path: Path)
     )
     mech = dojo.load_urdf(path)
     assert mech.joint_names == ("free",)
-    np.testing.assert_allclose(poses(mech.joints, np.array(mech.neutral))["base"].point, (0, 0, 0.1), atol=1e-8)
+    np.testing.assert_allclose(body_poses(mech.joints, np.array(mech.neutral))["base"].point, (0, 0, 0.1), atol=1e-8)

@@ -9,8 +9,8 @@ import pytest
 
 import dojo_opt as dojo
 from sim.io.urdf.inertia import BALL_MASS, BALL_RADIUS, RigidInertia, combined, fault, repaired
+from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.pose import roll_pitch_yaw
-from sim.mechanism.poses import poses
 from sim.mechanism.shapes import rotation_matrix
 from support.urdf_files import branched, compare_with_mujoco, inertial, joint, link, write
 
@@ -57,7 +57,7 @@ def test_poses_agree_with_the_simulator(tmp_path: Path, rng: np.random.Generator
     )
     z = dojo.Simulator(mech, 0.01).maximal(np.concatenate([q, np.zeros(mech.nv)]))
     for name, row in zip(mech.body_names, z, strict=True):
-        pose = poses(mech.joints, q)[name]
+        pose = body_poses(mech.joints, q)[name]
         np.testing.assert_allclose(pose.point, row[:3], atol=1e-13)
         np.testing.assert_allclose(pose.rotation, rotation_matrix(row[6:10]), atol=1e-13)
 
@@ -94,7 +94,7 @@ def test_locked_joints_are_fixed_where_they_are(tmp_path: Path) -> None:
     q = np.zeros(free.nq)
     for name, value in (("shoulder", 0.3), ("elbow", 0.4), ("rail", 0.2)):
         q[free.q_slice(name)] = value
-    there, here = poses(free.joints, q), poses(held.joints, np.array([0.3]))
+    there, here = body_poses(free.joints, q), body_poses(held.joints, np.array([0.3]))
     for name in ("upper", "lower", "tool", "slider"):
         a, b = free.report.links[name], held.report.links[name]
         np.testing.assert_allclose(here[b.body].at(b.point), there[a.body].at(a.point), atol=1e-14)

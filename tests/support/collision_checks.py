@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.contact.collision.cylinders import choose_on_cylinder, collide_with_cylinder
+from sim.contact.collision.cylinder_contacts import choose_on_cylinder, collide_with_cylinder
 from sim.contact.collision.edge_axes import OPEN
 from sim.model.shape_kinds import OUT, Pair, Shape
 from support.collide import arrange, choose, collide_chosen

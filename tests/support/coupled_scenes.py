@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from sim.mechanism.body import Body
 from sim.mechanism.gear import Gear
-from sim.mechanism.parts import Body, Joint
+from sim.mechanism.joint import Joint
 from sim.simulator.simulator import Simulator
-from support.case import Case
 from support.couplings import started
 from support.linkage import fourbar
+from support.parameter_case import Case
 from support.situations import CASES
 
 # other values of these and the four-bar is no planar linkage of rods, and cannot close

@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
+from sim.mechanism.contact import Contact
 from sim.mechanism.gear import Gear
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Joint
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import Box, HalfSpace, Solid, Sphere, String
 from sim.simulator.simulator import Simulator
-from support.case import Case, turned
+from support.parameter_case import Case, turned
 
 Floats = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from sim.model import pace
+from sim.model import interruptible_loops
 
 LONGER = 4  # as many steps are tried where a call ends before its signal comes: machines differ
 TRIES = 3  # a call that does not listen fails in each of them, a busy machine does not
@@ -33,17 +33,17 @@ class Heard(NamedTuple):
 @contextmanager
 def at_first_piece(start: Callable[[], None]) -> Iterator[None]:
     """Call `start` when the loop over steps begins, whatever time its arguments took before."""
-    before = pace._pieces
+    before = interruptible_loops._pieces
 
     def begun(settings: Any) -> Iterator[None]:
         start()
         yield from before(settings)
 
-    pace._pieces = begun
+    interruptible_loops._pieces = begun
     try:
         yield
     finally:
-        pace._pieces = before
+        interruptible_loops._pieces = before
 
 
 def interrupt(call: Callable[[], Any], after: float, *, in_loop: bool = False) -> Heard:

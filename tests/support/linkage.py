@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
+from sim.mechanism.body import Body
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Input, Joint
 from sim.mechanism.shapes import Box
 
 Y = (0.0, 1.0, 0.0)

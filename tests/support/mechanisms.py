@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.joint import KINDS, Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import KINDS, Body, Contact, Joint
 from sim.mechanism.shapes import Sphere
 
 Floats = NDArray[np.float64]

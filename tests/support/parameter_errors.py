@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from support.case import Case, kind_of
+from support.parameter_case import Case, kind_of
 from support.situations import CASES
 
 Floats = NDArray[np.float64]

@@ -9,15 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.dynamics.bodies import rotated
+from sim.dynamics.maximal_energy import rotated
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
+from sim.mechanism.joint import KINDS as JOINTS
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import KINDS as JOINTS
-from sim.mechanism.parts import Body, Contact, Input, Joint
 from sim.mechanism.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Sphere, String
 from sim.mechanism.terrain import Terrain
 from sim.simulator.simulator import Simulator
-from support.case import Case, turned
 from support.couplings import STONE, colliding, geared, loop, touching
+from support.parameter_case import Case, turned
 
 Floats = NDArray[np.float64]
 

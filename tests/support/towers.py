@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import HalfSpace, Shape
 
 EDGE = 0.2  # [m] height of every body

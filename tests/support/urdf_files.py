@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
-from sim.mechanism.poses import poses
+from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.shapes import rotation_matrix
 
 BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
@@ -125,7 +125,7 @@ def compare_with_mujoco(path: Path, rng: np.random.Generator, states: int = 3) -
             a, d = model.jnt_qposadr[k], model.jnt_dofadr[k]
             data.qpos[a : a + j.nq], data.qvel[d : d + j.nv] = q[at], v[dof]
         mujoco.mj_forward(model, data)
-        ours = poses(mech.joints, q)
+        ours = body_poses(mech.joints, q)
         for name, frame in mech.report.links.items():
             if name not in bodies or frame.body is None:
                 continue

@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.engines import PhysicsEngine, installed
 from benchmarks.studies.accuracy import accuracy_scenes as scenes
 from benchmarks.studies.accuracy import robot_settings as robots
-from benchmarks.studies.accuracy.damped import dampers
+from benchmarks.studies.accuracy.damped_motions import dampers
 from dojo_opt.report.accuracy import RobotAccuracy
 from dojo_opt.report.accuracy import error_curves as curves
 from dojo_opt.report.accuracy import error_figure as drawing

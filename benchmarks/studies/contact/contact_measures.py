@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from benchmarks.engines import PhysicsEngine, Run
 from benchmarks.studies.contact import contact_scenes as scenes
 from benchmarks.studies.contact.contact_scenes import Scene
-from dojo_opt.report.gauge import complete, gaps, penetration
+from dojo_opt.report.run_measures import complete, gaps, penetration
 
 Floats = NDArray[np.float64]
 Numbers = dict[str, float]

@@ -16,9 +16,12 @@ from numpy.typing import NDArray
 
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.report.result import Cell, Row, Table
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Input, Joint
 from sim.mechanism.shapes import Box, Sphere
 from sim.simulator.simulator import Simulator
 

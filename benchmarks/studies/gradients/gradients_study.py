@@ -13,10 +13,10 @@ from benchmarks.engines import PhysicsEngine, installed
 from benchmarks.studies.gradients import drake_motion, drake_step, peer_steps, sliding, smoothing, touchdown
 from benchmarks.studies.gradients.gradients_figure import draw
 from benchmarks.studies.gradients.gradients_tables import motion_table, resting_table, smoothing_table
-from dojo_opt.report.clock import slope
 from dojo_opt.report.gradients import RobotGradients
 from dojo_opt.report.gradients.resting import ALLOWED, STEPS, resting_kappa
 from dojo_opt.report.gradients.robot_gradients import EXACT, add_steps
+from dojo_opt.report.interleaved_rounds import slope
 from dojo_opt.report.result import Report, Row
 from dojo_opt.report.study import Progress
 from sim.mechanism.mechanism import Mechanism

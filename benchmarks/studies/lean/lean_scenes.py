@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 from dojo_opt.models import pendulum
-from dojo_opt.report.costs import CostScene
-from dojo_opt.report.lean.variants import with_contacts, with_joints
+from dojo_opt.report.lean.feature_variants import with_contacts, with_joints
+from dojo_opt.report.step_cost import CostScene
+from sim.mechanism.contact import Contact
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Contact
 from sim.simulator.simulator import Simulator
 
 MANY = 100  # contacts at once

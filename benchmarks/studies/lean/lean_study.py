@@ -23,11 +23,11 @@ from benchmarks.studies.lean.lean_scenes import (
     pendulum_scene,
 )
 from benchmarks.studies.lean.new_process import HEAVY, new_process
-from dojo_opt.report.clock import ratio
-from dojo_opt.report.costs import COST_HEADER, cost_row, costs, median_us, raw_cost
+from dojo_opt.report.interleaved_rounds import ratio
 from dojo_opt.report.lean import OmittedTerms
 from dojo_opt.report.lean.cold_starts import add_cold_starts
 from dojo_opt.report.result import Cell, Report, Row, Table
+from dojo_opt.report.step_cost import COST_HEADER, cost_row, costs, median_us, raw_cost
 from dojo_opt.report.study import Progress
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.omitted_contacts import reach

@@ -17,8 +17,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.mechanism.body import Body
+from sim.mechanism.input import Input
+from sim.mechanism.joint import KINDS, Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import KINDS, Body, Input, Joint
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from benchmarks.studies.mechanics.mechanics_figure import margins
 from dojo_opt.report.result import Report, Row, Table
 from dojo_opt.report.study import Progress
 from sim.derivatives.parameters.parameters import KINDS as PARAMETERS
-from sim.mechanism.parts import KINDS
+from sim.mechanism.joint import KINDS
 from support import collision_checks as collisions
 from support import parameter_errors as parameters
 from support.situations import CASES

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.studies.planning.families import Score
 from benchmarks.studies.planning.planners import PlanOutcome
 from benchmarks.studies.planning.planning_cases import NAMES
+from benchmarks.studies.planning.setting_families import Score
 
 _CLOSED = 1e-6  # gap up to which a trajectory has a cost
 _LEAST = 1e-7  # violations are drawn from here

@@ -7,8 +7,8 @@ from importlib.util import find_spec
 from typing import Any
 
 from benchmarks.engines.mujoco_ilqr import MujocoSettings
-from benchmarks.studies.planning import families
 from benchmarks.studies.planning import planning_cases as cases
+from benchmarks.studies.planning import setting_families
 from benchmarks.studies.planning.planners import HARD, REFINE, PlanOutcome, ours, peer
 from benchmarks.studies.planning.planning_figure import draw
 from dojo_opt.report.result import Cell, Report, Row, Table
@@ -93,19 +93,19 @@ class PlanningStudy:
         report.details["peers"] = {name: _numbers(plan) for name, plan in rows.items()}
         return found
 
-    def _settings(self, report: Report, progress: Progress) -> dict[str, list[families.Score]]:
+    def _settings(self, report: Report, progress: Progress) -> dict[str, list[setting_families.Score]]:
         """Every setting on variants of every problem."""
-        scores: dict[str, list[families.Score]] = {}
+        scores: dict[str, list[setting_families.Score]] = {}
         report.details["settings"] = {}
         for name in cases.NAMES if self.quick else cases.FAMILIES:
             problems = cases.family(name, quick=self.quick)
             outcomes = [
-                (setting, families.run(problems, setting))
+                (setting, setting_families.run(problems, setting))
                 for setting in progress(
                     [(s.name, s) for s in cases.settings(quick=self.quick)], f"planning, settings on {name}"
                 )
             ]
-            scores[name] = families.score(name, problems, outcomes)
+            scores[name] = setting_families.score(name, problems, outcomes)
             report.tables.append(_scores_table(name, scores[name]))
             report.details["settings"][name] = {
                 f"{s.group}: {s.name}": [_numbers(o, history=False) for o in found] for s, found in outcomes
@@ -152,14 +152,16 @@ def _plans_table(title: str, plans: dict[str, PlanOutcome]) -> Table:
     return Table(title, header, rows, note)
 
 
-def _scores_table(name: str, scores: list[families.Score]) -> Table:
+def _scores_table(name: str, scores: list[setting_families.Score]) -> Table:
     rows: list[list[Cell]] = [
         [f"{s.setting.group}: {s.setting.name}", s.solved, s.true, s.good, s.iterations, s.excess, 1e3 * s.seconds]
         for s in scores
     ]
     header = ("", "solved", "true", "good", "iterations", "excess cost", "ms")
-    note = f"of {scores[0].variants}. True: violation <= {families.TRUE:g} when replayed on hard contact; good: within "
-    note += f"{100 * (families.GOOD - 1):.0f} % of the best true plan of any setting, both "
+    note = (
+        f"of {scores[0].variants}. True: violation <= {setting_families.TRUE:g} when replayed on hard contact; good: "
+    )
+    note += f"within {100 * (setting_families.GOOD - 1):.0f} % of the best true plan of any setting, both "
     note += "by the cost of the replay. Medians; 100 iterations at most."
     return Table(f"Settings of the planner: {name}", header, rows, note)
 

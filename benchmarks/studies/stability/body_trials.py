@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dojo_opt.report.stability import measures
 from dojo_opt.report.stability.trial import StabilityTrial
+from sim.mechanism.body import Body
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Joint
 
 Three = tuple[float, float, float]
 

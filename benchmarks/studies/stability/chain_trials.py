@@ -9,8 +9,10 @@ import numpy as np
 
 from dojo_opt.report.stability import measures
 from dojo_opt.report.stability.trial import StabilityTrial
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Joint
 
 G = 9.81  # [m/s^2]
 WHY = "tension acts along the links at the start of a step, which limits h to 2/omega, omega = 2 sqrt(tension / (m l))"

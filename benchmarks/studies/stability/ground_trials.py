@@ -11,8 +11,10 @@ from dojo_opt.models.quadruped import quadruped
 from dojo_opt.models.sphere import sphere
 from dojo_opt.report.stability import measures
 from dojo_opt.report.stability.trial import StabilityTrial
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Joint
 
 G = 9.81  # [m/s^2]
 TILTED = (0.8, 0.36, 0.48, 0.0)

@@ -7,8 +7,10 @@ import numpy as np
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.report.stability import measures
 from dojo_opt.report.stability.trial import StabilityTrial
+from sim.mechanism.body import Body
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Input, Joint
 
 
 def slider(*, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0), **joint: object) -> Mechanism:

@@ -18,7 +18,7 @@ from benchmarks.engines.crocoddyl_trot import CrocoddylTrot
 from benchmarks.engines.mujoco_ilqr import MujocoIlqr
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.tick import milliseconds
-from dojo_opt.report.clock import interleave
+from dojo_opt.report.interleaved_rounds import interleave
 from dojo_opt.report.result import Cell, Report, Row, Table
 
 CROCODDYL, PIN = "3.2.1", "4.0.0"  # compatible wheels: with other versions crocoddyl ends the process

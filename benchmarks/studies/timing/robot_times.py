@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.engines import mujoco_scene
 from benchmarks.engines.mujoco_warnings import quiet
 from dojo_opt import models
-from dojo_opt.report.clock import interleave, ratio
+from dojo_opt.report.interleaved_rounds import interleave, ratio
 from dojo_opt.report.result import Report, Row
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator

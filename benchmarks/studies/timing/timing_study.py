@@ -24,7 +24,7 @@ from benchmarks.engines import mujoco_scene
 from benchmarks.studies.timing.planning_time import add_planning
 from benchmarks.studies.timing.robot_times import add_robots
 from dojo_opt.gaits.equilibrium import equilibrium
-from dojo_opt.report.clock import interleave, ratio, slope
+from dojo_opt.report.interleaved_rounds import interleave, ratio, slope
 from dojo_opt.report.result import Report, Row
 from dojo_opt.report.study import Progress
 from sim.simulator.simulator import Simulator

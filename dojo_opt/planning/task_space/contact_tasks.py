@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.planning.names import chosen_inputs, input_weight
+from dojo_opt.planning.component_names import chosen_inputs, input_weight
 from dojo_opt.planning.task_space.body_tasks import needs_order_two
 from dojo_opt.planning.task_space.input_changes import InputChanges
 from dojo_opt.planning.task_space.quantity import (
@@ -24,10 +24,10 @@ from dojo_opt.planning.task_space.task_spec import TaskSpec, bounds
 from dojo_opt.planning.task_space.task_term import Entries
 from dojo_opt.planning.term import Spec, Term, knot_list, table
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
 from sim.mechanism.collision import Collision
-from sim.mechanism.parts import WORLD
+from sim.mechanism.joint import WORLD
 from sim.mechanism.shapes import Solid
+from sim.mechanism.short_repr import short_repr
 from sim.model.shape_kinds import SWAPPED, Pair
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
@@ -222,7 +222,7 @@ class TorqueRate(Spec):
     knots: Any = None
     scale: float = 1.0
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         del layout

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.planning.term import Pick, PickTerm, Spec, Term, knot_list
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
 
 Integers = NDArray[np.int64]
@@ -35,7 +35,7 @@ class JointLimits(Spec):
     weight: float = 1.0
     knots: Any = None
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
         knots = knot_list("JointLimits(knots=...)", self.knots, horizon, last=True)

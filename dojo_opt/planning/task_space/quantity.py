@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.simulator.simulator import Simulator
-from sim.simulator.task_space.calls import Buffers, TaskSpace
+from sim.simulator.task_space.task_space import Buffers, TaskSpace
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

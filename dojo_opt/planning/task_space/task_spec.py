@@ -13,7 +13,7 @@ from dojo_opt.planning.task_space.quantity import Quantity
 from dojo_opt.planning.task_space.task_term import Entries, PeriodicTaskTerm, TaskTerm
 from dojo_opt.planning.term import Spec, Term, knot_list, numbers, table
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -48,7 +48,7 @@ class TaskSpec(Spec):
     scale: float = 1.0
     periodic: bool = False
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     _LAST = True  # whether the final knot has one
 

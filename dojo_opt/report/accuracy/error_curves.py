@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.report.accuracy.smooth_scene import SAMPLES, SmoothScene
+from dojo_opt.report.dojo_engine import Ours
 from dojo_opt.report.engine import PhysicsEngine, Run, observe
-from dojo_opt.report.ours import Ours
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]

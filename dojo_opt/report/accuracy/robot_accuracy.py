@@ -16,8 +16,8 @@ from dojo_opt.report.accuracy import smooth_scene as scenes
 from dojo_opt.report.accuracy.advice import hints, recommendation
 from dojo_opt.report.accuracy.setting_trial import DURATION, PIECE, PIECES, SettingTrial
 from dojo_opt.report.accuracy.starting_pose import start
+from dojo_opt.report.dojo_engine import Ours
 from dojo_opt.report.engine import PhysicsEngine
-from dojo_opt.report.ours import Ours
 from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.study import Progress
 from sim.mechanism.mechanism import Mechanism

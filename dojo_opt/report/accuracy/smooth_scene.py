@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.report.accuracy.reference import TreeReference
 from dojo_opt.report.engine import Run, observe
-from sim.dynamics.bodies import rotated
+from sim.dynamics.maximal_energy import rotated
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
 

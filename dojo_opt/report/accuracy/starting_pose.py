@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.dynamics.bodies import rotated
+from sim.dynamics.maximal_energy import rotated
 from sim.mechanism.mechanism import Mechanism
 from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator

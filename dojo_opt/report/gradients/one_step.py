@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.report.clock import interleave
 from dojo_opt.report.gradients.differences import Stepper, extrapolated, relative_error
+from dojo_opt.report.interleaved_rounds import interleave
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
 

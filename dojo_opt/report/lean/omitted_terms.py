@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dojo_opt.report.clock import ratio
-from dojo_opt.report.costs import COST_HEADER, Cost, CostScene, cost_row, costs, median_us, raw_cost
+from dojo_opt.report.interleaved_rounds import ratio
 from dojo_opt.report.lean.cold_starts import add_cold_starts
 from dojo_opt.report.lean.cost_figure import cost_figure
-from dojo_opt.report.lean.variants import robot_scene, without
+from dojo_opt.report.lean.feature_variants import robot_scene, without
 from dojo_opt.report.result import Report, Row, Table
+from dojo_opt.report.step_cost import COST_HEADER, Cost, CostScene, cost_row, costs, median_us, raw_cost
 from dojo_opt.report.study import Progress
 from sim.mechanism.mechanism import Mechanism
 from solvers.compiler import threads

@@ -7,8 +7,8 @@ from itertools import compress
 from math import isnan
 from typing import Any
 
+from dojo_opt.report.dojo_engine import Ours
 from dojo_opt.report.engine import PhysicsEngine
-from dojo_opt.report.ours import Ours
 from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.stability.trial import NOT_GIVEN, StabilityTrial, TrialVerdict
 from dojo_opt.report.stability.verdict_figure import picture

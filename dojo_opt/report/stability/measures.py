@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dojo_opt.report import gauge
+from dojo_opt.report import run_measures
 from dojo_opt.report.engine import Run
 from dojo_opt.report.stability.trial import Measure
 from sim.mechanism.mechanism import Mechanism
@@ -23,7 +23,7 @@ def energy_growth(scale: float) -> Measure:
     """Largest E - E0 over `scale` [J]: contacts, friction and dampers may only take."""
 
     def measure(_: Mechanism, run: Run) -> float:
-        return gauge.energy_change(run)[1] / scale
+        return run_measures.energy_change(run)[1] / scale
 
     return measure
 
@@ -35,19 +35,19 @@ def amplitude_error(_: Mechanism, run: Run) -> float:
 
 def angular_momentum(_: Mechanism, run: Run) -> float:
     """Largest change of the angular momentum, over its size."""
-    return gauge.momentum_drift(run)
+    return run_measures.momentum_drift(run)
 
 
 def penetration(mechanism: Mechanism, run: Run) -> float:
     """Deepest penetration [m]."""
-    return gauge.penetration(mechanism, run)
+    return run_measures.penetration(mechanism, run)
 
 
 def growth_and_penetration(energy: float, depth: float) -> Measure:
     """The larger of the growth of energy over `energy` [J] and the penetration over `depth` [m]."""
 
     def measure(mechanism: Mechanism, run: Run) -> float:
-        return max(gauge.penetration(mechanism, run) / depth, gauge.energy_change(run)[1] / energy)
+        return max(run_measures.penetration(mechanism, run) / depth, run_measures.energy_change(run)[1] / energy)
 
     return measure
 
@@ -55,14 +55,14 @@ def growth_and_penetration(energy: float, depth: float) -> Measure:
 def resting(mechanism: Mechanism, run: Run) -> float:
     """The larger of the penetration at any time, and of the motion of a body in the last tenth of the time [m]."""
     last = run.position[-max(2, len(run.time) // 10) :]
-    return max(gauge.penetration(mechanism, run), float(np.abs(last[-1] - last[0]).max()))
+    return max(run_measures.penetration(mechanism, run), float(np.abs(last[-1] - last[0]).max()))
 
 
 def standing_at(body: int, height: float) -> Measure:
     """Penetration, and the error of the height of a body at the end [m]."""
 
     def measure(mechanism: Mechanism, run: Run) -> float:
-        return max(gauge.penetration(mechanism, run), abs(float(run.position[-1, body, 2]) - height))
+        return max(run_measures.penetration(mechanism, run), abs(float(run.position[-1, body, 2]) - height))
 
     return measure
 
@@ -92,6 +92,6 @@ def late_penetration(after: float) -> Measure:
     """Deepest penetration [m] later than `after` [s]."""
 
     def measure(mechanism: Mechanism, run: Run) -> float:
-        return float(-gauge.gaps(mechanism, run)[run.time > after].min())
+        return float(-run_measures.gaps(mechanism, run)[run.time > after].min())
 
     return measure

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from numpy.typing import ArrayLike
 
 from dojo_opt.report.engine import PhysicsEngine, Run
-from dojo_opt.report.gauge import complete
+from dojo_opt.report.run_measures import complete
 from sim.mechanism.mechanism import Mechanism
 
 Measure = Callable[[Mechanism, Run], float]

@@ -8,8 +8,10 @@ from dojo_opt.cost import Effort, Tracking
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
 from dojo_opt.tasks.plan_task import PlanTask, continuation
+from sim.mechanism.body import Body
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Input, Joint
 from sim.simulator.simulator import Simulator
 
 __all__ = ["transport"]

@@ -8,14 +8,16 @@ import numpy as np
 
 from dojo_opt.cost import Effort
 from dojo_opt.mpc.controller import MPC
-from dojo_opt.mpc.moving import Sampled
+from dojo_opt.mpc.moving_reference import Sampled
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
-from dojo_opt.plant.loop import ClosedLoop
+from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.tasks.suite import SuiteTask, quadratic, timed
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Input, Joint
 from sim.mechanism.shapes import Sphere
 from sim.simulator.simulator import Simulator
 

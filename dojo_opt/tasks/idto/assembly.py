@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.mechanism.parts import Body, Joint
+from sim.mechanism.body import Body
+from sim.mechanism.joint import Joint
 
 Vector = NDArray[np.float64]
 

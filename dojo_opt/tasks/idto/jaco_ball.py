@@ -11,12 +11,15 @@ from dojo_opt.cost import Clearance
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
-from dojo_opt.plant.loop import ClosedLoop
+from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
 from dojo_opt.tasks.suite import SuiteTask, held, quadratic, servo_effort, timed
+from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Input, Joint
 from sim.mechanism.shapes import Sphere
 from sim.simulator.simulator import Simulator
 

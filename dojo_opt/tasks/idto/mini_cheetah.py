@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from dojo_opt.plant.loop import ClosedLoop
+from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.tasks.free_gait import free_gait_mpc
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
 from dojo_opt.tasks.suite import SuiteTask
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Contact, Input
 from sim.mechanism.terrain import Terrain
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator

@@ -8,13 +8,16 @@ import numpy as np
 
 from dojo_opt.gaits.equilibrium import equilibrium
 from dojo_opt.mpc.controller import MPC
-from dojo_opt.mpc.moving import Onward
+from dojo_opt.mpc.moving_reference import Onward
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
-from dojo_opt.plant.loop import ClosedLoop
+from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.tasks.suite import SuiteTask, lifted, quadratic, servo_effort, timed
+from sim.mechanism.body import Body
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Contact, Input, Joint
 from sim.simulator.simulator import Simulator
 
 __all__ = ["hopper"]

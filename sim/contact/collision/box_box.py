@@ -33,8 +33,8 @@ from sim.contact.collision.box_elements import (
     put_elements,
     vertex,
 )
-from sim.contact.collision.clip import BORDER, PAST, clip, edge_normal, on_edges, side_edge
 from sim.contact.collision.edge_axes import Arrangement, deepest, side_of
+from sim.contact.collision.edge_clipping import BORDER, PAST, clip, edge_normal, on_edges, side_edge
 from sim.contact.collision.witness import TIE, absent, axis, dot
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3

@@ -13,7 +13,7 @@ A code holds the kind, the two faces and further indices (`code_of`); 0 means no
 from __future__ import annotations
 
 from sim.contact.collision.box import column, corner, to_a, to_b, vertex_on_box, vertex_under_box
-from sim.contact.collision.clip import common_normal, edge_normal, side_edge
+from sim.contact.collision.edge_clipping import common_normal, edge_normal, side_edge
 from sim.contact.collision.witness import FACE, NOWHERE, along, axis, edges, vertex_a, vertex_b
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3

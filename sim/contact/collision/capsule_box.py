@@ -15,7 +15,6 @@ from math import sqrt
 
 from sim.contact.collision.box import bits, corner, distance_squared, vertex_on_box
 from sim.contact.collision.box_elements import CROSSING, code_of, edge_of, faces_of
-from sim.contact.collision.clip import PAST, clip, common_normal, edge_normal, on_edges, side_edge
 from sim.contact.collision.edge_axes import (
     OPEN,
     PARALLEL,
@@ -28,6 +27,7 @@ from sim.contact.collision.edge_axes import (
     side,
     side_of,
 )
+from sim.contact.collision.edge_clipping import PAST, clip, common_normal, edge_normal, on_edges, side_edge
 from sim.contact.collision.witness import (
     FACE,
     LINE,

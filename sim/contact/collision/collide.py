@@ -9,7 +9,6 @@ The kernels of each pair are in pair_kernels.py.
 from __future__ import annotations
 
 from sim.contact.collision.edge_axes import OPEN, Arrangement
-from sim.contact.collision.exchange import exchange
 from sim.contact.collision.pair_kernels import (
     arrange_box_box,
     arrange_capsule_box,
@@ -24,6 +23,7 @@ from sim.contact.collision.pair_kernels import (
     sides_box_box,
     sides_capsule_box,
 )
+from sim.contact.collision.swapped_shapes import exchange
 from sim.contact.collision.witness import ABSENT
 from sim.model.model import Model
 from sim.model.shape_kinds import SWAPPED, Pair
@@ -35,7 +35,7 @@ from solvers.types import Vector
 def collide(model: Model, kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Distance, normal and point of contact point `feature` of shapes a and b, with derivatives by the twist of a.
 
-    model    its hull has the tables of polytopes (hull.py), and the kernels of this kind are linked
+    model    its hull has the tables of polytopes (polytope_table.py), and the kernels of this kind are linked
     kind     a Pair; Pair + SWAPPED: out is then that of b against a, in the frame of a, by the twist of b
     feature  0 to shape_kinds.count(kind) - 1
     sizes    (8,) sizes of a from 0, of b from 4 [m], in the order of shape_kinds.Shape

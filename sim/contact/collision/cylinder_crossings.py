@@ -7,9 +7,8 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.collision.box import column, to_a
-from sim.contact.collision.clip import edge_normal, on_edges
 from sim.contact.collision.cylinder import nearest, reach, vertex_on_cylinder
-from sim.contact.collision.exchange import exchange
+from sim.contact.collision.edge_clipping import edge_normal, on_edges
 from sim.contact.collision.polytope_cylinder_crossings import LEANING, PASSING
 from sim.contact.collision.rim import (
     SECTORS,
@@ -21,8 +20,9 @@ from sim.contact.collision.rim import (
     sector_of,
 )
 from sim.contact.collision.rim_rim import point_of, rim_minimum, rim_rim
+from sim.contact.collision.swapped_shapes import exchange
 from sim.contact.collision.witness import Z, along, dot, edges
-from sim.model.columns import PairSize
+from sim.model.record_columns import PairSize
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, three
 from solvers.types import Vector

@@ -12,9 +12,7 @@ Codes: 16 + 8 i + kind, i: the end; or which rims, the side of the normal of two
 
 from __future__ import annotations
 
-from sim.contact.collision.aligned import from_cylinder
 from sim.contact.collision.box import column
-from sim.contact.collision.clip import BORDER
 from sim.contact.collision.cylinder_crossings import (
     crossing,
     nearest_rim_point,
@@ -22,15 +20,17 @@ from sim.contact.collision.cylinder_crossings import (
     separation_along,
     turn_around,
 )
-from sim.contact.collision.exchange import exchange
-from sim.contact.collision.kept import original
+from sim.contact.collision.edge_clipping import BORDER
+from sim.contact.collision.feature_code import substituted_feature
+from sim.contact.collision.parallel_elements import from_cylinder
 from sim.contact.collision.polytope_cylinder import MISSED
 from sim.contact.collision.rim import (
     plane_rim,
     rim_below,
 )
+from sim.contact.collision.swapped_shapes import exchange
 from sim.contact.collision.witness import TIE, absent, dot
-from sim.model.columns import PairSize
+from sim.model.record_columns import PairSize
 from sim.model.shape_kinds import CROSSINGS, RIM_POINTS
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
@@ -130,7 +130,7 @@ def choose_elements(
 @inner_kernel
 def put_elements(feature: int, code: int, sizes: Vector, R: Vector, r: Vector, turned: Vector, out: Vector) -> None:
     """Contact of the elements `code`; uses up `turned`."""
-    feature, code = original(feature, code)
+    feature, code = substituted_feature(feature, code)
     if code == 0:
         absent(out)
         return

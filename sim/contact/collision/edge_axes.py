@@ -55,7 +55,7 @@ def deepest(s: float, h: Vec3) -> float:
 
 @inner_kernel
 def side_of(i: int, n: Vec3, face: int, top: float) -> int:
-    """Which side (clip.py) of the face `top` e_face is the edge along e_i farthest along n, or -1 for none."""
+    """Which side (edge_clipping.py) of the face `top` e_face is the edge along e_i farthest along n, or -1 for none."""
     if i == face or n[face] * top < 0.0:
         return -1
     m = 3 - i - face

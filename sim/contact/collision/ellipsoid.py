@@ -17,8 +17,8 @@ from __future__ import annotations
 
 from sim.contact.collision.box import column, to_a, to_b
 from sim.contact.collision.cylinder import reach
-from sim.contact.collision.hull import above, edge, highest_face, row
-from sim.contact.collision.hulls import nearest_element
+from sim.contact.collision.polytope_polytope import nearest_element
+from sim.contact.collision.polytope_table import above, edge, highest_face, row
 from sim.contact.collision.rim import across, put_column
 from sim.contact.collision.support import (
     bent,
@@ -32,7 +32,7 @@ from sim.contact.collision.support import (
     stiffness,
 )
 from sim.contact.collision.witness import NOWHERE, Z, along, axis, dot, put
-from sim.model.columns import PairSize
+from sim.model.record_columns import PairSize
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, three
 from solvers.types import Matrix, Vector

@@ -6,7 +6,7 @@ from math import sqrt
 
 from sim.contact.collision.box import corner, to_b
 from sim.contact.collision.witness import FACE, NOWHERE, Z, absent, along, axis, moment, put, put_rows, vertex_a
-from sim.model.columns import PairSize
+from sim.model.record_columns import PairSize
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, three
 from solvers.types import Vector

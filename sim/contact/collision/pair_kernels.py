@@ -12,10 +12,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from sim.contact.collision import box_axes, box_box, capsule_box, ellipsoid, hulls, segment
+from sim.contact.collision import box_axes, box_box, capsule_box, ellipsoid, polytope_polytope, segment
+from sim.contact.collision.ball_level_set import capsule_field, choose_end, sphere_field
 from sim.contact.collision.box_elements import put_elements
 from sim.contact.collision.edge_axes import Arrangement
-from sim.contact.collision.fields import capsule_field, choose_end, sphere_field
 from sim.contact.collision.halfspace import box_halfspace, capsule_halfspace, cylinder_halfspace, sphere_halfspace
 from sim.contact.collision.sphere import sphere_box, sphere_capsule, sphere_cylinder, sphere_sphere, string
 from sim.contact.collision.witness import absent
@@ -135,7 +135,7 @@ def _capsule_field(model: Model, feature: int, code: int, sizes: Vector, R: Vect
 
 @optional(Slot.PUT_POLYTOPE_POLYTOPE)
 def _polytope_polytope(model: Model, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
-    hulls.put_elements(feature, code, sizes, model.hull, R, r, out)
+    polytope_polytope.put_elements(feature, code, sizes, model.hull, R, r, out)
 
 
 @optional(Slot.ARRANGE_CAPSULE_BOX)
@@ -153,7 +153,7 @@ def arrange_box_box(model: Model, sizes: Vector, R: Vector, r: Vector, sides: in
 @optional(Slot.ARRANGE_POLYTOPE_POLYTOPE)
 def arrange_polytope_polytope(model: Model, sizes: Vector, R: Vector, r: Vector, sides: int) -> Arrangement:
     """`arrange` of collide.py for this pair."""
-    return hulls.separation(sizes, model.hull, R, r)
+    return polytope_polytope.separation(sizes, model.hull, R, r)
 
 
 @optional(Slot.SIDES_CAPSULE_BOX)
@@ -201,13 +201,13 @@ def choose_polytope_polytope(
     model: Model, feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector
 ) -> int:
     """`choose` of collide.py for this pair."""
-    return hulls.choose_elements(feature, arrangement, sizes, model.hull, R, r, out)
+    return polytope_polytope.choose_elements(feature, arrangement, sizes, model.hull, R, r, out)
 
 
 @optional(Slot.FACE_POLYTOPE_POLYTOPE)
 def face_polytope_polytope(model: Model, feature: int, sizes: Vector, R: Vector, r: Vector) -> int:
     """`instead` of collide.py for this pair."""
-    return hulls.face_towards(feature, sizes, model.hull, R, r)
+    return polytope_polytope.face_towards(feature, sizes, model.hull, R, r)
 
 
 @inner_kernel

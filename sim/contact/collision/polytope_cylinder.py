@@ -12,11 +12,10 @@ Codes: 16 + 8 i + the element of b (cylinder.py), i: the face, or the edge, with
 
 from __future__ import annotations
 
-from sim.contact.collision.aligned import from_polytope
 from sim.contact.collision.box import to_b
 from sim.contact.collision.cylinder import SIDE, TOP, nearest, reach, vertex_on_cylinder
-from sim.contact.collision.hull import above, row
-from sim.contact.collision.kept import original
+from sim.contact.collision.feature_code import substituted_feature
+from sim.contact.collision.parallel_elements import from_polytope
 from sim.contact.collision.polytope_cylinder_crossings import (
     corner_of,
     crossings,
@@ -24,12 +23,13 @@ from sim.contact.collision.polytope_cylinder_crossings import (
     put_crossing,
     separation_along,
 )
+from sim.contact.collision.polytope_table import above, row
 from sim.contact.collision.rim import (
     plane_rim,
     rim_below,
 )
 from sim.contact.collision.witness import TIE, absent, dot
-from sim.model.columns import PairSize
+from sim.model.record_columns import PairSize
 from sim.model.shape_kinds import CROSSINGS, RIM_POINTS
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
@@ -138,7 +138,7 @@ def rim_at_face(k: int, face: int, deepest: float, sizes: Vector, hull: Matrix, 
 @inner_kernel
 def put_elements(feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
     """Contact of the elements `code`."""
-    feature, code = original(feature, code)
+    feature, code = substituted_feature(feature, code)
     o, rho, half = int(sizes[0]), sizes[PairSize.B], sizes[PairSize.B + 1]
     na = int(hull[o, 0])
     if code == 0:

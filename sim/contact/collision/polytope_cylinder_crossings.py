@@ -8,10 +8,10 @@ from __future__ import annotations
 from math import cos, sin
 
 from sim.contact.collision.box import to_a, to_b
-from sim.contact.collision.clip import edge_normal, on_edges
 from sim.contact.collision.cylinder import RIM_BOTTOM, RIM_TOP, SIDE, reach
-from sim.contact.collision.hull import edge, row
-from sim.contact.collision.hulls import element, nearest_element, points_out
+from sim.contact.collision.edge_clipping import edge_normal, on_edges
+from sim.contact.collision.polytope_polytope import element, nearest_element, points_out
+from sim.contact.collision.polytope_table import edge, row
 from sim.contact.collision.rim import (
     SECTORS,
     across,
@@ -21,7 +21,7 @@ from sim.contact.collision.rim import (
     sector_of,
 )
 from sim.contact.collision.witness import Z, along, dot, edges, vertex_b
-from sim.model.columns import PairSize
+from sim.model.record_columns import PairSize
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
 from solvers.types import Integers, Matrix, Vector

@@ -27,7 +27,7 @@ from sim.contact.collision.witness import (
     vertex_a,
     vertex_b,
 )
-from sim.model.columns import PairSize
+from sim.model.record_columns import PairSize
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
 from solvers.types import Vector

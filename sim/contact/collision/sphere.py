@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.contact.collision.box import vertex_on_box
 from sim.contact.collision.cylinder import nearest, vertex_on_cylinder
 from sim.contact.collision.witness import LINE, NOWHERE, TIE, Z, bend_line, bend_point, direction, vertex_a
-from sim.model.columns import PairSize
+from sim.model.record_columns import PairSize
 from solvers.compiler import inner_kernel
 from solvers.rotation import three
 from solvers.types import Vector

@@ -34,10 +34,10 @@ from sim.contact.pairs.previous_features import (
     remember,
     rounding_of_rims,
 )
-from sim.model.columns import Cone, RelativePose, Witness
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice, Verdict
+from sim.model.record_columns import Cone, RelativePose, Witness
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 

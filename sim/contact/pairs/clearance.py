@@ -5,7 +5,7 @@ is nowhere less than (g0 + g1 - d)/2, where d is the distance by which points of
 other in between. The balls around the shapes give a lower bound of a gap; only where they are near each other are the
 shapes themselves measured.
 
-Columns of pair_apart, at the first pair of a collision: Apart of sim/model/columns.py.
+Columns of pair_apart, at the first pair of a collision: Apart of sim/model/record_columns.py.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from sim.contact.pairs.active_features import choose_shapes, open_pairs
 from sim.contact.pairs.limited_reach import end_of
 from sim.contact.pairs.pair_contact import point_kinematics
 from sim.contact.pairs.pair_pose import place_shapes
-from sim.model.columns import Apart, PairBound
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Apart, PairBound
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import cross

@@ -1,20 +1,20 @@
-"""Collisions of cylinders with polytopes and cylinders (cylinders.py), as active_features.py and pair_contact.py
-for the others. Scenes without such collisions do not compile these kernels.
+"""Collisions of cylinders with polytopes and cylinders (cylinder_contacts.py), as active_features.py
+and pair_contact.py for the others. Scenes without such collisions do not compile these kernels.
 """
 
 from __future__ import annotations
 
-from sim.contact.collision.cylinders import (
+from sim.contact.collision.cylinder_contacts import (
     choose_on_cylinder,
     collide_with_cylinder,
     instead_on_cylinder,
     separation_of_cylinder,
 )
 from sim.contact.pairs.previous_features import keep, last_point, left_behind
-from sim.model.columns import RelativePose, Witness
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice
+from sim.model.record_columns import RelativePose, Witness
 from sim.model.shape_kinds import SWAPPED, Pair
 from sim.model.slots import Slot
 from solvers.compiler import inner_kernel, optional

@@ -13,7 +13,7 @@ for its n points at the activation gap a, half the gap ahead; M and T as in inac
 collisions that one of its bodies has, so that the sum over them holds. A gap below a at the solution activates the
 collision, and the step is solved again. Derivatives take all collisions as active (`all_near`): they are exact.
 
-Columns of model.pair_far: PairBound of sim/model/columns.py.
+Columns of model.pair_far: PairBound of sim/model/record_columns.py.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ from sim.contact.pairs.limited_reach import (
 from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, point_kinematics
 from sim.contact.pairs.pair_pose import place_shapes
 from sim.dynamics.displacements import third_quaternion
-from sim.model.columns import PairBound, RelativePose, Witness
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import StepOptions
+from sim.model.record_columns import PairBound, RelativePose, Witness
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 

@@ -19,9 +19,9 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.inactive_bounds import ANGLE
-from sim.model.columns import PairBound, PairShare, Way, Witness
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import PairBound, PairShare, Way, Witness
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, rotate
 
@@ -35,16 +35,16 @@ _HALF_ANGLE = 3.2  # an angle is at most so many times the sine of its half
 def fit_share(model: Model, data: Data, j: int) -> None:
     """pair_share of pair j at its present gap."""
     reach = model.pair_far[j - model.pair_feature[j], PairBound.REACH]
-    share = data.pair_share[j]
-    share[PairShare.PART], share[PairShare.RATE] = 1.0, 0.0
+    fade = data.pair_share[j]
+    fade[PairShare.PART], fade[PairShare.RATE] = 1.0, 0.0
     t = 2.0 * data.pair_out[j, Witness.GAP] / reach - 1.0
     if t >= 1.0:
-        share[PairShare.PART] = 0.0
+        fade[PairShare.PART] = 0.0
     elif t > 0.0:
         w = 1.0 - t * t * t * (10.0 + t * (6.0 * t - 15.0))
-        share[PairShare.PART] = w
+        fade[PairShare.PART] = w
         if w > 1e-12:  # below, it is rounding
-            share[PairShare.RATE] = -60.0 * t * t * (1.0 - t) * (1.0 - t) / (reach * w)
+            fade[PairShare.RATE] = -60.0 * t * t * (1.0 - t) * (1.0 - t) / (reach * w)
 
 
 @kernel

@@ -6,7 +6,7 @@
 
 Both wrenches about O are opposite because they act at one point, P: momentum is exact. P is the point p carried back
 to configuration 2, where the balance of momenta is taken, mostly by the lighter body (`shares`); of a fixed obstacle, a
-alone carries it. Taut strings pull along where they lay at configuration 2: string.py.
+alone carries it. Taut strings pull along where they lay at configuration 2: taut_string.py.
 
 Derivatives: pair_jacobian.py.
 """
@@ -20,11 +20,11 @@ from sim.contact.pairs.active_features import choose_shapes
 from sim.contact.pairs.cylinder_pairs import collide_cylinders, on_cylinder
 from sim.contact.pairs.limited_reach import fit_share
 from sim.contact.pairs.pair_pose import place_shapes
-from sim.contact.pairs.string import is_taut, pull_from_before, string_arm
-from sim.model.columns import Kin, PairFrame, PairShare, Witness
+from sim.contact.pairs.taut_string import is_taut, pull_from_before, string_arm
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice
+from sim.model.record_columns import Kin, PairFrame, PairShare, Witness
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, rotate, three, transposed_times

@@ -19,13 +19,13 @@ from sim.contact.contact_law import contact_impulse
 from sim.contact.pairs.limited_reach import end_of
 from sim.contact.pairs.pair_contact import is_absent, pair_arm, pair_force
 from sim.contact.pairs.previous_features import least_size, overlap_before, rounding_of_rims
-from sim.contact.pairs.string import is_taut
+from sim.contact.pairs.taut_string import is_taut
 from sim.contact.restitution import impulse_work
 from sim.dynamics.energy import twice_kinetic
-from sim.model.columns import Bounce, Cone, RelativePose
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import StepOptions
+from sim.model.record_columns import Bounce, Cone, RelativePose
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross

@@ -8,9 +8,9 @@ Everything moves with b, plus the effect of the motion of a relative to b:
 from __future__ import annotations
 
 from sim.contact.pairs.pair_contact import POLE, gap_normal, point_velocity, shape_b
-from sim.model.columns import PairFrame, Witness
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import PairFrame, Witness
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, three

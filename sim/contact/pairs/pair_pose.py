@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.dynamics.frame import place_frame
+from sim.dynamics.frame_placement import place_frame
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.shape_kinds import SWAPPED

@@ -5,9 +5,9 @@ from __future__ import annotations
 from sim.contact.contact_law import report_contact
 from sim.contact.pairs.limited_reach import BEYOND, end_of
 from sim.contact.pairs.pair_contact import is_absent
-from sim.model.columns import ContactRow, PairShare, Witness
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import ContactRow, PairShare, Witness
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.dense import is_finite

@@ -12,13 +12,13 @@ from sim.contact.pairs.inactive_pairs import add_inactive_pairs
 from sim.contact.pairs.limited_reach import with_share
 from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
 from sim.contact.pairs.pair_jacobian import pair_jacobian
-from sim.contact.pairs.string import is_taut
-from sim.contact.pairs.string_stiffness import add_string_stiffness, add_string_turn
+from sim.contact.pairs.taut_string import is_taut
+from sim.contact.pairs.taut_string_stiffness import add_string_stiffness, add_string_turn
 from sim.contact.pairs.wrench_columns import add_wrench_column, centre_shift, point_shift, unit_vector
-from sim.model.columns import PairFrame
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import NewtonTarget
+from sim.model.record_columns import PairFrame
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross
@@ -39,8 +39,8 @@ def impulse_rate(data: Data, c: int, j: int, C: Vector, k: int, p: Vec3) -> Vec3
 
 
 @kernel
-def add_pair_stiffness(model: Model, data: Data, j: int, share: float) -> None:
-    """coupling_K += pair j, condensed; share: of the turning of its impulse."""
+def add_pair_stiffness(model: Model, data: Data, j: int, indefinite: float) -> None:
+    """coupling_K += pair j, condensed; indefinite: factor of the turning of its impulse."""
     if is_taut(model, data, j):
         add_string_stiffness(model, data, j)
         return
@@ -49,7 +49,7 @@ def add_pair_stiffness(model: Model, data: Data, j: int, share: float) -> None:
     c = model.contact_height.shape[0] + j
     wa, wb = shares(model, j)
     p = contact_impulse(model, data, c)
-    f = pair_force(data, j, share * p[0], share * p[1], share * p[2])
+    f = pair_force(data, j, indefinite * p[0], indefinite * p[1], indefinite * p[2])
     P = pair_arm(model, data, j)
     Ka = data.coupling_K[2 * model.pair_coupling[j]]
     Kb = data.coupling_K[2 * model.pair_coupling[j] + 1]
@@ -81,7 +81,7 @@ def add_pair_stiffness(model: Model, data: Data, j: int, share: float) -> None:
 
 
 @optional(Slot.CONDENSE_PAIRS)
-def condense_pairs(model: Model, data: Data, h: float, kappa: float, share: float, form: int) -> None:
+def condense_pairs(model: Model, data: Data, h: float, kappa: float, indefinite: float, form: int) -> None:
     """coupling_K of the active pairs, their laws linearised at kappa; overwritten.  See `condense_into`."""
     ground = model.contact_height.shape[0]
     for k in range(model.coupling_body.shape[0] - model.loop_ntrans.shape[0]):
@@ -92,9 +92,9 @@ def condense_pairs(model: Model, data: Data, h: float, kappa: float, share: floa
     for m in range(data.active_ground_count[0], data.active_count[0]):
         c = data.active[m]
         pair_jacobian(model, data, h, c - ground)
-        condense_contact(model, data, h, c, kappa, share, form)
+        condense_contact(model, data, h, c, kappa, indefinite, form)
         if not is_absent(data, c - ground):
-            add_pair_stiffness(model, data, c - ground, share)
+            add_pair_stiffness(model, data, c - ground, indefinite)
 
 
 @optional(Slot.APPLY_PAIRS, default=0.0)

@@ -1,6 +1,6 @@
 """State of collisions at the beginning of a step, and the overlap of elements allowed there; and elements that
 pressed, kept beside new ones: where those of one place make the shapes overlap in another, and those of the other in
-the first. Collisions of polytopes and of cylinders have room for them (sim/contact/collision/kept.py).
+the first. Collisions of polytopes and of cylinders have room for them (sim/contact/collision/feature_code.py).
 """
 
 from __future__ import annotations
@@ -8,12 +8,12 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.collision.box import to_a, to_b
-from sim.contact.collision.kept import elsewhere
+from sim.contact.collision.feature_code import substitute_code
 from sim.contact.collision.rim import LEVEL
 from sim.contact.collision.witness import dot
-from sim.model.columns import Cone, PairSize, Witness
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Cone, PairSize, Witness
 from sim.model.shape_kinds import RIM_POINTS, SWAPPED, Pair
 from solvers.compiler import inner_kernel, kernel
 from solvers.rotation import Vec3, three
@@ -133,7 +133,7 @@ def keep(model: Model, data: Data, first: int) -> None:
         if kept == 0 or kept == data.pair_code[j]:
             continue
         if j < begin:
-            kept = elsewhere(j - first, kept)
+            kept = substitute_code(j - first, kept)
         for k in range(begin, end):
             if data.pair_code[k] == kept:
                 kept = 0

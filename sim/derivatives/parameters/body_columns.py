@@ -13,9 +13,9 @@ from sim.derivatives.parameters.directions import At
 from sim.dynamics.joints.ball_spring import spring_turns
 from sim.dynamics.joints.damper import damper_lag, lag_rates
 from sim.dynamics.joints.dry_friction import add_dry_time_step
-from sim.model.columns import Bound
 from sim.model.data import Data
 from sim.model.model import InputKind, Model
+from sim.model.record_columns import Bound
 from solvers.compiler import kernel
 from solvers.rotation import Quat, Vec3, cross, left_jacobian, rotate
 from solvers.types import Vector

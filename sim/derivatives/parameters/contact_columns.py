@@ -12,9 +12,9 @@ from sim.contact.pairs.pair_contact import is_absent, pair_arm, pair_force
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.contact.terrain_contact import centre
 from sim.derivatives.parameters.body_columns import add_wrench, moment
-from sim.model.columns import Bounce, Cone, ConeScale, Kin
 from sim.model.data import Data
 from sim.model.model import Law, Model
+from sim.model.record_columns import Bounce, Cone, ConeScale, Kin
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, rotate, three
 from solvers.types import Vector

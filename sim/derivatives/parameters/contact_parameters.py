@@ -12,9 +12,9 @@ from sim.derivatives.parameters.parameter import Parameter, Term, vector
 from sim.derivatives.parameters.tree_parameters import frame_turns
 from sim.mechanism.axes import contact_frame
 from sim.mechanism.collision import Collision
+from sim.mechanism.contact import Contact
 from sim.mechanism.contact_candidates import Touch
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Contact
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import HalfSpace, Solid, String
 from sim.model.shape_kinds import Size

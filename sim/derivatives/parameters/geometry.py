@@ -19,9 +19,9 @@ from sim.derivatives.parameters.body_columns import add_wrench
 from sim.derivatives.parameters.directions import At, Effect
 from sim.derivatives.restitution_gradient import gap_wrench
 from sim.dynamics.joints.coordinates import joint_frame
-from sim.model.columns import Bounce, DirectionRow
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Bounce, DirectionRow
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, quat_matrix, rotate, times
 from solvers.types import Matrix, Vector

@@ -15,16 +15,16 @@ from math import sqrt
 
 from sim.contact.height_field import cell, height_field, weight
 from sim.contact.terrain_contact import centre
-from sim.derivatives.parameters.columns import clear_columns
 from sim.derivatives.parameters.directions import At
 from sim.derivatives.parameters.parameter_jacobian import coordinate_rows
+from sim.derivatives.parameters.residual_columns import clear_columns
 from sim.derivatives.parameters.surface import add_ground_place, is_on_terrain
 from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
-from sim.model.columns import Bounce, Grid, TerrainSize
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
+from sim.model.record_columns import Bounce, Grid, TerrainSize
 from sim.model.slots import Slot
 from solvers.compiler import Table, kernel, optional
 from solvers.rotation import Vec3
@@ -60,15 +60,15 @@ def spread_earlier(model: Model, data: Data, c: int, configuration: int, X: Matr
     """The effect of the ground below configuration 1 or 2 on the offset of an impact."""
     k = model.contact_terrain[c] - 1
     b = data.bounce[c]
-    share, phi = (
+    weight, phi = (
         (b[Bounce.RESTITUTION], b[Bounce.GAP1]) if configuration == 1 else (1.0 - b[Bounce.RESTITUTION], b[Bounce.GAP2])
     )
     pos, rot = (data.pos1, data.rot1) if configuration == 1 else (data.pos2, data.rot2)
     at = centre(model, c, pos, rot)
     _, Fx, Fy, _, _, _ = height_field(model, k, at[0], at[1])
     i = 1.0 / sqrt(1.0 + Fx * Fx + Fy * Fy)
-    t = -share * i / data.contact_frame[c, 2]
-    if share != 0.0:
+    t = -weight * i / data.contact_frame[c, 2]
+    if weight != 0.0:
         spread(model, k, at, (t, t * phi * i * Fx, t * phi * i * Fy), X, 3 * c, out)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sim.derivatives.parameters.contact_parameters import shape_of
 from sim.derivatives.parameters.terrain_parameters import terrains
-from sim.mechanism.closing import parts_of
+from sim.mechanism.loop_joints import parts_of
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import String

@@ -6,13 +6,13 @@ from sim.contact.collision.witness import NOWHERE, dot
 from sim.contact.contact_law import contact_impulse
 from sim.contact.pairs.limited_reach import with_share
 from sim.contact.pairs.pair_contact import POLE, is_absent, pair_force, shape_b
-from sim.contact.pairs.string import is_taut
+from sim.contact.pairs.taut_string import is_taut
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.contact_columns import add_pair, floor_change, impulse_change, is_active, turning
-from sim.derivatives.parameters.string_columns import add_moved_end
-from sim.model.columns import PairFrame
+from sim.derivatives.parameters.taut_string_columns import add_moved_end
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import PairFrame
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, rotate
 from solvers.types import Vector

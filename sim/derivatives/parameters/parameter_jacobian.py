@@ -11,8 +11,8 @@ By the time step h: R depends on it by h v15, h v25, and directly, so with A_vv 
 
 from __future__ import annotations
 
-from sim.derivatives.parameters.columns import fill_columns
 from sim.derivatives.parameters.directions import At, Effect
+from sim.derivatives.parameters.residual_columns import fill_columns
 from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
 from sim.model.data import Data

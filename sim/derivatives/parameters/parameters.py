@@ -25,9 +25,9 @@ from sim.derivatives.parameters.tree_parameters import (
     joint_parameters,
     limit_parameters,
 )
-from sim.mechanism.brief import brief_repr
-from sim.mechanism.closing import is_weld
+from sim.mechanism.loop_joints import is_weld
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.short_repr import short_repr
 from solvers.types import IntegerMatrix, Vector
 
 __all__ = ["KINDS", "Parameter", "Parameters", "ParameterPlan", "all_parameters"]
@@ -71,7 +71,7 @@ class Parameters(NamedTuple):
     rows: dict[str, slice]
 
     def __repr__(self) -> str:
-        return brief_repr(self)
+        return short_repr(self)
 
     def __getitem__(self, name: str) -> Floats:  # type: ignore[override]
         """Values of one name of the selection."""
@@ -79,7 +79,7 @@ class Parameters(NamedTuple):
 
 
 class ParameterPlan(NamedTuple):
-    """Parameters as kernels need them, see columns.py; heights of terrain apart, see terrain_parameters.py."""
+    """Parameters as kernels need them, see residual_columns.py; heights of terrain apart, see terrain_parameters.py."""
 
     terms: IntegerMatrix  # (m, 4)
     weights: Vector  # (m,)

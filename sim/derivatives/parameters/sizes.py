@@ -12,13 +12,13 @@ from __future__ import annotations
 from sim.contact.collision.witness import NOWHERE, dot
 from sim.contact.pairs.pair_contact import gap_normal
 from sim.contact.pairs.pair_pose import place_shape
-from sim.contact.pairs.string import is_taut
+from sim.contact.pairs.taut_string import is_taut
 from sim.derivatives.parameters.directions import SIDE
 from sim.derivatives.parameters.pair_columns import add_moved_shape, is_felt, pair_floor, row
-from sim.derivatives.parameters.string_columns import add_moved_end
-from sim.model.columns import Bounce, Witness
+from sim.derivatives.parameters.taut_string_columns import add_moved_end
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Bounce, Witness
 from sim.model.shape_kinds import SWAPPED, Pair, Size
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross

@@ -10,9 +10,9 @@ from math import sqrt
 from sim.contact.height_field import field_values, height_field
 from sim.contact.terrain_contact import centre, frame_turn
 from sim.derivatives.parameters.contact_columns import add_impulse, add_turn, floor_change, impulse_change, is_active
-from sim.model.columns import Bounce, Kin
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Bounce, Kin
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.types import Matrix

@@ -2,7 +2,7 @@
 
 They stand in a row, terrain after terrain in the order of the contacts, each like heights.ravel(). Kernels know the
 coefficients of one surface per terrain and radius (pack.py); their gradient is mapped to the heights here, all
-heights at once, so the lists of columns.py have no terms for them.
+heights at once, so the lists of residual_columns.py have no terms for them.
 """
 
 from __future__ import annotations

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from sim.derivatives.parameters.directions import Effect
 from sim.derivatives.parameters.parameter import Parameter, Term, vector
 from sim.mechanism.axes import translation_axes
-from sim.mechanism.closing import parts_of
+from sim.mechanism.body import Body
+from sim.mechanism.joint import Joint
+from sim.mechanism.loop_joints import parts_of
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.parts import Body, Joint
 
 Floats = NDArray[np.float64]
 
@@ -22,16 +23,16 @@ _INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 def body_parameters(mech: Mechanism, body: Body) -> list[Parameter]:
     """mass, inertia, com. The centre of mass is the origin of the body: everything else on it moves the other way.
 
-    A body that closing joints have divided (mechanism/closing.py) has those of the whole.
+    A body that closing joints have divided (mechanism/loop_joints.py) has those of the whole.
     """
     parts = [mech.body_names.index(name) for name in parts_of(mech.loops, body.name)]
-    share = 1.0 / len(parts)
-    J = np.asarray(body.inertia) / share
+    fraction = 1.0 / len(parts)
+    J = np.asarray(body.inertia) / fraction
     entries = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
     return [
-        Parameter("mass", body.name, "", body.mass / share, tuple((Effect.MASS, i, 0, share) for i in parts)),
+        Parameter("mass", body.name, "", body.mass / fraction, tuple((Effect.MASS, i, 0, fraction) for i in parts)),
         *(
-            Parameter("inertia", body.name, label, float(x), tuple((Effect.INERTIA, i, k, share) for i in parts))
+            Parameter("inertia", body.name, label, float(x), tuple((Effect.INERTIA, i, k, fraction) for i in parts))
             for k, (label, x) in enumerate(zip(_INERTIA, entries, strict=True))
         ),
         *vector("com", body.name, np.zeros(3), lambda k: [t for i in parts for t in _on_body(mech, i, k)]),

@@ -1,4 +1,4 @@
 """Joints inside a step: springs, dampers, inputs, limits, and the kinds with kinematics of their own.
 
-The list of joint kinds is `KINDS` in sim/mechanism/parts.py.
+The list of joint kinds is `KINDS` in sim/mechanism/joint.py.
 """

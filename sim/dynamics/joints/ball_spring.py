@@ -1,4 +1,4 @@
-"""Springs of quaternion joints, see terms.py; compiled by scenes with such a spring only.
+"""Springs of quaternion joints, see joint_forces.py; compiled by scenes with such a spring only.
 
 With s the vector part of the rotation from rest, V_d = (h/2) k |(s(2) + s(3))/2|^2.
 """

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from sim.model.columns import Bound, BoundRow
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Bound, BoundRow
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, left_jacobian, quat_exp, quat_matrix

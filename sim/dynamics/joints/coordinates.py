@@ -1,4 +1,4 @@
-"""Coordinates of one joint from the poses of its bodies: the inverse of motion.py."""
+"""Coordinates of one joint from the poses of its bodies: the inverse of joint_motion.py."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
     impulse = h d nu - lag (nu - v),      lag = 3 h d/(6 + z + z^2),      z = h d/I
 
 v, nu: velocities of the intervals 1-2 and 2-3; I: the inertia that the damper sees, a constant of the mechanism
-(mechanism/seen_inertia.py). Where h d is small beside I the lag is h d/2, and the damper acts on the mean of both
+(mechanism/damper_inertia.py). Where h d is small beside I the lag is h d/2, and the damper acts on the mean of both
 velocities: the trapezoidal rule. Where h d is large it acts on nu, as in the implicit method of Euler. A body of the
 inertia I, with nothing but the damper, slows down by
 

@@ -16,10 +16,10 @@ has M = e = r = 0.
 from __future__ import annotations
 
 from sim.dynamics.joints.limited_servo import begin_drive, drive_by_time_step
-from sim.model.columns import Drive, Dry, DryConstant, DryMove
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import NewtonTarget
+from sim.model.record_columns import Drive, Dry, DryConstant, DryMove
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.cones import orthant_step
@@ -209,7 +209,7 @@ def dry_constants(model: Model, data: Data, target: NewtonTarget) -> None:
             a, p = z[2 * side], z[2 * side + 1]
             r = target.kappa - a * p - target.corrected * step[2 * side] * step[2 * side + 1]
             parts[DryConstant.FORWARD + side] = r / p
-        w = parts[DryConstant.FORWARD] - parts[DryConstant.BACKWARD] + target.share * _gap(data, k)
+        w = parts[DryConstant.FORWARD] - parts[DryConstant.BACKWARD] + target.gap_fraction * _gap(data, k)
         parts[DryConstant.IMPULSE] = w / dry_compliance(data, k)
         data.dnu[model.dry_dof[k]] += parts[DryConstant.IMPULSE]
 

@@ -2,8 +2,8 @@
 
     P = h (g u - kp (q + h (nu - v)/4) - kd nu) = P0 - h k nu,    k = h kp/4 + kd
 
-is the impulse of the servo without limits: its spring is that of a joint (terms.py), its damper acts on the unknown
-velocity. With limits it is T = P between h lo and h hi, and one of the two otherwise: (T - P)/k = f - b,
+is the impulse of the servo without limits: its spring is that of a joint (joint_forces.py), its damper acts on the
+unknown velocity. With limits it is T = P between h lo and h hi, and one of the two otherwise: (T - P)/k = f - b,
 
     f - b = h nu - r + e T,    f (T - h lo) = kappa,    b (h hi - T) = kappa,    r = P0/k,  e = 1/k
 
@@ -13,9 +13,9 @@ that it is within its limits is stable for every gain, and beyond them its force
 
 from __future__ import annotations
 
-from sim.model.columns import Drive, Gain
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Drive, Gain
 from solvers.compiler import kernel
 from solvers.types import Vector
 

@@ -9,11 +9,11 @@ Columns of `bound` (and of its steps): 0 slack s, 1 impulse gamma.
 from __future__ import annotations
 
 from sim.dynamics.joints.cone_limit import cone_block, cone_derivative, cone_gap
-from sim.dynamics.joints.terms import add_limit_impulse
-from sim.model.columns import Bound, BoundRow
+from sim.dynamics.joints.joint_forces import add_limit_impulse
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import NewtonTarget
+from sim.model.record_columns import Bound, BoundRow
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.cones import onto_path, return_pair
@@ -64,7 +64,7 @@ def limit_constants(model: Model, data: Data, target: NewtonTarget) -> None:
         r = target.kappa - s * g
         if target.corrected > 0.0:
             r -= target.corrected * data.carry.bound_step[k, Bound.SLACK] * data.carry.bound_step[k, Bound.IMPULSE]
-        w = (r - g * target.share * (data.bound_gap[k] - s)) / s
+        w = (r - g * target.gap_fraction * (data.bound_gap[k] - s)) / s
         data.bound_w[k] = w
         add_limit_impulse(model, data, k, w, data.dnu)
 
@@ -92,7 +92,7 @@ def return_limits(model: Model, data: Data, weight: float, kappa: float) -> None
 
 
 @kernel
-def recover_limits(model: Model, data: Data, h: float, share: float) -> None:
+def recover_limits(model: Model, data: Data, h: float, gap_fraction: float) -> None:
     """bound_step from dnu."""
     for k in range(model.limit_dof.shape[0]):
         s = data.bound[k, Bound.SLACK]
@@ -106,5 +106,5 @@ def recover_limits(model: Model, data: Data, h: float, share: float) -> None:
             )
         else:
             t = model.limit_sign[k] * h * data.dnu[d]
-        data.carry.bound_step[k, Bound.SLACK] = t + share * (data.bound_gap[k] - s)
+        data.carry.bound_step[k, Bound.SLACK] = t + gap_fraction * (data.bound_gap[k] - s)
         data.carry.bound_step[k, Bound.IMPULSE] = data.bound_w[k] - data.bound[k, Bound.IMPULSE] / s * t

@@ -6,9 +6,9 @@ Their impulse is T, c dT = e dP0 - h d nu (dry_friction.py): within limits dT = 
 from __future__ import annotations
 
 from sim.dynamics.joints.dry_friction import dry_compliance
-from sim.model.columns import Drive, Gain
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import Drive, Gain
 from sim.model.slots import Slot
 from solvers.compiler import optional
 

@@ -12,7 +12,7 @@ against it; of a constraint that says nothing anywhere, dw vanishes too. A force
 from __future__ import annotations
 
 from sim.dynamics.displacements import tree_moves, turn_bodies
-from sim.dynamics.joints.motion import Increment
+from sim.dynamics.joints.joint_motion import Increment
 from sim.dynamics.loops.closure import loop_rows
 from sim.dynamics.loops.constraint_rows import add_along_path
 from sim.model.data import Data

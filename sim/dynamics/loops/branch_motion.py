@@ -19,9 +19,9 @@ from sim.dynamics.energy import factor_mass_matrix
 from sim.dynamics.loops.bifurcation import lead_loops
 from sim.dynamics.loops.closure import direct_loops, start_loops
 from sim.dynamics.loops.loop_velocity import close_velocity
-from sim.model.columns import CoupleRank
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import CoupleRank
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.status import Status

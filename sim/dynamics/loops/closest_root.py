@@ -121,15 +121,15 @@ def _led_back(error: Error, zero: Zero) -> Zero:
 
     d <- the point nearest to 0 of the tangent J (d' - d) = 0 at d, or a part of the way to it, and back to a zero.
     """
-    share = 1.0
+    step_size = 1.0
     for _ in range(_BACK):
         J = jacobian(error, zero.d)
         goal = np.linalg.lstsq(J, J @ zero.d, rcond=_RANK)[0]
-        nearer = newton(error, zero.d + share * (goal - zero.d))
+        nearer = newton(error, zero.d + step_size * (goal - zero.d))
         if nearer.found and np.linalg.norm(nearer.d) < np.linalg.norm(zero.d) - 1e-7:
-            zero, share = nearer, min(1.0, 2.0 * share)
+            zero, step_size = nearer, min(1.0, 2.0 * step_size)
         else:
-            share *= 0.25
-        if share < 1e-3:
+            step_size *= 0.25
+        if step_size < 1e-3:
             break
     return zero

@@ -14,7 +14,7 @@ A loop joint sits on b (the parent) with the frame Q = R_b offset, and holds the
 
 from __future__ import annotations
 
-from sim.dynamics.frame import place_frame
+from sim.dynamics.frame_placement import place_frame
 from sim.dynamics.loops.constraint_rows import is_loop
 from sim.model.data import Data
 from sim.model.model import Model

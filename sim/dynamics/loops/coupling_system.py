@@ -33,9 +33,9 @@ from sim.dynamics.loops.constraint_rows import (
     unit_impulses,
 )
 from sim.dynamics.loops.coupling_order import is_apart, moved_tree, order_couplings, set_nodes
-from sim.model.columns import CoupleRank
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import CoupleRank
 from sim.model.slots import Slot
 from solvers.block_lu import Nodes, block_lu_factor, block_lu_solve
 from solvers.compiler import kernel, optional
@@ -162,14 +162,14 @@ def _solve_rows(data: Data) -> None:
 
 
 @optional(Slot.SOLVE_COUPLING)
-def solve_coupling(model: Model, data: Data, share: float, out: Vector) -> None:
+def solve_coupling(model: Model, data: Data, gap_fraction: float, out: Vector) -> None:
     """After out = H0^-1 b of the tree: the answer with couplings, its twists, and couple_step, the forces f.
 
-    share: part of the loop gaps to close.
+    gap_fraction: part of the loop gaps to close.
     """
     count = int(data.couple_count[0])
     for p in range(data.couple_start[count]):
-        gap = share * data.couple_gap[data.couple_live[p, 0]]
+        gap = gap_fraction * data.couple_gap[data.couple_live[p, 0]]
         store(data.couple_x, p, 0, spread(data.couple_scale[p] * (gap + row_response(model, data, p, out))))
     _solve_rows(data)
     for row in range(data.couple_step.shape[0]):

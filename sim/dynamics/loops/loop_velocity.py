@@ -11,9 +11,9 @@ from sim.dynamics.loops.bifurcation import lead_loops
 from sim.dynamics.loops.closure import direct_loops, loop_rows
 from sim.dynamics.loops.coupling_system import body_twists, factor_coupling, solve_coupling
 from sim.dynamics.loops.gears import gear_row
-from sim.model.columns import CoupleRank
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import CoupleRank
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.types import Vector

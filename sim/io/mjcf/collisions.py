@@ -13,10 +13,10 @@ from itertools import combinations
 from typing import Any
 
 from sim.io.mjcf.contacts import STANDING, fixed_planes, label_on, meet, mixed, plane_pose
-from sim.io.mjcf.groups import NO_SHAPE, PLANE, GeomGroup, Where, name_of, solid_of
+from sim.io.mjcf.welded_bodies import NO_SHAPE, PLANE, GeomGroup, Where, name_of, solid_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.collision import Collision
-from sim.mechanism.parts import WORLD
+from sim.mechanism.joint import WORLD
 from sim.mechanism.shapes import HalfSpace, Solid
 
 Settings = tuple[float | None, str, int]

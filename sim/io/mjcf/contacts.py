@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.io.mjcf.groups import (
+from sim.io.mjcf.welded_bodies import (
     BOX,
     CAPSULE,
     CYLINDER,
@@ -34,7 +34,7 @@ from sim.io.mjcf.groups import (
     pose_of,
 )
 from sim.io.urdf.report import Notes
-from sim.mechanism.parts import Contact
+from sim.mechanism.contact import Contact
 from sim.mechanism.pose import Pose
 
 Floats = NDArray[np.float64]

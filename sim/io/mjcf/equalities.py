@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.io.mjcf.groups import GeomGroup, Where, name_of, pose_of
+from sim.io.mjcf.welded_bodies import GeomGroup, Where, name_of, pose_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.gear import Gear
-from sim.mechanism.parts import WORLD, Joint
+from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.pose import HERE, Pose
 
 Floats = NDArray[np.float64]

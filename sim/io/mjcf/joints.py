@@ -13,10 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.io.mjcf.groups import GeomGroup, name_of
+from sim.io.mjcf.welded_bodies import GeomGroup, name_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.axes import translation_axes
-from sim.mechanism.parts import KINDS, WORLD, Body, Joint
+from sim.mechanism.body import Body
+from sim.mechanism.joint import KINDS, WORLD, Joint
 from sim.mechanism.pose import HERE, Pose, turn
 
 Floats = NDArray[np.float64]

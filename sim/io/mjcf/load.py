@@ -13,16 +13,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.io.contact_choices import contact_choices
+from sim.io.mjcf.actuators import find_inputs, left_out, with_friction
 from sim.io.mjcf.collisions import find_collisions, find_on_planes
 from sim.io.mjcf.contacts import find_contacts
-from sim.io.mjcf.drives import find_inputs, left_out, with_friction
 from sim.io.mjcf.equalities import find_gears, find_loops
-from sim.io.mjcf.groups import GeomGroup, body_shapes, find_groups
 from sim.io.mjcf.joints import BALL, FREE, carry
 from sim.io.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
+from sim.io.mjcf.welded_bodies import GeomGroup, body_shapes, find_groups
 from sim.io.urdf.report import OVERLAPPING, LinkFrame, Notes
 from sim.mechanism import checks
-from sim.mechanism.parts import Body, Joint
+from sim.mechanism.body import Body
+from sim.mechanism.joint import Joint
 from sim.mechanism.pose import Pose
 from sim.mechanism.stance import gaps, lifted, plane_heights
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.io.urdf.report import LinkFrame, Note
-from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.short_repr import short_repr
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class MjcfReport:
     low: Floats
     high: Floats
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __str__(self) -> str:
         lines = [f"{self.file}: {len(self.bodies)} bodies, {len(self.joints)} joints, {len(self.gear)} actuators"]

@@ -20,8 +20,11 @@ from sim.io.urdf.solids import body_shapes, body_visuals, collision_shapes
 from sim.io.urdf.tree import MergedLinks, Place, group, held_pose, ordered
 from sim.io.urdf.xml import UrdfError
 from sim.mechanism import checks
-from sim.mechanism.composite import composite
-from sim.mechanism.parts import KINDS, WORLD, Body, Contact, Input, Joint
+from sim.mechanism.body import Body
+from sim.mechanism.composite_inertia import composite
+from sim.mechanism.contact import Contact
+from sim.mechanism.input import Input
+from sim.mechanism.joint import KINDS, WORLD, Joint
 from sim.mechanism.pose import HERE, Pose
 from sim.mechanism.stance import gaps, lifted, resting
 from sim.mechanism.visual import Visual

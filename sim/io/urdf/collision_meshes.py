@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from sim.io.meshes.decompose import decompose
-from sim.io.meshes.fit import fit
-from sim.io.meshes.hull import reduced_hull
+from sim.io.meshes.fitted_shapes import fit
 from sim.io.meshes.paths import find_mesh
+from sim.io.meshes.reduced_hull import reduced_hull
 from sim.io.meshes.triangles import MeshError, TriangleMesh, read_mesh
 from sim.io.urdf.report import Notes
 from sim.io.urdf.robot import Geometry, Robot, UrdfLink

@@ -21,7 +21,7 @@ from sim.io.urdf.robot import Geometry
 from sim.io.urdf.tree import MergedLinks, Place
 from sim.io.urdf.xml import UrdfError
 from sim.mechanism import checks
-from sim.mechanism.parts import Contact
+from sim.mechanism.contact import Contact
 from sim.mechanism.pose import HERE, Pose
 
 Floats = NDArray[np.float64]

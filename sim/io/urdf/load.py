@@ -8,7 +8,7 @@ from pathlib import Path
 from numpy.typing import ArrayLike
 
 from sim.io.contact_choices import contact_choices
-from sim.io.meshes.hull import CORNERS
+from sim.io.meshes.reduced_hull import CORNERS
 from sim.io.urdf.assemble import Choices, assemble
 from sim.io.urdf.collision_meshes import mesh_choices, with_shapes
 from sim.io.urdf.loops import read_loops
@@ -18,7 +18,7 @@ from sim.io.urdf.robot import Robot, read_robot
 from sim.io.urdf.xml import parse
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
-from sim.mechanism.parts import Contact
+from sim.mechanism.contact import Contact
 
 MIMIC = ("auto", "free", "locked", "gear")
 

@@ -25,7 +25,7 @@ from sim.io.urdf.report import Notes
 from sim.io.urdf.robot import Robot, UrdfJoint, read_joint
 from sim.io.urdf.tree import Place
 from sim.io.urdf.xml import Element
-from sim.mechanism.parts import WORLD, Joint
+from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.pose import HERE, Pose, quaternion, roll_pitch_yaw
 
 Floats = NDArray[np.float64]

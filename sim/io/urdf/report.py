@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.short_repr import short_repr
 
 Floats = NDArray[np.float64]
 
@@ -74,7 +74,7 @@ class UrdfReport:
     effort: Floats
     velocity: Floats
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
     def __str__(self) -> str:
         merged = len(self.links) - len({f.body for f in self.links.values()})

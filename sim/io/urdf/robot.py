@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from sim.io.urdf.report import Notes
 from sim.io.urdf.xml import Element
-from sim.mechanism import parts
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.joint import KINDS as JOINT_KINDS
 from sim.mechanism.pose import HERE, Pose, roll_pitch_yaw
+from sim.mechanism.short_repr import short_repr
 
 Floats = NDArray[np.float64]
 T = TypeVar("T", "UrdfLink", "UrdfJoint")
@@ -44,7 +44,7 @@ KINDS = {
     "planarorbital": "planar_orbital",
     "freeorbital": "free_orbital",
 }
-KINDS |= {kind: kind for kind in parts.KINDS if kind not in (*KINDS, "screw")}
+KINDS |= {kind: kind for kind in JOINT_KINDS if kind not in (*KINDS, "screw")}
 SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
 # elements without effect on the motion of bodies, or without use in a step
 READ = {"link", "joint", "loop_joint"}
@@ -66,7 +66,7 @@ class Geometry:
     color: tuple[float, ...] | None = None
     points: Floats | None = None
 
-    __repr__ = brief_repr
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class UrdfJoint:
     """A joint."""
 
     name: str
-    kind: str  # one of sim.parts.KINDS
+    kind: str  # one of sim.mechanism.joint.KINDS
     parent: str
     child: str
     pose: Pose  # of the joint frame, and so of the child's frame at coordinate zero, in the parent

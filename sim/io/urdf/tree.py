@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sim.io.urdf.inertia import RigidInertia
 from sim.io.urdf.robot import Robot, UrdfJoint, UrdfLink
 from sim.io.urdf.xml import UrdfError
-from sim.mechanism.parts import WORLD
+from sim.mechanism.joint import WORLD
 from sim.mechanism.pose import HERE, Pose, turn
 
 Floats = NDArray[np.float64]

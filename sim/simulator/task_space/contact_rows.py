@@ -15,15 +15,15 @@ from sim.contact.ground_contact import contact_jacobian, contact_kinematics
 from sim.derivatives.parameters.contact_columns import is_active
 from sim.derivatives.step_gradient import gradient
 from sim.dynamics.displacements import tree_moves, turn_bodies
-from sim.dynamics.joints.motion import Increment
+from sim.dynamics.joints.joint_motion import Increment
 from sim.dynamics.kinematics import displace, tree_poses, velocity_columns
 from sim.integrators.rollout import options_of
-from sim.model.columns import Kin, StepSetting
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.options import Guess
-from sim.simulator.task_space.rows import Rows, carried
+from sim.model.record_columns import Kin, StepSetting
+from sim.simulator.task_space.knot_rows import Rows, carried
 from sim.step import step
 from solvers.compiler import Table, kernel
 from solvers.dense import clear

@@ -14,11 +14,11 @@ from sim.contact.collision.edge_axes import OPEN
 from sim.contact.pairs.pair_contact import is_absent
 from sim.contact.pairs.pair_pose import place_shapes
 from sim.dynamics.kinematics import tree_poses
-from sim.model.columns import Witness
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
-from sim.simulator.task_space.rows import Rows, carried
+from sim.model.record_columns import Witness
+from sim.simulator.task_space.knot_rows import Rows, carried
 from solvers.compiler import Table, kernel
 from solvers.dense import clear
 from solvers.rotation import Vec3, rotate, three

@@ -13,7 +13,7 @@ from sim.dynamics.kinematics import velocity_columns
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
-from sim.simulator.task_space.rows import (
+from sim.simulator.task_space.knot_rows import (
     Rows,
     body_rotation,
     carried,

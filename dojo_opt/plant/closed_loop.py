@@ -1,0 +1,274 @@
+"""`closed_loop`: a controller and a plant over time, and the record of their motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.planning.component_names import chosen_components
+from dojo_opt.plant.ground_plane import GroundPlane
+from dojo_opt.plant.plant import Plant
+from dojo_opt.plant.tick import Tick
+from sim.mechanism import checks
+from sim.mechanism.memory_limit import check_room
+from sim.mechanism.short_repr import short_table
+from sim.simulator.results import Contacts, Interrupted
+from sim.simulator.simulator import Simulator
+from solvers.status import MESSAGES, Status
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Controller = Callable[[float, Vector], ArrayLike]
+
+__all__ = ["ClosedLoop", "closed_loop", "steps_of"]
+
+_RECORD = 500.0  # bytes of the objects that keep a step
+
+
+@dataclass(frozen=True, repr=False)
+class ClosedLoop:
+    """The record of a run, up to the end, a fall, or the first step of the plant that could not be solved.
+
+    Attributes:
+        simulator: simulator of the plant, perturbation included.
+        time: (N + 1,) times of the states [s].
+        x: (N + 1, nx) true states.
+        u: (N, nu of the plant) inputs that acted, pushes included [N, N m].
+        status: (N,) or (N + 1,) Status of every step that was tried.
+        contacts: contacts of every step, world axes.
+        survived: whether the run reached its end.
+        message: the end of the run as a sentence.
+        softened: number of steps of the plant that needed softer contact than its own, see `Plant`.
+        log: every tick of the controller; empty for a controller without ticks.
+        reference: states over time to be tracked, a function of times (n,) [s]; None without a reference.
+        tracked: numbers of the tracked coordinates, of an MPC those with a weight; None for all.
+    """
+
+    simulator: Simulator
+    time: Vector
+    x: Matrix
+    u: Matrix
+    status: Integers
+    contacts: Contacts
+    survived: bool
+    message: str
+    softened: int = 0
+    log: Sequence[Tick] = field(default=(), repr=False)
+    reference: Any = field(default=None, repr=False)
+    tracked: Integers | None = None
+
+    def __repr__(self) -> str:
+        return (
+            f"ClosedLoop({self.duration:g} s, {self.message} x {self.x.shape}, u {self.u.shape}, {len(self.log)} ticks)"
+        )
+
+    def _repr_html_(self) -> str:
+        rows = [] if self.reference is None else list(self.by_coordinate().items())
+        return short_table(repr(self), ("coordinate", "rms error [m or rad]"), rows)
+
+    @property
+    def duration(self) -> float:
+        """Length of the run [s]."""
+        return float(self.time[-1])
+
+    def error(self) -> Matrix:
+        """True (-) reference coordinates over time.
+
+        Returns:
+            (N + 1, nv) errors [m, rad].
+
+        Raises:
+            ValueError: the run has no reference.
+        """
+        if self.reference is None:
+            raise ValueError("ClosedLoop.error: no reference was given; use closed_loop(reference=...)")
+        sim = self.simulator
+        return sim.difference(self.x, np.asarray(self.reference(self.time)))[:, : sim.nv]
+
+    def rms(self, components: Any = None) -> float:
+        """Root mean square of the distance from the reference.
+
+        For several coordinates, squares of lengths [m] and of angles [rad] are added up. `by_coordinate` has each of
+        them by itself.
+
+        Args:
+            components: numbers below nv, or names as in `Mechanism.components` (default None: all `tracked` ones).
+
+        Returns:
+            The root mean square [m, rad].
+
+        Raises:
+            ValueError: the run has no reference, or a name is unknown.
+        """
+        error = self.error()
+        chosen = self.tracked
+        if components is not None or chosen is None:
+            chosen = chosen_components("ClosedLoop.rms(components)", components, self.simulator)
+        return float(np.sqrt(np.mean(np.sum(error[:, chosen[chosen < error.shape[1]]] ** 2, axis=1))))
+
+    def by_coordinate(self) -> dict[str, float]:
+        """Root mean square of the distance from the reference, by coordinate.
+
+        Returns:
+            {name of each tracked coordinate: its root mean square [m or rad]}.
+
+        Raises:
+            ValueError: the run has no reference.
+        """
+        each, names = np.sqrt(np.mean(self.error() ** 2, axis=0)), self.simulator.mechanism.dof_names
+        return {names[i]: float(each[i]) for i in (range(len(each)) if self.tracked is None else self.tracked)}
+
+
+def closed_loop(
+    controller: Controller,
+    plant: Plant,
+    duration: float,
+    *,
+    control_step: float | None = None,
+    reference: Any = None,
+    fallen: Callable[[Vector], bool] | None = None,
+) -> ClosedLoop:
+    """Run u = controller(time, measured state) on the plant, from the start of both.
+
+    Args:
+        controller: an `MPC`, which is reset, or any function of (time [s], state (nx,)) that returns an input (nu,)
+            [N, N m].
+        plant: the plant, which is reset.
+        duration: length of the run [s].
+        control_step: time between calls of the controller, whose answer is held in between [s]; a multiple of the time
+            step of the plant (default None: every time step).
+        reference: function of times (n,) [s] that returns the states (n, nx) of the error (default None: that of the
+            controller, raised by the height of the ground that the controller has learnt by then).
+        fallen: function of a state that returns whether the robot has fallen, which ends the run (default None:
+            `plant.fallen`).
+
+    Returns:
+        The motion, up to the end, a fall, or the first step of the plant that could not be solved.
+
+    Raises:
+        TypeError: for an argument of the wrong kind.
+        ValueError: for a number out of range, or an answer of the controller of the wrong shape.
+        Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the ClosedLoop until then.
+    """
+    if not isinstance(plant, Plant):
+        raise TypeError(f"closed_loop(plant): expected a Plant, such as Plant(simulator), got {plant!r}")
+    if not callable(controller):
+        raise TypeError(f"closed_loop(controller): expected an MPC or a function of (time, x), got {controller!r}")
+    h, steps = plant.sim.time_step, steps_of("closed_loop(duration)", plant, duration)
+    every = 1 if control_step is None else round(checks.number("closed_loop(control_step=...)", control_step) / h)
+    if every < 1 or (control_step is not None and abs(every * h - control_step) > 1e-9):
+        raise ValueError(
+            f"closed_loop(control_step=...): expected a multiple of the plant's step {h:g} s, got {control_step}"
+        )
+    plant.reset()
+    if hasattr(controller, "reset"):
+        controller.reset()
+    run = _LoopRecord([plant.x])
+    try:
+        _drive(run, controller, plant, steps, every, plant.fallen if fallen is None else fallen)
+    except KeyboardInterrupt:
+        run.survived, run.message = False, MESSAGES[Status.INTERRUPTED]
+        raise Interrupted(_closed_loop(run, controller, plant, reference)) from None
+    return _closed_loop(run, controller, plant, reference)
+
+
+def steps_of(call: str, plant: Plant, duration: float) -> int:
+    """Steps of the plant in a duration [s], whose record fits the memory."""
+    steps = round(checks.number(call, duration, above=0.0) / plant.sim.time_step)
+    numbers = plant.sim.nx + plant.sim.nu + 11 * plant.sim.ncontact
+    check_room(call, steps, _RECORD + 8.0 * numbers, "run it in parts")
+    return steps
+
+
+def _closed_loop(run: _LoopRecord, controller: Controller, plant: Plant, reference: Any) -> ClosedLoop:
+    """The record of the steps, as arrays."""
+    h, count = plant.sim.time_step, len(run.u)
+    own, tracked = getattr(controller, "references", None), None
+    if reference is None and own is not None and own.state is not None:
+        times = h * np.arange(float(len(run.planes)))
+        reference, tracked = OnPlanes(own.state, times, run.planes, plant.sim.nq), own.tracked
+    return ClosedLoop(
+        simulator=plant.simulator,
+        time=h * np.arange(count + 1.0),
+        x=np.array(run.x[: count + 1]),
+        u=np.array(run.u).reshape(count, plant.simulator.nu),
+        status=np.array(run.status, dtype=np.int64),
+        contacts=_stacked(plant.simulator, run.contacts[:count]),
+        survived=run.survived,
+        message=run.message,
+        softened=plant.softened,
+        log=tuple(run.log),
+        reference=reference,
+        tracked=tracked,
+    )
+
+
+class OnPlanes:
+    """States over time, carried onto the ground that was learnt until then."""
+
+    def __init__(self, level: Any, time: Vector, planes: Sequence[GroundPlane], nq: int) -> None:
+        self._level, self._time, self._planes, self._nq = level, time, planes, nq
+
+    def __call__(self, times: ArrayLike) -> Matrix:
+        """(n, nx) at the times (n,) [s]."""
+        x = np.array(self._level(times))
+        at = np.maximum(np.searchsorted(self._time, np.asarray(times) + 1e-9) - 1, 0)
+        planes = [self._planes[k] for k in at]
+        for plane in set(planes) - {GroundPlane()}:
+            rows = np.array([other == plane for other in planes])
+            x[rows] = plane.carry(x[rows], self._nq)
+        return x
+
+
+@dataclass
+class _LoopRecord:
+    """The record of the steps so far."""
+
+    x: list[Vector]
+    u: list[Vector] = field(default_factory=list)
+    contacts: list[Contacts] = field(default_factory=list)
+    status: list[int] = field(default_factory=list)
+    log: list[Tick] = field(default_factory=list)
+    planes: list[GroundPlane] = field(default_factory=list)  # that the reference was carried onto
+    survived: bool = True
+    message: str = "Ran to the end."
+
+
+def _drive(
+    run: _LoopRecord, controller: Controller, plant: Plant, steps: int, every: int, has_fallen: Callable[[Vector], bool]
+) -> None:
+    """Call the controller at regular steps of the plant, until the end, a fall, or an unsolved step."""
+    command = np.zeros(plant.sim.nu)
+    own, log = getattr(controller, "references", None), getattr(controller, "log", [])
+    for k in range(steps):
+        if k % every == 0:
+            answer = controller(plant.time, plant.measure().copy())  # a controller may write into its argument
+            command = checks.array("closed_loop: controller's u", answer, (plant.sim.nu,))
+            run.log += [tick for tick in log[-1:] if not run.log or tick is not run.log[-1]]
+        run.planes.append(GroundPlane() if own is None else own.plane)
+        u, result = plant.step(command)
+        run.status.append(int(result.status))
+        if result.status != Status.SOLVED:
+            run.message, run.survived = f"Plant, step {k}: {MESSAGES[result.status]}", False
+            break
+        run.contacts.append(result.contacts)
+        run.x.append(plant.x)
+        run.u.append(u)  # last: Ctrl-C may come between two of them, and counts the steps by this one
+        if has_fallen(plant.x.copy()):
+            run.message, run.survived = f"Fell at {plant.time:.3f} s.", False
+            break
+
+
+def _stacked(sim: Simulator, steps: Sequence[Contacts]) -> Contacts:
+    """The contacts of single steps, one after the other."""
+    shapes = {"normals": (3,), "impulse": (3,), "point": (3,), "gap": (), "slip": ()}
+    arrays = {
+        name: np.array([getattr(c, name) for c in steps], dtype=np.float64).reshape(len(steps), sim.ncontact, *shape)
+        for name, shape in shapes.items()
+    }
+    return Contacts(sim.mechanism.contact_names, time_step=sim.time_step, **arrays)

@@ -1,0 +1,151 @@
+"""Inputs from the actuators of an MJCF file, and notes on its unsupported elements."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.io.mjcf.joints import BALL, FREE
+from sim.io.mjcf.welded_bodies import Where, name_of, pose_of
+from sim.io.urdf.report import Notes
+from sim.mechanism.input import Input
+from sim.mechanism.joint import Joint
+
+Floats = NDArray[np.float64]
+
+_JOINT, _JOINT_IN_PARENT, _SITE = 0, 1, 4  # mjtTrn
+_FIXED_GAIN, _NO_BIAS, _NO_DYNAMICS = 0, 0, 0  # mjtGain, mjtBias, mjtDyn
+_AFFINE_BIAS = 1
+
+
+def find_inputs(
+    model: Any, homes: dict[int, tuple[str, int]], where: Where, notes: Notes
+) -> tuple[list[Input], Floats, Floats, Floats]:
+    """(inputs, gear, low, high): one input per actuator on a hinge, a slide or a site; bounds of u = gear * ctrl.
+
+    That of a site is the wrench that moves with it, per unit of the actuator's force; that of a servo is its target.
+    """
+    inputs: list[Input] = []
+    rows: list[tuple[float, float, float]] = []
+    for a in range(model.nu):
+        name, j = name_of(model, "actuator", a), int(model.actuator_trnid[a, 0])
+        wrench = _at_site(model, a, name, where)
+        on_joint = int(model.actuator_trntype[a]) in (_JOINT, _JOINT_IN_PARENT)
+        if wrench is None and (not on_joint or model.jnt_type[j] in (FREE, BALL)):
+            notes.add("actuators that do not drive a hinge, a slide or a site are omitted", [name], warn=True)
+            continue
+        servo = None if wrench else _servo(model, a)
+        if servo is not None:
+            part, ratio = replace(servo, joint=homes[j][0], dof=homes[j][1], name=name), 1.0 / model.actuator_gear[a, 0]
+            low, high = _ctrl_bounds(model, a, ratio)
+            if model.actuator_forcelimited[a]:
+                ends = sorted(float(x * model.actuator_gear[a, 0]) for x in model.actuator_forcerange[a])
+                part = replace(part, force_limits=(ends[0], ends[1]))
+            inputs.append(replace(part, limits=(low, high)) if low < high else part)
+            rows.append((ratio, low, high))
+            continue
+        plain = model.actuator_gaintype[a] == _FIXED_GAIN and model.actuator_biastype[a] == _NO_BIAS
+        if not plain or model.actuator_dyntype[a] != _NO_DYNAMICS:
+            notes.add("actuators with dynamics or a bias that is no servo's are plain forces here", [name], warn=True)
+        ratio = 1.0 if wrench else float(model.actuator_gear[a, 0])
+        gear = ratio * (float(model.actuator_gainprm[a, 0]) if plain else 1.0)
+        low, high = _bounds(model, a, gear, ratio, bool(plain))
+        part = wrench or Input(homes[j][0], dof=homes[j][1], name=name)
+        inputs.append(replace(part, limits=(low, high)) if low < high else part)
+        rows.append((gear, low, high))
+    table = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    return inputs, table[:, 0], table[:, 1], table[:, 2]
+
+
+def _servo(model: Any, a: int) -> Input | None:
+    """The servo that an actuator of a joint is, for a target in units of the joint; None of others.
+
+    Its force is kp ctrl - kp l - kd l' or kd (ctrl - l') of the length l = gear q.
+    """
+    affine = model.actuator_gaintype[a] == _FIXED_GAIN and model.actuator_biastype[a] == _AFFINE_BIAS
+    gear = float(model.actuator_gear[a, 0])
+    if not affine or model.actuator_dyntype[a] != _NO_DYNAMICS or gear == 0.0:
+        return None
+    gain, (constant, place, rate) = float(model.actuator_gainprm[a, 0]), model.actuator_biasprm[a, :3].tolist()
+    if constant != 0.0 or gain <= 0.0 or rate > 0.0:
+        return None
+    if place == -gain:
+        return Input("a joint", servo="position", stiffness=gain * gear**2, damping=-rate * gear**2)
+    if place == 0.0 and rate == -gain:
+        return Input("a joint", servo="velocity", damping=gain * gear**2)
+    return None
+
+
+def _at_site(model: Any, a: int, name: str, where: Where) -> Input | None:
+    """The force and torque of an actuator on a site of a moving body, about its centre of mass; None of others."""
+    site, reference = (int(k) for k in model.actuator_trnid[a])
+    if int(model.actuator_trntype[a]) != _SITE or reference >= 0:
+        return None
+    group, frame = where[int(model.site_bodyid[site])]
+    gear = np.array(model.actuator_gear[a], dtype=np.float64)
+    if group is None or not gear.any():
+        return None
+    at = frame.then(pose_of(model.site_pos[site], model.site_quat[site]))
+    force, torque = at.rotation @ gear[:3], at.rotation @ gear[3:]
+    torque = torque + np.cross(at.point - group.com, force)
+    return Input(body=group.name, force=force, torque=torque, frame="body", name=name)
+
+
+def _bounds(model: Any, a: int, gear: float, ratio: float, plain: bool) -> tuple[float, float]:
+    """Bounds of an input from those of its control, and of its force times the ratio [N, N m]."""
+    low, high = _ctrl_bounds(model, a, gear) if plain else (-np.inf, np.inf)
+    if model.actuator_forcelimited[a]:
+        ends = sorted(float(ratio * x) for x in model.actuator_forcerange[a])
+        low, high = max(low, ends[0]), min(high, ends[1])
+    return low, high
+
+
+def _ctrl_bounds(model: Any, a: int, gear: float) -> tuple[float, float]:
+    """Bounds of an input from those of its control."""
+    if not model.actuator_ctrllimited[a]:
+        return -np.inf, np.inf
+    low, high = sorted(float(gear * x) for x in model.actuator_ctrlrange[a])
+    return low, high
+
+
+def with_friction(
+    model: Any, joints: list[Joint], homes: dict[int, tuple[str, int]], wanted: bool, notes: Notes
+) -> list[Joint]:
+    """The joints with the dry friction of the file, where it is wanted and they can have it."""
+    forces = {joint.name: np.zeros(joint.nv) for joint in joints}
+    rough = sorted({int(model.dof_jntid[d]) for d in np.flatnonzero(model.dof_frictionloss)})
+    missing = []
+    for j in rough:
+        if not wanted or model.jnt_type[j] in (FREE, BALL):
+            missing.append(name_of(model, "joint", j))
+            continue
+        name, dof = homes[j]
+        forces[name][dof] = model.dof_frictionloss[model.jnt_dofadr[j]]
+    if missing:
+        text = "dry friction of joints is omitted; joint_friction=True adds that of hinges and slides"
+        notes.add(text, missing, warn=True)
+    return [replace(joint, friction=forces[joint.name]) if forces[joint.name].any() else joint for joint in joints]
+
+
+def left_out(model: Any, collisions: bool, notes: Notes) -> None:
+    """Notes on the elements of the file that the mechanism lacks."""
+    if model.ntendon:
+        forces = (model.tendon_stiffness, model.tendon_damping, model.tendon_limited, model.tendon_frictionloss)
+        felt = any(np.any(field) for field in forces)
+        notes.add("tendons are omitted", [name_of(model, "tendon", k) for k in range(model.ntendon)], warn=felt)
+    if model.npair and not collisions:
+        notes.add("explicit contact pairs are omitted", [name_of(model, "pair", k) for k in range(model.npair)])
+    for field, feature in (("dof_dampingpoly", "nonlinear damping"), ("jnt_stiffnesspoly", "nonlinear stiffness")):
+        if np.any(getattr(model, field, 0.0)):
+            notes.add(f"{feature} is omitted", warn=True)
+    if model.opt.density or model.opt.viscosity:
+        notes.add("the drag of a fluid is omitted", warn=True)
+    moving = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] != 0]
+    types, affinities = model.geom_contype[moving], model.geom_conaffinity[moving]
+    if collisions or not len(moving):
+        return
+    if np.any(types[:, None] & affinities[None, :]):
+        notes.add("bodies do not collide with one another (collisions=True lets them)")
