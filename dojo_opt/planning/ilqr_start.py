@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 _GOOD_FIT = 2.0  # times the least sum of squared gaps: a guess fits a smoother stage nearly as well
 _REST = 1e-9  # [m, rad] largest motion from one knot to the next of a joint at rest
 _ASKED = 1e-6  # [m, rad, m/s, rad/s] Newton step above which the objective asks a joint to move
+_ROUNDED = 1e-12  # of the largest gradient: a smaller one is rounding, such as that of a wrist that turns about the tip
 _CURVED = 1e-8  # curvature, relative to that of the components, below which a direction is rounding
 _CYCLES = 200  # a trot takes 20
 _TOLERANCE = 1e-8  # change of the value from one cycle to the next, relative to its largest curvature
@@ -58,7 +59,7 @@ def at_rest(sim: Simulator, objective: Objective, now: Iterate) -> bool:
     objective.expand(now.x, now.u)
     gradient = np.abs(objective.g[1:, : sim.ndx])
     curvature = np.abs(objective.H[1:].diagonal(axis1=1, axis2=2)[:, : sim.ndx])
-    asked = np.any(gradient > _ASKED * curvature, axis=0)
+    asked = np.any(gradient > np.maximum(_ASKED * curvature, _ROUNDED * gradient.max()), axis=0)
     asked = asked[: sim.nv] | asked[sim.nv :] | (start > _ASKED)
     rests = np.all(steps[1:] <= _REST, axis=0)
     first = 0

@@ -27,11 +27,14 @@ Array = NDArray[np.float64]
 # of a robot as high as the A1: lengths go with the height, times and speeds with its root
 _PERIOD, _SPEED, _LIFT = 0.6, 0.2, 0.04  # of a trot [s], [m/s], [m]
 _KNOTS = 20  # of a period
+_SUBSTEPS = 2  # of a knot: gaits planned with steps of 50 ms and more fall when they are replayed with shorter ones
 _STEP = 0.02  # [s] of jumps and of standing up
 _LOWS = (0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)  # of the height of the stance, where rising begins
 _STRIDE = 0.7  # [s] of a walk on two feet
 _SINK, _RAISE = 0.4, 0.25  # of the way down that flat feet allow: how much lower the base is in a walk, and their lift
 _LOOSE = 0.2  # of the usual damper, which takes much of the torque of ankles that push off
+_SHARES = (1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2)  # of the usual distance and height of a jump, from the most
+_STRAIN = 1.3  # times the torque limits: largest torques of the reference of a jump, which plans spread over more time
 _CROUCH = 0.8  # of the way down that the legs allow, at most, before a jump
 _LEAST = 1e-3  # [s] time steps are multiples of this
 
@@ -52,7 +55,7 @@ def trot(
 
     Feet and stance of another robot are found, see `dojo_opt.gaits.legs.Legs`; weights, times and lengths follow from
     its weight and height h: two periods of 0.6 s at 0.2 m/s for h = 0.29 m, in proportion to the root of h, with 20
-    knots each. Torques stay within the limits of its inputs. Six legs move in two sets of three.
+    knots of two time steps each. Torques stay within the limits of its inputs. Six legs move in two sets of three.
 
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
@@ -87,7 +90,7 @@ def walk(
     """A robot walks, one foot after the other: the library's quadruped, or any robot with two or four legs.
 
     Others walk for two periods of 1 s, 0.7 s on two feet, at 0.1 m/s for a height of 0.29 m, in proportion to the root
-    of the height, with 20 knots each; all else is as for `trot`.
+    of the height, with 20 knots of two time steps each; all else is as for `trot`.
 
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
@@ -113,9 +116,9 @@ def _periodic(legs: Legs, name: str, period: float, speed: float, settings: dict
     """The problem to follow two periods of a gait; period [s] and speed [m/s] of a robot as high as the A1."""
     slow = legs.size**0.5
     step = _rounded(settings.pop("period", period * slow) / _KNOTS)
-    follows, rest = _shared_out(settings)
+    follows, rest = _shared_out({"substeps": _SUBSTEPS, **settings})
     usual = {"speed": speed * slow, "step_height": _LIFT * legs.size, "cycles": 1 if follows.get("periodic") else 2}
-    substeps = whole_number(f"problems.{name}(substeps=...)", follows.get("substeps", 1))
+    substeps = whole_number(f"problems.{name}(substeps=...)", follows["substeps"])
     sim = legs.simulator(step / substeps, PLANNED)
     if Feet(sim).flat:  # legs that are nearly stretched reach neither to the side nor ahead
         bend = _deepest(sim, legs.height)
@@ -138,7 +141,9 @@ def jump(
     height at the top is a constraint.
 
     The quadruped jumps 0.3 m far and 0.2 m high. Others jump as far and high for their height h, that of the quadruped
-    being 0.29 m, a third of it on flat feet; times follow the root of h, weights the robot's weight and height.
+    being 0.29 m, a third of it on flat feet; times follow the root of h, weights the robot's weight and height. A robot
+    whose joints are too weak for that jumps less far and high by default: the torques of the reference, by inverse
+    dynamics, exceed no limit by more than 30 %, which plans make up for.
 
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
@@ -171,8 +176,23 @@ def jump(
     if not {"crouch", "clearance"} <= rest.keys():  # both bend the legs
         bend = _CROUCH * _deepest(sim, legs.height)
         usual |= {name: min(usual[name], bend) for name in ("crouch", "clearance")}
-    gait = gaits.jump(sim, **{**usual, **rest})
+    gait = _strongest(legs, sim, usual, rest)
     return locomotion.with_apex(_scaled(legs, gait, follows), refinement)
+
+
+def _strongest(legs: Legs, sim: Simulator, usual: dict[str, float], given: dict[str, Any]) -> Gait:
+    """The jump of the usual distance and height, or of a share of them that the joints are strong enough for."""
+    limits = legs.mechanism.input_limits
+    for share in _SHARES:
+        smaller = {name: share * usual[name] for name in ("distance", "height")}
+        gait = gaits.jump(sim, **{**usual, **smaller, **given})
+        if limits is None or "height" in given:
+            break
+        low, high = (_STRAIN * np.asarray(bound) for bound in limits)
+        torques = gait.torques()
+        if np.all((low <= torques) & (torques <= high)):
+            break
+    return gait
 
 
 def _of_the_quadruped(call: str, feet: Any, stance: Any, settings: dict[str, Any]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import dojo_opt as dojo
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.planning.ilqr import FAILED, Solver
+from dojo_opt.planning.ilqr_start import at_rest as resting_joint
 from solvers.status import Status
 
 
@@ -148,3 +150,17 @@ def test_where_one_stage_fails_the_planner_begins_at_another(monkeypatch):
     firsts.clear()
     monkeypatch.setattr(solver, "_descend", lambda first: firsts.append(first) or Status.TIME_LIMIT)
     assert solver.solve().status == Status.TIME_LIMIT and firsts == [0] and Status.TIME_LIMIT not in FAILED
+
+
+@pytest.mark.parametrize(
+    ("slope", "curvature", "asked"), [(1e-29, 1e-34, False), (1e-5, 1e-3, True), (1e-5, 0.0, True)]
+)
+def test_rounding_of_a_gradient_asks_no_joint_to_move(slope, curvature, asked):
+    """A wrist that turns about the tip has no part in the task, and yet its Newton step, 0/0, is not zero."""
+    sim = dojo.Simulator(dojo.models.double_pendulum(), time_step=0.02)
+    x = np.tile(sim.neutral(), (6, 1))
+    x[:, 0] += np.linspace(0.0, 0.1, 6)  # the second link rests
+    g, H = np.zeros((6, sim.ndx + sim.nu)), np.zeros((6, sim.ndx + sim.nu, sim.ndx + sim.nu))
+    g[-1, [0, 1]], H[-1, [0, 1], [0, 1]] = (1e-3, slope), (1.0, curvature)
+    objective = SimpleNamespace(g=g, H=H, expand=lambda x, u: None)
+    assert resting_joint(sim, objective, SimpleNamespace(x=x, u=None)) == asked

@@ -57,6 +57,24 @@ def test_a_robot_trots_and_jumps(straight, task):
     assert plan.success, plan.message
     assert (1.0 - 2.0 * (plan.x[:, 4] ** 2 + plan.x[:, 5] ** 2)).min() > 0.9
     assert plan.x[-1, 0] - plan.x[0, 0] > 0.1
+    sim, parts = plan.problem.sim, 5 * plan.problem.substeps
+    fine, limits = sim.replace(time_step=sim.time_step / 5), plan.problem.control_limits
+    shot = fine.closed_loop(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=parts, limits=limits)
+    assert shot.success and np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < 0.01
+
+
+def test_weak_joints_jump_as_high_as_they_can(straight):
+    """Twice and four times the torque that carries the robot; a height that the user gives is not changed."""
+    legs = Legs(straight)
+    hold = np.abs(dojo.equilibrium(legs.simulator(0.01, 1e-6))[1]).max()
+    heights = []
+    for strong in (2.0, 4.0):
+        inputs = [replace(i, limits=(-strong * hold, strong * hold)) for i in straight.inputs]
+        weak = replace(straight, inputs=inputs)
+        heights.append([dojo.problems.jump(weak, **kw).specs[0][0].reference for kw in ({}, {"height": 0.2})])
+    rises = np.array([[path[:, 2].max() - path[0, 2] for path in pair] for pair in heights])
+    assert 0.02 < rises[0, 0] < 0.7 * rises[1, 0]
+    np.testing.assert_allclose(rises[:, 1], 0.2, atol=0.01)
 
 
 def test_six_legs_trot_in_two_sets_of_three():
