@@ -236,6 +236,32 @@ def twice_kinetic(model: Model, data: Data, h: float, v: Vector) -> float:
 
 
 @kernel
+def unjoined_energy(model: Model, data: Data, h: float, v: Vector) -> float:
+    """Kinetic energy at configuration 3 of bodies and rotors that arrive there, without their joints [J]:
+
+        (sum of m |x3 - x2|^2/h^2 + P.J^-1 P + I v^2)/2
+
+    P: angular momentum of a body at the end of the interval, turned back to configuration 2, as J is. No joint and
+    no damper lets as much energy arrive: M^-1 is largest, for given momenta, where all bodies are free.
+    """
+    energy = 0.0
+    for i in range(model.body_parent.shape[0]):
+        J, t, m = data.inertia_world[i], data.turn[i], model.body_mass[i]
+        P = angular_momentum(data.inertia_world, i, h, t[0], -t[1], -t[2], -t[3])
+        a, b, c = cross(J[3], J[4], J[5], J[6], J[7], J[8])
+        determinant = J[0] * a + J[1] * b + J[2] * c
+        q0, q1, q2 = cross(J[6], J[7], J[8], J[0], J[1], J[2])
+        r0, r1, r2 = cross(J[0], J[1], J[2], J[3], J[4], J[5])
+        spin = P[0] * (a * P[0] + b * P[1] + c * P[2]) + P[1] * (q0 * P[0] + q1 * P[1] + q2 * P[2])
+        energy += 0.5 * (spin + P[2] * (r0 * P[0] + r1 * P[1] + r2 * P[2])) / determinant
+        for k in range(3):
+            energy += 0.5 * m * data.move[i, k] * data.move[i, k] / (h * h)
+    for d in range(v.shape[0]):
+        energy += 0.5 * model.dof_armature[d] * v[d] * v[d]
+    return energy
+
+
+@kernel
 def energies(model_at: Table, data_at: Table, h: float, xs: Matrix, out: Matrix) -> None:
     """out[t] = (kinetic, potential) energy of state t [J].   xs: (n, nx); out: (n, 2)."""
     model = model_view(model_at)

@@ -5,6 +5,7 @@ import pytest
 from naive import rotation as rot
 
 import dojo_opt as dojo
+from sim.dynamics.energy import unjoined_energy
 from sim.model.layout import data_view, model_view
 from sim.simulator.link_kernels import link_step
 from sim.solve.energy_balance import arriving_energy, constraint_work, work_at_node
@@ -22,6 +23,13 @@ def joints_work(model_at, data_at, h, v):
 @local_kernel
 def arriving(model_at, data_at, h, v, third, fall=0.0):
     return arriving_energy(model_view(model_at), data_view(data_at), h, v, third, fall)
+
+
+@local_kernel
+def most(model_at, data_at, h, v):
+    """Bound of the kinetic energy with which the bodies arrive at configuration 3."""
+    model, data = model_view(model_at), data_view(data_at)
+    return unjoined_energy(model, data, h, v)
 
 
 @local_kernel
@@ -100,6 +108,20 @@ def test_energy_on_arrival_agrees_with_the_simulator(kind, damper, rng):
         sim.step(x)
         ours = arriving(*tables(sim), sim.time_step, state[sim.nq :].copy(), third)
         assert abs(ours - sim.kinetic_energy(state)) < close * (1.0 + ours)
+
+
+@pytest.mark.parametrize("damper", [0.0, 0.5])
+@pytest.mark.parametrize("kind", KINDS)
+def test_energy_on_arrival_has_a_bound(kind, damper, rng):
+    """Also for turns by half a radian; of slow bodies, the bound is the energy."""
+    sim = dojo.Simulator(chain(kind, 2, damper=damper), time_step=0.03, tolerance=1e-12)
+    for speed in (15.0, 0.01):
+        x = random_state(sim, rng, speed=speed)
+        v = sim.step(x, throw=True).x[sim.nq :].copy()
+        ours, bound = arriving(*tables(sim), 0.03, v, True), most(*tables(sim), 0.03, v)
+        assert ours <= bound * (1.0 + 1e-12)
+    if not damper:
+        assert bound < 1.001 * ours
 
 
 @pytest.mark.parametrize(
