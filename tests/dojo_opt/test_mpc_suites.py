@@ -52,6 +52,21 @@ def test_an_arm_rolls_a_ball(seed):
     assert np.abs(loop.x[-1, 22]) > 0.05
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "seconds", "least"), [("jaco", 1.3, 45.0), ("dual_jaco", 1.0, 30.0)])
+def test_arms_turn_a_box(name, seconds, least):
+    """About x, which is towards the goal: one arm tips it over its edge, two tilt it between their stubs."""
+    task = getattr(dojo.tasks.idto, name)()
+    loop = task.run(seconds=seconds)
+    assert loop.survived
+    w, x, *rest = loop.x[-1, task.model.nu + 3 : task.model.nu + 7]
+    assert np.degrees(2.0 * np.arctan2(x, w)) > least
+    assert np.linalg.norm(rest) < 0.1
+    outcome = task.outcome(loop)
+    assert outcome.penetration < 1e-4
+    assert set(outcome.measures) == {"at the goal [s]", "angle off [deg]", "off [mm]"}
+
+
 def test_a_puck_is_pushed_towards_its_goal():
     """Over a gap of .3 m, which no contact reaches at first; its heading is hardly changed by the rim's friction."""
     task = dojo.tasks.idto.air_hockey()
