@@ -104,6 +104,7 @@ class Data(NamedTuple):
     node_row: Integers  # (ncouple + 1,) Nodes of solvers/block_lu.py: the active couplings, or one of all rows
     node_span: IntegerMatrix  # (ncouple, ncouple + 2)
     feature_choice: Integers  # (1,) FeatureChoice: when active features of shapes are chosen
+    strategy_solves: Integers  # (64,) solutions by start strategy (solve/globalization.py) since the Data was made
     overlap_allowed: Integers  # (1,) 1 where a small overlap in other features is accepted
     inactive: Matrix  # (nground, 38) Inactive, see contact/inactive.py
     inactive_share: Vector  # (1,) change of a cluster's impulses below which they stand [N s]

@@ -200,6 +200,8 @@ def solve_active(
         data.overlap_allowed[0] = 1 if s.overlap else 0
         out, verdict = attempt(model, data, options, inputs, s, out.iterations, known)
         if verdict == Verdict.VALID and (out.status == Status.SOLVED or out.status == Status.MAX_ITERATIONS):
+            if out.status == Status.SOLVED:
+                data.strategy_solves[k] += 1
             break
         refused = verdict == Verdict.OVERLAPPING or verdict == Verdict.TUNNELLED
         why = Status.COLLISION_STEP.value if refused else Status.NO_PROGRESS.value
