@@ -19,6 +19,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -63,7 +64,6 @@ class Identified:
         rms: root mean square of the errors over their noise: 1 if the given noise is right.
         unseen: combinations, by label, that change no prediction and have no prior.
         outliers: share of states with reduced weight.
-        unsolved: windows without a prediction at the end, which are not counted.
         cost: cost of the data and the prior, see the module.
         starts: (nx,) of every window.
         windows: the measured windows.
@@ -84,7 +84,6 @@ class Identified:
     rms: float
     unseen: list[dict[str, float]]
     outliers: float
-    unsolved: int
     cost: float = float("nan")
     starts: list[Floats] = field(default_factory=list)
     windows: list[Window] = field(default_factory=list)
@@ -92,6 +91,11 @@ class Identified:
     solved: list[bool] = field(default_factory=list)
     history: list[dict[str, Any]] = field(default_factory=list)
     seconds: float = 0.0
+
+    @property
+    def unsolved(self) -> int:
+        """Number of windows without a prediction at the end, which are not counted."""
+        return self.solved.count(False)
 
     @property
     def deviation(self) -> Floats:
@@ -106,12 +110,16 @@ class Identified:
             return self.covariance / np.outer(d, d)
 
     def predictions(self) -> list[tuple[Window, Trajectory, Floats]]:
-        """The motions that the values predict, of all windows but the unsolved ones.
+        """The motions that the values predict, of all windows but the unsolved ones; computed once.
 
         Returns:
             The window, the trajectory from its start, and (T + 1, ndx) the residuals: predicted (-) measured states
             over the noise, 0 where the noise is infinite.
         """
+        return list(self._predictions)
+
+    @cached_property
+    def _predictions(self) -> list[tuple[Window, Trajectory, Floats]]:
         out, sim = [], self.simulator
         for window, start, solved in zip(self.windows, self.starts, self.solved, strict=True):
             path = sim.rollout(start, window.u) if solved else None
@@ -439,7 +447,7 @@ def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str,
     ]
     return Identified(
         status == Status.SOLVED, status, MESSAGES[status], space.labels, fit.theta, space.values, covariance,
-        space.simulator(fit.theta), float(np.sqrt(cost / max(count, 1))), unseen, far, usable.count(False),
+        space.simulator(fit.theta), float(np.sqrt(cost / max(count, 1))), unseen, far,
         fit.rest(cost, found, usable), fit.starts, fit.windows, fit.predictor.noise, usable,
         history, time.process_time() - began,
     )  # fmt: skip

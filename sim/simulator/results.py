@@ -571,7 +571,7 @@ def sentence(
     status, iterations, residual, violation, contact = report[:5]
     reason = Status(int(status))
     text = f"{where}: {MESSAGES[reason]}"
-    if reason == Status.CONTACT_SUNK:
+    if reason == Status.CONTACT_SUNK and contact >= 0:
         text += f" It is {mech.contact_names[int(contact)]!r}."
     if reason in (Status.MAX_ITERATIONS, Status.NO_PROGRESS):
         text += f" Residual {residual:.1e} after {int(iterations)} iterations (tolerance {tolerance:g})"

@@ -16,15 +16,16 @@ from numpy.typing import ArrayLike, NDArray
 from sim.integrators.parallel_loops import BatchBuffers, RowTables, linearize_rows, roll_rows
 from sim.integrators.rollout import Linearized, MotionBuffers
 from sim.mechanism import checks
+from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory_limit import room_for
 from sim.mechanism.short_repr import short_repr
 from sim.model.interruptible_loops import pieces
 from sim.model.record_columns import StepReport, StepSetting
 from sim.simulator.division import DIVISIBLE, Division
 from sim.simulator.engine import REPORT, Engine, finite_rows, refuse
-from sim.simulator.results import Result, ended
+from sim.simulator.results import Result, ended, sentence
 from sim.simulator.state_space import StateSpace
-from solvers.status import MESSAGES, Status
+from solvers.status import Status
 from solvers.types import Integers
 
 Floats = NDArray[np.float64]
@@ -132,8 +133,8 @@ class RowBatch:
 
     __repr__ = short_repr
 
-    def step(self, derivatives: bool) -> BatchStep:
-        """One knot of every row."""
+    def step(self, derivatives: bool) -> tuple[BatchStep, Floats]:
+        """One knot of every row, and the report of each."""
         first = self.engines[0]
         n = len(self.us)
         A, B = (np.zeros((n if derivatives else 0, first.ndx, size)) for size in (first.ndx, first.nu))
@@ -154,7 +155,7 @@ class RowBatch:
             x_next[i] = self.xs[i]
             A[i : i + 1], B[i : i + 1] = 0.0, 0.0
         statuses, iterations = (reports[:, k].astype(np.int64) for k in (StepReport.STATUS, StepReport.ITERATIONS))
-        return BatchStep(x_next, statuses, iterations, A, B)
+        return BatchStep(x_next, statuses, iterations, A, B), reports
 
     def _kappa(self, row: int) -> float | None:
         """Kappa of a row; None for that of its engine."""
@@ -229,7 +230,7 @@ class RowBatch:
                 A[rows], B[rows], x_next[rows], reports[rows] = engine.linearize(xs, us, self.substeps, None)
             else:
                 found, status, _ = engine.roll_batch(xs, np.repeat(us[:, None], self.substeps, axis=1))
-                reports[rows, StepReport.STATUS] = status
+                reports[rows, StepReport.STATUS], reports[rows, StepReport.WORST] = status, -1.0  # not reported
                 x_next[rows] = found[:, -1]
 
 
@@ -237,12 +238,13 @@ class SingleRow:
     """Knots of one row after another, in buffers of its own: its threads and arrays would take as long as its steps.
 
     Args:
-        engine: of a simulator.
+        mechanism: of a simulator.
+        engine: of the simulator.
         steps: per knot.
     """
 
-    def __init__(self, engine: Engine, steps: int) -> None:
-        self._engine, self._steps = engine, steps
+    def __init__(self, mechanism: Mechanism, engine: Engine, steps: int) -> None:
+        self._mechanism, self._engine, self._steps = mechanism, engine, steps
         xs, us, reports = np.empty((steps + 1, engine.nx)), np.empty((steps, engine.nu)), np.empty((steps, REPORT))
         self._motion = MotionBuffers(xs, us, engine.external(None), reports, *engine.unkept)
         self._division = Division.none(steps)
@@ -286,7 +288,7 @@ class SingleRow:
         status, iterations = last[:2].astype(np.int64)[:, None]
         if solved:
             return BatchStep(self.end[None].copy(), status, iterations, *self._none)
-        detail = f"Simulator.step_batch: row 0: {MESSAGES[Status(int(status[0]))]}"
+        detail = sentence(self._mechanism, "Simulator.step_batch: row 0", last, self._engine.settings.tolerance)
         return BatchStep(states, status, iterations, *self._none, detail)
 
 
@@ -344,11 +346,10 @@ class RowStepping(StateSpace):
             if not np.all(kappas > 0.0):
                 raise ValueError(f"{call}(kappa=...): expected numbers above 0, got {kappa!r}")
         engines, index = self._row_models.of(f"{call}(parameters=...)", parameters, count)
-        found = RowBatch(engines, index, states, inputs, steps, kappas).step(bool(derivatives))
+        found, reports = RowBatch(engines, index, states, inputs, steps, kappas).step(bool(derivatives))
         if len(found.unsolved):
             i = int(found.unsolved[0])
-            reason = Status(int(found.status[i]))
-            found = replace(found, detail=f"{call}: row {i}: {MESSAGES[reason]}")
+            found = replace(found, detail=sentence(self.mechanism, f"{call}: row {i}", reports[i], self.tolerance))
         return ended(found, throw)
 
     @cached_property
@@ -376,7 +377,7 @@ class RowStepping(StateSpace):
                     "Simulator.single_row: expected a simulator without an accuracy, and of order 2 where there are "
                     "contacts or limits"
                 )
-            self._single_rows[key] = SingleRow(self._engine, steps)
+            self._single_rows[key] = SingleRow(self.mechanism, self._engine, steps)
         return self._single_rows[key]
 
     @property

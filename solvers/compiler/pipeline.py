@@ -13,8 +13,11 @@ import sys
 from typing import Any, NamedTuple
 
 import numba
+from numba.core import config
 from numba.core.compiler import Compiler, CompileResult
+from numba.core.untyped_passes import IRProcessing
 
+from solvers.compiler.index_checks import RefuseNegativeIndices
 from solvers.compiler.index_typing import IndexTyping
 from solvers.compiler.operators import OPERATORS, with_our_cases
 from solvers.compiler.progress import compiling
@@ -52,6 +55,15 @@ class PlainCompiler(Compiler):
     def __init__(self, typingctx: Any, *others: Any) -> None:
         super().__init__(_PlainTyping(typingctx), *others)
         self.state.targetctx.typing_context = self.state.typingctx  # of a copy that is this compilation's own
+
+    def define_pipelines(self) -> list[Any]:
+        """Numba's passes, and a look at indices where bounds are checked."""
+        pipelines: list[Any] = super().define_pipelines()
+        if self.own and config.BOUNDSCHECK:
+            for passes in pipelines:
+                passes.add_pass_after(RefuseNegativeIndices, IRProcessing)
+                passes.finalize()
+        return pipelines
 
     def compile_extra(self, func: Any) -> Any:
         """Compile one function."""

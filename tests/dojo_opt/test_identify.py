@@ -189,7 +189,8 @@ def test_a_report_has_parameters_residuals_and_both_motions(tmp_path):
         motions.append((path.x + 0.01 * rng.standard_normal(path.x.shape), path.u))
     found = dojo.identify(truth.with_parameters({"damper": 0.1}), motions, ("damper", "mass:link_0"), noise=0.01)
     predictions = found.predictions()
-    assert [window.trajectory for window, *_ in predictions] == [0, 1]
+    assert [window.trajectory for window, *_ in predictions] == [0, 1] and found.unsolved == 0
+    assert found.predictions()[0][1] is predictions[0][1], "a report and its figure share them"
     values = np.concatenate([residuals.ravel() for *_, residuals in predictions])
     assert np.sqrt(np.mean(values**2)) == pytest.approx(found.rms, rel=1e-6)
     files = dojo.identification_report(found, tmp_path / "fit")
