@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import pickletools
 import shutil
 import signal
 import stat
@@ -15,9 +16,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding as llvm
 import pytest
 
 from solvers.compiler import targets
+from solvers.compiler.crossing import SYSTEMS
 from solvers.compiler.shipped import SUFFIX, Shipped, write_shipped
 from support.fork_server import forked
 from support.programs import HOME, PACKAGES, python
@@ -29,7 +32,7 @@ pytestmark = [
 ]
 
 OWN = """
-from solvers.compiler import kernel, parallel_kernel, prange, users_callee, users_loop
+from solvers.compiler import kernel, parallel_kernel, prange, seconds, users_callee, users_loop
 
 @kernel
 def inner(x):
@@ -45,6 +48,10 @@ def total(a):
     for i in prange(a.shape[0]):
         out += one(a[i])
     return out
+
+@kernel
+def clock():
+    return seconds()
 
 @users_callee
 def half(x):
@@ -70,8 +77,20 @@ from pathlib import Path
 from solvers.compiler.cache import ship
 ship(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3])
 """
+SHIP_ABROAD = """
+from pathlib import Path
+from solvers.compiler.cache import ship
+from solvers.compiler.crossing import SYSTEMS
+for name, system in SYSTEMS.items():
+    ship(Path("cache").resolve() / name, Path("abroad").resolve() / name, system.target)
+"""
 CALL_ONE = CALL.replace("total(np.ones(3))", "3.0 * one(1.0)")  # the loop over threads takes longest to compile
 CALL_LOOP = CALL.replace("import one, total", "import looped").replace("one(1.0), total(np.ones(3))", "looped(3.0)")
+CALL_CLOCK = (
+    CALL.replace("import one, total", "import clock")
+    .replace("one(1.0), total(np.ones(3))", "abs(clock() - time.monotonic()) // 1.0")
+    .replace("import json", "import json, time")
+)
 NUMBERS = [4.0, 12.0]
 HEAD = 17 + 32 + 8  # bytes before the index: a magic text, its digest and its length
 
@@ -118,12 +137,15 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Package:
         shutil.copytree(HOME / package, root / package, ignore=shutil.ignore_patterns("__pycache__", "shipped"))
     (root / "solvers" / "own.py").write_text(OWN)
     built = Package(root)
-    why, _ = built.compiles(**targets.build_environment(TARGET))
+    worker = {**targets.build_environment(TARGET), "DOJO_OPT_CROSS": " ".join(SYSTEMS)}
+    why, _ = built.compiles(**worker)
     assert why == "no code is shipped"
-    build = {"NUMBA_CACHE_DIR": str(root / "cache"), **targets.build_environment(TARGET)}
+    build = {"NUMBA_CACHE_DIR": str(root / "cache"), **worker}
     assert json.loads(python(CALL_LOOP, home=root, **build))[:2] == [[3.0], 1]
+    assert json.loads(python(CALL_CLOCK, home=root, **build))[:2] == [[0.0], 1]
     program = SHIP.replace("sys.argv[1]", repr(str(root / "cache"))).replace("sys.argv[2]", repr(str(built.folder)))
     python(program.replace("sys.argv[3]", repr(TARGET)), home=root)
+    python(SHIP_ABROAD, cwd=root, home=root)
     moved = root.with_name("second")
     root.rename(moved)
     return Package(moved)
@@ -143,6 +165,46 @@ def test_shipped_code_runs_elsewhere_and_nothing_is_compiled(package: Package) -
     assert package.call(OMP_NUM_THREADS="1", NUMBA_NUM_THREADS="1") == (NUMBERS, 0, "", [])
 
 
+def test_code_translated_for_other_systems_is_for_their_linkers(package: Package) -> None:
+    elf, macho, coff = b"\x7fELF\2\1\1", b"\xcf\xfa\xed\xfe\x0c\0\0\1", b"\x64\x86"
+    heads = {"linux-x86_64": elf, "linux-aarch64": elf, "macos-arm64": macho, "windows-x86_64": coff}
+    machines = {"linux-x86_64": 62, "linux-aarch64": 183}
+    for name, system in SYSTEMS.items():
+        shipped = Shipped(package.root / "abroad" / name, system.target, package.index()["stamp"])
+        assert shipped.why_not == "" and len(shipped) == len(package.index()["entries"])
+        for entry in shipped._entries:
+            parts = [part for op, part, _ in pickletools.genops(shipped.read(entry)) if op.name.endswith("BINBYTES")]
+            bitcode = [part for part in parts if part.startswith((b"BC\xc0\xde", b"\xde\xc0\x17\x0b"))]
+            objects = [part for part in parts if part.startswith(heads[name])]
+            assert {llvm.parse_bitcode(part).triple for part in bitcode} == {system.triple}
+            assert len(objects) == (0 if "-callee-" in entry else 1)
+            for code in objects if name in machines else ():
+                assert int.from_bytes(code[18:20], "little") == machines[name]
+
+
+@pytest.mark.skipif(targets.system_of(llvm.get_process_triple()) != "x86_64-linux", reason="runs code of Linux")
+@pytest.mark.skipif("x86-64-v3" not in targets.runnable(), reason="runs code for x86-64-v3")
+def test_code_translated_for_another_system_runs_there(package: Package) -> None:
+    """Translated code of this system is an entry like any other: it stands for those that cannot run here."""
+    for file in package.folder.iterdir():
+        file.unlink()
+    shutil.copy(package.root / "abroad" / "linux-x86_64" / f"x86-64-v3{SUFFIX}", package.folder)
+    assert package.call() == (NUMBERS, 0, "", [])
+    assert package.call(CALL_LOOP) == ([3.0], 0, "", [])
+    assert package.call(CALL_CLOCK) == ([0.0], 0, "", [])
+
+
+def test_names_of_entries_keep_no_version_of_a_system() -> None:
+    systems = {
+        targets.system_of(f"{cpu}-apple-{name}")
+        for cpu in ("arm64", "aarch64")
+        for name in ("darwin23.6.0", "macosx15")
+    }
+    assert systems == {"aarch64-darwin"} == {targets.system_of(SYSTEMS["macos-arm64"].triple)}
+    assert targets.system_of("x86_64-pc-windows-msvc") == "x86_64-windows"
+    assert targets.system_of("x86_64-unknown-linux-gnu") == "x86_64-linux"
+
+
 def test_kernels_that_loops_of_users_call_are_shipped(package: Package) -> None:
     assert package.call(CALL_LOOP) == ([3.0], 0, "", [])
 
@@ -151,7 +213,8 @@ def test_only_entries_and_what_users_call_are_shipped(package: Package) -> None:
     assert len(Shipped(package.folder, TARGET, "another stamp")) == 0
     stamp = package.index()["stamp"]
     names = sorted(name.split("-")[0] for name in package.index()["entries"])
-    assert names == ["own_half", "own_one", "own_total"] and len(Shipped(package.folder, TARGET, stamp)) == 3
+    assert names == ["own_clock", "own_half", "own_one", "own_total"]
+    assert len(Shipped(package.folder, TARGET, stamp)) == 4
 
 
 def test_an_edited_source_is_compiled(package: Package) -> None:

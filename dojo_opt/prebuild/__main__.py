@@ -7,12 +7,14 @@ import os
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from dojo_opt.prebuild.tasks import CONTENTS, run, tasks
 from dojo_opt.prebuild.worker_processes import BuildError, Done, compile_tasks, work
 from solvers.compiler import compiled, shipped
 from solvers.compiler.cache import ship
+from solvers.compiler.crossing import SYSTEMS
 from solvers.compiler.shipped import FOLDER
 from solvers.compiler.targets import FEATURES, runnable
 
@@ -35,13 +37,20 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--jobs", type=int, default=_cores(), help=f"processes (default: one per core, {_MOST} at most)"
     )
+    parser.add_argument(
+        "--cross",
+        nargs="+",
+        choices=SYSTEMS,
+        default=[],
+        help="other systems to translate for, each into a folder of its own in that of the file",
+    )
     parser.add_argument("--check", action="store_true", help="fail if anything compiles, write nothing")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     return parser
 
 
-def build(content: str, target: str, out: Path, cache: Path, jobs: int) -> Path:
-    """Compile, and write the file of the target."""
+def build(content: str, target: str, out: Path, cache: Path, jobs: int, systems: Sequence[str] = ()) -> Path:
+    """Compile, and write the file of the target, and those of other systems."""
     begin, names = time.perf_counter(), tasks(content)
 
     def progress(done: Done, left: int) -> None:
@@ -52,11 +61,20 @@ def build(content: str, target: str, out: Path, cache: Path, jobs: int) -> Path:
             flush=True,
         )
 
-    compile_tasks(names, target, cache, jobs, progress)
+    compile_tasks(names, target, cache, jobs, progress, systems)
     path, count = ship(cache, out, target)
-    size, seconds = path.stat().st_size / 1e6, time.perf_counter() - begin
-    print(f"dojo_opt: {count} entries for {target}, {size:.1f} MB, in {seconds:.0f} s: {path}", flush=True)
+    seconds = time.perf_counter() - begin
+    _tell(path, count, f"{target}, in {seconds:.0f} s")
+    for name in systems:
+        other, found = ship(cache / name, out / name, SYSTEMS[name].target)
+        if found != count:
+            raise BuildError(f"{found} of {count} entries were translated for {name}: begin with an empty cache")
+        _tell(other, found, f"{SYSTEMS[name].target} on {name}")
     return path
+
+
+def _tell(path: Path, count: int, what: str) -> None:
+    print(f"dojo_opt: {count} entries for {what}, {path.stat().st_size / 1e6:.1f} MB: {path}", flush=True)
 
 
 def check(content: str) -> int:
@@ -86,7 +104,8 @@ def main() -> int:
             if target not in runnable():
                 raise BuildError(f"this processor cannot run code for {target}")
             with tempfile.TemporaryDirectory(prefix="dojo_opt_") as scratch:
-                build(args.content, target, args.out, args.cache or Path(scratch), args.jobs)
+                systems = args.cross if target == args.targets[0] else ()
+                build(args.content, target, args.out, args.cache or Path(scratch), args.jobs, systems)
     except RuntimeError as error:  # a BuildError, or nothing that could be shipped
         print(f"dojo_opt: {error}", file=sys.stderr)
         return 1

@@ -50,12 +50,13 @@ def work() -> int:
     return 0
 
 
-def _environment(target: str, cache: Path) -> dict[str, str]:
+def _environment(target: str, cache: Path, systems: Sequence[str]) -> dict[str, str]:
     """Of a worker: Numba's variables, and no code but its own."""
     inherited = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "DOJO_OPT_"))}
     path = os.pathsep.join([_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
     own = {"PYTHONPATH": path, "NUMBA_CACHE_DIR": str(cache), "DOJO_OPT_SHIPPED": "0", "OPENBLAS_NUM_THREADS": "1"}
     own["DOJO_OPT_JOBS"] = "1"  # a worker has no helper
+    own["DOJO_OPT_CROSS"] = " ".join(systems)
     return {**inherited, **own, **build_environment(target)}
 
 
@@ -90,7 +91,12 @@ class _Worker:
 
 
 def compile_tasks(
-    tasks: Sequence[str], target: str, cache: Path, jobs: int, progress: Callable[[Done, int], None]
+    tasks: Sequence[str],
+    target: str,
+    cache: Path,
+    jobs: int,
+    progress: Callable[[Done, int], None],
+    systems: Sequence[str] = (),
 ) -> None:
     """Carry out the tasks in worker processes.
 
@@ -100,11 +106,12 @@ def compile_tasks(
         cache: folder that the workers share.
         jobs: number of processes.
         progress: called with each task that is done, and the number of those that remain.
+        systems: others to translate for, of `crossing.SYSTEMS`; each has a folder of its own in the cache.
 
     Raises:
         BuildError: a task failed.
     """
-    environment, left = _environment(target, cache), deque(tasks)
+    environment, left = _environment(target, cache, systems), deque(tasks)
 
     def carry_out() -> Iterator[Done]:
         worker = _Worker(environment)

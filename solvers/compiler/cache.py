@@ -40,11 +40,13 @@ from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
+from solvers.compiler.crossing import Crossing, crossings, keep_modules
 from solvers.compiler.ownership import OTHERS, WORLD, foreign
 from solvers.compiler.pipeline import FAST, inner_result
 from solvers.compiler.progress import because
 from solvers.compiler.shipped import Shipped, open_shipped, write_shipped
 from solvers.compiler.signals import hold_while_translating, signals_held
+from solvers.compiler.targets import system_of
 
 __all__ = [
     "CALLEE",
@@ -273,6 +275,8 @@ def prepare() -> None:
     Plain arithmetic before anything else: otherwise the operators of sets and strings come first, and every operator
     of every kernel is then tried on all of them: 10 of the 50 s of processor time of a cold start (Numba 0.68).
     """
+    if crossings():
+        keep_modules(cpu_target.target_context.codegen())
     cpu_target.typing_context.refresh()
     cpu_target.target_context.refresh()
     hold_while_translating(cpu_target.target_context.codegen()._engine)
@@ -294,12 +298,23 @@ def _text_digest(file: str) -> bytes:
 class _Named:
     """Properties of a code generator in Numba's keys: system, processor and features."""
 
-    def __init__(self, codegen: Any, target: str) -> None:
-        self._magic = (codegen.magic_tuple()[0], target, "")
+    def __init__(self, triple: str, target: str, features: str = "") -> None:
+        self._magic = (system_of(triple), target, features)
 
     def magic_tuple(self) -> tuple[str, str, str]:
         """As a process that compiles for the target has it."""
         return self._magic
+
+
+def _for_shipped_target(codegen: Any) -> _Named:
+    return _Named(codegen.magic_tuple()[0], str(shipped().target))
+
+
+@cache
+def _store_of(crossing: Crossing) -> Store:
+    """The entries of another system, beside the compiled code of this one."""
+    assert STORE.folder is not None
+    return open_store(crossing.folder(STORE.folder.parents[1]))
 
 
 class KernelCache(FunctionCache):
@@ -320,7 +335,7 @@ class KernelCache(FunctionCache):
 
     def _key(self, sig: Any, codegen: Any) -> tuple[Any, str]:
         """(dependencies of the compiled code, apart from those of the stamp; name of its file)."""
-        key = (self._form, self._file, self._text, self._index_key(sig, codegen))
+        key = (self._form, self._file, self._text, self._index_key(sig, _Named(*codegen.magic_tuple())))
         return key, f"{self._stem}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.nbc"
 
     @signals_held()
@@ -349,7 +364,7 @@ class KernelCache(FunctionCache):
 
     def holds(self, sig: Any, codegen: Any) -> bool:
         """Whether there is a file for this signature, of use or not."""
-        if len(shipped()) and self._key(sig, _Named(codegen, str(shipped().target)))[1] in shipped():
+        if len(shipped()) and self._key(sig, _for_shipped_target(codegen))[1] in shipped():
             return True
         return STORE.holds(self._key(sig, codegen)[1])
 
@@ -357,7 +372,7 @@ class KernelCache(FunctionCache):
         """The compile result that was shipped; None where there is none."""
         if not len(shipped()):
             return None
-        key, name = self._key(sig, _Named(target_context.codegen(), str(shipped().target)))
+        key, name = self._key(sig, _for_shipped_target(target_context.codegen()))
         if name not in shipped():
             return None
         try:
@@ -380,6 +395,14 @@ class KernelCache(FunctionCache):
             return
         key, name = self._key(sig, data.codegen)
         STORE.write(name, dumps((key, data._reduce())))
+        if self._form != INNER and crossings():
+            self._save_crossings(sig, data)
+
+    def _save_crossings(self, sig: Any, data: Any) -> None:
+        """Keep a compile result with code for other systems."""
+        for crossing in crossings():
+            key, name = self._key(sig, crossing)
+            _store_of(crossing).write(name, dumps((key, crossing.reduced(data))))
 
     def flush(self) -> None:
         """Delete the stored files of this form."""

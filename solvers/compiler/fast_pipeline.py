@@ -20,11 +20,11 @@ from numba.core.ssa import reconstruct_ssa
 
 from solvers.compiler.arithmetic import KernelTyping
 from solvers.compiler.inference import KernelInference
-from solvers.compiler.libraries import EntryLibrary, InnerLibrary, OptionalLibrary, SeldomLibrary
+from solvers.compiler.libraries import EntryLibrary, InnerLibrary, OptionalLibrary, RolledLibrary, SeldomLibrary
 from solvers.compiler.lowering import KernelLowering
 from solvers.compiler.progress import compiling
 
-__all__ = ["EntryCompiler", "InnerCompiler", "OptionalCompiler", "SeldomCompiler"]
+__all__ = ["EntryCompiler", "InnerCompiler", "OptionalCompiler", "RolledCompiler", "SeldomCompiler"]
 
 _IDLE = (  # features that kernels do not use: closures, array expressions, literals as types, exceptions; print types
     untyped_passes.WithLifting,
@@ -235,6 +235,12 @@ class OptionalCompiler(_Compiler):
     """For functions called by their address."""
 
     library = OptionalLibrary
+
+
+class RolledCompiler(_Compiler):
+    """For those of them whose loops have few rounds."""
+
+    library = RolledLibrary
 
 
 class SeldomCompiler(_Compiler):

@@ -19,7 +19,7 @@ from numba.core.sigutils import normalize_signature
 from numba.core.types.misc import unliteral
 
 from solvers.compiler.cache import CALLEE, INNER, STORE, KernelCache, cache_folder, prepare, shipped
-from solvers.compiler.pipeline import EntryCompiler, InnerCompiler, OptionalCompiler, SeldomCompiler, UsersCompiler
+from solvers.compiler.pipeline import EntryCompiler, InnerCompiler, OptionalCompiler, UsersCompiler
 
 __all__ = [
     "FLAGS",
@@ -176,12 +176,12 @@ def inlined(func: F) -> F:
 inner_kernel = kernel  # where only kernels call it
 
 
-def entry(func: Callable[..., Any], signature: tuple[Any, ...], seldom: bool = False) -> Any:
+def entry(func: Callable[..., Any], signature: tuple[Any, ...], compiler: Any = OptionalCompiler) -> Any:
     """`func` compiled, or loaded, for arguments of these types, to be called by its address: Numba's result.
 
-    seldom: that it is called, so that to compile it fast is worth more than fast code.
+    compiler: of one that is called by its address.
     """
-    form = registered(cached(_Form(func, SeldomCompiler if seldom else OptionalCompiler, no_cpython_wrapper=True)))
+    form = registered(cached(_Form(func, compiler, no_cpython_wrapper=True)))
     form.compile(signature)
     return form.overloads[signature]
 

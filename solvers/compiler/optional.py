@@ -39,6 +39,7 @@ from numpy.typing import NDArray
 
 from solvers.compiler.helper_process import divided, serve
 from solvers.compiler.kernels import entry, is_kept
+from solvers.compiler.pipeline import OptionalCompiler, RolledCompiler, SeldomCompiler
 from solvers.compiler.progress import parts
 from solvers.compiler.records import RECORDS, load_word
 
@@ -91,8 +92,8 @@ _UNCOMPILED: list[OptionalKernel] = []  # addresses requested with NUMBA_DISABLE
 class OptionalKernel:
     """A kernel with a slot in a table of addresses; compiled when it is first linked."""
 
-    def __init__(self, func: Callable[..., Any], slot: int, default: Any, seldom: bool) -> None:
-        self.func, self.slot, self.default, self.seldom = func, slot, default, seldom
+    def __init__(self, func: Callable[..., Any], slot: int, default: Any, compiler: Any) -> None:
+        self.func, self.slot, self.default, self._compiler = func, slot, default, compiler
         self.name = f"{func.__module__}:{func.__name__}"
         self._code: Any = None
         _EVERY.append(self)
@@ -132,7 +133,7 @@ class OptionalKernel:
             return _UNCOMPILED.index(self) + 1
         if self._code is None:
             declared = self.signature()
-            code = entry(self.func, declared.args, self.seldom)
+            code = entry(self.func, declared.args, self._compiler)
             if code.signature.return_type != declared.return_type:
                 found = code.signature.return_type
                 raise TypeError(f"optional kernel {self.name}: expected to return {declared.return_type}, got {found}")
@@ -189,7 +190,9 @@ def _zeros(kind: types.Type) -> Any:
     return {types.float64: 0.0, types.int64: 0, types.boolean: False}.get(kind)
 
 
-def optional(slot: int, default: Any = None, seldom: bool = False) -> Callable[[Function], Function]:
+def optional(
+    slot: int, default: Any = None, seldom: bool = False, rolled: bool = False
+) -> Callable[[Function], Function]:
     """A decorator: the kernel gets a slot in the table of addresses.
 
     Args:
@@ -197,13 +200,15 @@ def optional(slot: int, default: Any = None, seldom: bool = False) -> Callable[[
             holds it.
         default: result of a call where the slot is empty; zeros of the type of the result unless given.
         seldom: few steps call it: to compile it fast is worth more than fast code.
+        rolled: its loops have few rounds, and are not unrolled.
 
     Returns:
         The decorator. Tools see the decorated function with its own type.
     """
+    compiler = SeldomCompiler if seldom else RolledCompiler if rolled else OptionalCompiler
 
     def decorate(func: Function) -> Function:
-        return cast(Function, OptionalKernel(func, slot, default, seldom))
+        return cast(Function, OptionalKernel(func, slot, default, compiler))
 
     return decorate
 

@@ -28,6 +28,7 @@ __all__ = [
     "InnerCompiler",
     "OptionalCompiler",
     "PlainCompiler",
+    "RolledCompiler",
     "SeldomCompiler",
     "UsersCompiler",
     "inner_result",
@@ -83,6 +84,7 @@ class _Compilers(NamedTuple):
     fast: bool
     entry: type[Compiler]  # called from Python
     optional: type[Compiler]  # called by its address
+    rolled: type[Compiler]  # the same, with loops of few rounds
     seldom: type[Compiler]  # the same, by few steps
     inner: type[Compiler]  # called by kernels
     inner_result: Any  # rebuilds a cached result of the last
@@ -94,14 +96,14 @@ def _compilers() -> _Compilers:
             from solvers.compiler import fast_pipeline as fast
             from solvers.compiler.libraries import inner_result
 
-            own = (fast.EntryCompiler, fast.OptionalCompiler, fast.SeldomCompiler, fast.InnerCompiler)
-            return _Compilers(True, *own, inner_result)
+            by_address = (fast.OptionalCompiler, fast.RolledCompiler, fast.SeldomCompiler)
+            return _Compilers(True, fast.EntryCompiler, *by_address, fast.InnerCompiler, inner_result)
         print(
             f"dojo_opt: Numba {numba.__version__} is not one of {', '.join(_KNOWN)}, which the fast compiler knows: "
             "kernels are compiled by Numba alone, and steps take about 1.3 times as long",
             file=sys.stderr,
         )
-    return _Compilers(False, *(PlainCompiler,) * 4, CompileResult._rebuild)
+    return _Compilers(False, *(PlainCompiler,) * 5, CompileResult._rebuild)
 
 
-FAST, EntryCompiler, OptionalCompiler, SeldomCompiler, InnerCompiler, inner_result = _compilers()
+FAST, EntryCompiler, OptionalCompiler, RolledCompiler, SeldomCompiler, InnerCompiler, inner_result = _compilers()

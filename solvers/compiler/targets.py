@@ -13,7 +13,7 @@ import sys
 import llvmlite.binding as llvm
 import numba
 
-__all__ = ["FEATURES", "best_target", "build_environment", "runnable"]
+__all__ = ["FEATURES", "best_target", "build_environment", "runnable", "system_of"]
 
 _V2 = ("cx16", "popcnt", "sahf", "sse3", "sse4.1", "sse4.2", "ssse3")
 _V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
@@ -36,6 +36,14 @@ def target_names() -> tuple[str, ...]:
     if machine in ("aarch64", "arm64"):
         return ("apple-m1",) if sys.platform == "darwin" else ("generic",)
     return ()
+
+
+def system_of(triple: str) -> str:
+    """Processor and system of one of LLVM's names, without versions: that of macOS changes with every update."""
+    processor = {"arm64": "aarch64", "amd64": "x86_64"}.get(triple.split("-")[0], triple.split("-")[0])
+    known = ("linux", "darwin", "macos", "windows")
+    system = next((name for name in known if name in triple), triple)
+    return f"{processor}-{'darwin' if system == 'macos' else system}"
 
 
 def runnable() -> tuple[str, ...]:

@@ -45,7 +45,7 @@ from solvers.types import Vector
 _DEPENDENT = 1e-10  # a pivot below this belongs to a loop constraint that depends on others
 
 
-@optional(Slot.FACTOR_COUPLING, default=True)
+@optional(Slot.FACTOR_COUPLING, default=True, rolled=True)
 def factor_coupling(model: Model, data: Data) -> bool:
     """The system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops.
 
@@ -161,7 +161,7 @@ def _solve_rows(data: Data) -> None:
     block_lu_solve(data.couple_T, data.couple_pivots, _nodes(data), rank, data.couple_x)
 
 
-@optional(Slot.SOLVE_COUPLING)
+@optional(Slot.SOLVE_COUPLING, rolled=True)
 def solve_coupling(model: Model, data: Data, gap_fraction: float, out: Vector) -> None:
     """After out = H0^-1 b of the tree: the answer with couplings, its twists, and couple_step, the forces f.
 
