@@ -45,6 +45,7 @@ if [ -n "$quick" ]; then  # study by study; only bars that do not depend on the 
 else
     measure report "$python" "$here/benchmarks/compare.py" all --out "$out"
 fi
+measure source_statistics "$python" "$here/benchmarks/source_statistics.py" --out "$out"
 measure chaos "$python" "$here/benchmarks/chaos.py" $quick --out "$out"  # on all cores: loops over them are a part
 export NUMBA_NUM_THREADS=1  # one core from here on, as the tables say
 measure cold_starts "$python" "$here/benchmarks/cold_starts.py" $quick --out "$out"

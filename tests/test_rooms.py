@@ -6,81 +6,19 @@ import ast
 import re
 import tokenize
 from collections import Counter, defaultdict
-from functools import cache
-from pathlib import Path
 
 import pytest
 
+from support.modules import ROOT, circles, imports, module_name, modules
 from support.programs import PACKAGES
-
-ROOT = Path(__file__).resolve().parent.parent
-
-
-@cache
-def _files() -> dict[Path, ast.Module]:
-    """Every module with its syntax tree. Not at import: each worker of pytest-xdist imports this file."""
-    return {file: ast.parse(file.read_text()) for package in PACKAGES for file in (ROOT / package).rglob("*.py")}
-
-
-def _module(file: Path) -> str:
-    name = ".".join(file.relative_to(ROOT).with_suffix("").parts)
-    return name.removesuffix(".__init__")
-
-
-def _imports() -> dict[str, set[str]]:
-    """Modules by module, of every import: also under TYPE_CHECKING and inside functions."""
-    modules = {_module(file) for file in _files()}
-    out: dict[str, set[str]] = defaultdict(set)
-    for file, tree in _files().items():
-        here = _module(file)
-        for node in ast.walk(tree):
-            names: list[str] = []
-            if isinstance(node, ast.Import):
-                names = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                names = [
-                    inner if (inner := f"{node.module}.{alias.name}") in modules else node.module
-                    for alias in node.names
-                ]
-            out[here] |= {name for name in names if name in modules and name != here}
-    return out
-
-
-def _circles(graph: dict[str, set[str]]) -> list[list[str]]:
-    """Strongly connected components of more than one module (Tarjan)."""
-    index: dict[str, int] = {}
-    low: dict[str, int] = {}
-    stack: list[str] = []
-    found: list[list[str]] = []
-
-    def visit(v: str) -> None:
-        index[v] = low[v] = len(index)
-        stack.append(v)
-        for w in graph.get(v, ()):
-            if w not in index:
-                visit(w)
-                low[v] = min(low[v], low[w])
-            elif w in stack:
-                low[v] = min(low[v], index[w])
-        if low[v] == index[v]:
-            component = [stack.pop()]
-            while component[-1] != v:
-                component.append(stack.pop())
-            if len(component) > 1:
-                found.append(sorted(component))
-
-    for v in sorted(graph):
-        if v not in index:
-            visit(v)
-    return found
 
 
 def test_a_circle_is_found() -> None:
-    assert _circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
 
 
 def test_imports_have_no_circle() -> None:
-    assert _circles(_imports()) == []
+    assert circles(imports()) == []
 
 
 @pytest.mark.parametrize(("package", "most"), [("sim", 12), ("dojo_opt", 20), ("solvers", 20)])
@@ -90,7 +28,7 @@ def test_few_entries_at_the_top(package: str, most: int) -> None:
 
 
 def test_every_room_says_its_purpose() -> None:
-    for file, tree in _files().items():
+    for file, tree in modules().items():
         if file.name == "__init__.py":
             assert ast.get_docstring(tree), file
 
@@ -104,10 +42,10 @@ def test_no_file_name_is_used_more_than_twice() -> None:
 def test_no_class_name_is_used_twice() -> None:
     classes = defaultdict(list)
     benchmarks = {file: ast.parse(file.read_text()) for file in (ROOT / "benchmarks").rglob("*.py")}
-    for file, tree in {**_files(), **benchmarks}.items():
+    for file, tree in {**modules(), **benchmarks}.items():
         for node in ast.walk(tree):
             if isinstance(node, ast.ClassDef):
-                classes[node.name].append(_module(file))
+                classes[node.name].append(module_name(file))
     assert {name: where for name, where in classes.items() if len(where) > 1} == {}
 
 
@@ -133,21 +71,21 @@ def test_no_module_takes_private_parts_of_others() -> None:
     """But for the compiler, which adapts Numba's."""
     assert _foreign_private(ast.parse("def f(x):\n    return x._hidden")) == ["2: x._hidden"]
     assert _foreign_private(ast.parse("class A:\n    def f(self, x):\n        return self._a + x._a")) == []
-    places = {_module(file): _foreign_private(tree) for file, tree in _files().items()}
+    places = {module_name(file): _foreign_private(tree) for file, tree in modules().items()}
     assert {name: texts for name, texts in places.items() if texts and not name.startswith("solvers.compiler")} == {}
 
 
 def test_files_that_docstrings_name_exist() -> None:
     """A name with folders is a path, in part at least; a bare name is the name of some file."""
-    paths = {file.relative_to(ROOT).as_posix() for file in _files()}
+    paths = {file.relative_to(ROOT).as_posix() for file in modules()}
     paths |= {file.relative_to(ROOT).as_posix() for file in ROOT.glob("*/**/*.py")}
     wrong = []
-    for file, tree in _files().items():
+    for file, tree in modules().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
                 for name in re.findall(r"(?<![\w/.])(?:\w+/)*\w+\.py\b", text):
                     if not any(path == name or path.endswith("/" + name) for path in paths):
-                        wrong.append(f"{_module(file)}: {name}")
+                        wrong.append(f"{module_name(file)}: {name}")
     assert wrong == []
 
 

@@ -4,7 +4,8 @@ The first strategy begins with a known approximation (`known_start`). The others
 ends in a fold of the central path is given up, and the next one starts elsewhere, at another kappa0. Some solutions lie
 beyond folds, such as those of legs that jam between a joint limit and the ground.
 
-`STRATEGIES` is the list. `benchmarks/start_strategies.py` counts the solutions that each of them finds;
+`STRATEGIES` is the list. `benchmarks/start_strategies.py` counts the solutions that each of them finds:
+of 178,000, the first two find all but 1,345, and every row of this list, also in its last rounds, finds some.
 `benchmarks/robustness.py` measures the list on 60,000 random extreme states (seeds 0 to 2).
 """
 
