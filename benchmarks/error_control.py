@@ -1,8 +1,8 @@
 """Requested against achieved error, and processor time, compared with the best fixed order and step, MuJoCo's RK4, and
 Drake's integrators with error control (RK3, and CENIC for convex contact).
 
-    python benchmarks/accuracy.py --match pendulum                  some of the motions
-    python benchmarks/accuracy.py --figure accuracy.png             error against processor time
+    python benchmarks/error_control.py --match pendulum                  some of the motions
+    python benchmarks/error_control.py --figure error_control.png           error against processor time
 
 An error is the largest final error of a joint coordinate [m, rad], over the seconds of the motion. References: exact
 solutions of balls and blocks; order 8 with small steps without contact, and of closed loops order 2, extrapolated;
@@ -17,6 +17,7 @@ error of the result (`errors`) over the requested one: above 1, the motion repor
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from functools import partial
 from itertools import pairwise
@@ -36,6 +37,14 @@ Points = list[tuple[float, float, str]]  # (error, processor time [s], order and
 _ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 _STEPS = (0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4)
 _FINE = (2e-5, 1e-5)  # [s] steps of references in contact
+_KINDS = {  # by their names
+    "pendulums of 1 to 50 links": "pendulum",
+    "bodies and robots in flight": "free body|tree|in flight",
+    "balls and a block with exact solutions": "ball|sliding",
+    "stack, tumbling block, chain on the ground": "stack|tumbling|chain",
+    "closed loop": "four-bar",
+    "robots that fall": "falling",
+}
 _LEAST = 1e-6  # accuracy with contacts or loops
 
 
@@ -65,7 +74,7 @@ def fixed(motion: ReferenceMotion, exact: Vector, steps: tuple[float, ...]) -> P
 
 
 def runge_kutta(motion: ReferenceMotion, exact: Vector, steps: tuple[float, ...]) -> Points:
-    """Points of MuJoCo's RK4, with its default contacts; empty if it is not installed."""
+    """Points of MuJoCo's RK4, with its default contacts; empty if it is not installed, or has no such scene."""
     try:
         import mujoco
     except ImportError:
@@ -77,7 +86,10 @@ def runge_kutta(motion: ReferenceMotion, exact: Vector, steps: tuple[float, ...]
     if any(c.restitution for c in motion.mechanism.contacts) or motion.mechanism.loops:
         return []
     for h in steps:
-        model: Any = mujoco_scene.load(sim.model, h, integrator="RK4")
+        try:
+            model: Any = mujoco_scene.load(sim.model, h, integrator="RK4")
+        except ValueError:  # a joint or a collision that MuJoCo has not
+            return []
 
         def end(model: Any = model, count: int = round(motion.seconds / h)) -> Vector:
             data: Any = mujoco_scene.state(model, np.r_[motion.q, motion.v])
@@ -102,17 +114,21 @@ def drake(motion: ReferenceMotion, exact: Vector, scheme: str, quick: bool) -> P
     for accuracy in _ASKED[: 2 if quick else None]:
         try:
             end, cost = controlled(motion.mechanism, np.r_[motion.q, motion.v], motion.seconds, accuracy, scheme)
-        except ValueError:
+            out.append((error(sim, end, exact, motion.seconds), cost, f"{accuracy:g}"))
+        except ValueError:  # not for this contact; or coordinates of a joint that Drake has not
             return []
-        out.append((error(sim, end, exact, motion.seconds), cost, f"{accuracy:g}"))
     return out
+
+
+def _touches(mech: dojo.Mechanism) -> bool:
+    return bool(mech.contacts or mech.collisions)
 
 
 def reference(motion: ReferenceMotion) -> tuple[Vector, float]:
     """(coordinates in the end, their error over the seconds)."""
     if motion.exact is not None:
         return motion.exact, 0.0
-    touches, loops = bool(motion.mechanism.contacts), bool(motion.mechanism.loops)
+    touches, loops = _touches(motion.mechanism), bool(motion.mechanism.loops)
     ends: list[Vector] = []
     for h in _FINE if touches else ((4e-4, 2e-4, 1e-4) if loops else (2e-4, 1e-4)):
         settings: dict[str, Any] = {"kappa": 1e-13} if touches else {"order": 8}
@@ -127,10 +143,10 @@ def reference(motion: ReferenceMotion) -> tuple[Vector, float]:
 
 
 def _asked(motion: ReferenceMotion, unsure: float, quick: bool) -> tuple[float, ...]:
-    """The accuracies that exist and that the reference of a motion can judge."""
-    held = motion.mechanism.contacts or motion.mechanism.loops
+    """The accuracies that exist and that the reference of a motion can judge; none where small steps do not agree."""
+    held = _touches(motion.mechanism) or motion.mechanism.loops
     least = max(3.0 * unsure, 0.99 * _LEAST if held else 0.0)
-    asked = tuple(a for a in _ASKED if a >= least) or _ASKED[:1]
+    asked = tuple(a for a in _ASKED if a >= least)
     return asked[:4] if quick else asked
 
 
@@ -143,10 +159,13 @@ def _best(points: Points, got: float) -> tuple[float, str]:
 def study(motion: ReferenceMotion, quick: bool) -> tuple[list[list[Any]], dict[str, Points]]:
     """Lines of the table, and points of the figure."""
     exact, unsure = reference(motion)
+    if not _asked(motion, unsure, quick):
+        return [[motion.name, *[np.nan] * 6, "", np.nan, "", np.nan, np.nan, f"reference off by {unsure:.1g}"]], {}
     steps = _STEPS[1:4] if quick else _STEPS
     others, peer = fixed(motion, exact, steps), runge_kutta(motion, exact, steps)
     rk3, cenic = (drake(motion, exact, scheme, quick) for scheme in ("runge_kutta3", "cenic"))
-    lines, ours = [], []
+    lines: list[list[Any]] = []
+    ours: Points = []
     for asked in _asked(motion, unsure, quick):
         sim = dojo.Simulator(motion.mechanism, time_step=motion.seconds, accuracy=asked)
         x = sim.start(motion.q, motion.v)
@@ -200,13 +219,25 @@ def draw(curves: dict[str, dict[str, Points]]) -> Any:
 
 def run(args: argparse.Namespace) -> Report:
     """Every motion with `match` in its name, at every accuracy."""
-    report, lines, curves = Report("Accuracy on request", ""), [], {}
+    lines: list[list[Any]] = []
+    curves: dict[str, dict[str, Points]] = {}
     for make in progress()([(f"motion {k}", m) for k, m in enumerate(motions(args.quick))], "motions"):
         motion = make()
         if args.match in motion.name:
-            found, curves[motion.name] = study(motion, args.quick)
+            found, points = study(motion, args.quick)
             lines += found
-    solved = [line for line in lines if line[-1] == "SOLVED"]
+            curves |= {motion.name: points} if points else {}
+    report = summary(lines, curves)
+    if args.figure and report.figure is not None:
+        report.figure.savefig(args.figure, dpi=130)
+    return report
+
+
+def summary(lines: list[list[Any]], curves: dict[str, dict[str, Points]]) -> Report:
+    """Rows, table and figure of all motions."""
+    report = Report("Accuracy on request", "")
+    judged = [line for line in lines if np.isfinite(line[1])]
+    solved = [line for line in judged if line[-1] == "SOLVED"]
     silent = [line[3] for line in solved if line[4] <= 1.0]
     costs = np.array([line[6] for line in solved if line[4] <= 1.0], dtype=float)
     known = costs[np.isfinite(costs)]
@@ -218,20 +249,36 @@ def run(args: argparse.Namespace) -> Report:
             max((x[3] / max(1.0, x[4]) for x in solved), default=0.0),
             3.0,
         ),
-        number("motions that tell a miss", float(len(solved) - len(silent)), note=f"of {len(lines)}"),
-        number("motions that are refused", float(len(lines) - len(solved)), note=f"of {len(lines)}"),
+        number("motions that tell a miss", float(len(solved) - len(silent)), note=f"of {len(judged)}"),
+        number("motions that are refused", float(len(judged) - len(solved)), note=f"of {len(judged)}"),
         number("cost over best fixed, median", float(np.median(known)) if len(known) else 0.0),
         number("cost over best fixed, largest", float(known.max()) if len(known) else 0.0),
+        number("motions without a reference", float(len(lines) - len(judged)), note="small steps do not agree"),
     ]
-    header = ("motion", "asked", "got", "got/asked", "told", "ms", "cost/fixed", "fixed", "cost/RK4", "RK4")
-    header = (*header, "cost/RK3", "cost/CENIC", "status")
+    header = (
+        *("motion", "asked", "got", "got/asked", "told", "ms"),
+        *("cost/fixed", "fixed", "cost/RK4", "RK4", "cost/RK3", "cost/CENIC", "status"),
+    )
     report.tables = [Table("Error per second of motion, and processor time", header, lines)]
+    report.tables.append(by_kind(judged))
     report.details = curves
     if curves:
         report.figure = draw(curves)
-        if args.figure:
-            report.figure.savefig(args.figure, dpi=130)
     return report
+
+
+def by_kind(lines: list[list[Any]]) -> Table:
+    """Largest ratio of errors, and medians of costs, of each kind of motion; nothing where no peer is as accurate."""
+    table = []
+    for kind, pattern in _KINDS.items():
+        mine = [line for line in lines if re.search(pattern, line[0])]
+        if mine:
+            ratios = np.array([[line[k] for k in (3, 6, 8, 10)] for line in mine], dtype=float)
+            silent = [line[3] for line in mine if line[4] <= 1.0]
+            costs = [float(np.median(c)) if len(c := r[np.isfinite(r)]) else "" for r in ratios.T[1:]]
+            table.append([kind, len(mine), len(mine) - len(silent), max(silent, default=0.0), *costs])
+    header = ("motions", "runs", "miss told", "got/asked, largest of the others", "cost/fixed", "cost/RK4", "cost/RK3")
+    return Table("By kind of motion: medians of costs", header, table)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -239,7 +286,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser(__doc__)
     arguments.add_argument("--match", default="", help="only motions with this in their name")
     arguments.add_argument("--figure", metavar="FILE", help="draw error against processor time")
-    return deliver("accuracy", run, arguments, argv)
+    return deliver("error_control", run, arguments, argv)
 
 
 if __name__ == "__main__":
