@@ -52,7 +52,7 @@ measure cold_starts "$python" "$here/benchmarks/cold_starts.py" $quick --out "$o
 measure robustness "$python" "$here/benchmarks/robustness.py" $quick --out "$out"
 measure attacks "$python" "$here/benchmarks/attacks.py" $quick --out "$out"
 measure division "$python" "$here/benchmarks/division.py" $quick --out "$out"
-measure error_control "$python" "$here/benchmarks/error_control.py" $quick --out "$out"
+measure error_control "$python" "$here/benchmarks/error_control.py" $quick --figure error_control.png --out "$out"
 measure contact_costs "$python" "$here/benchmarks/contact_costs.py" $quick --out "$out"
 measure start_strategies "$python" "$here/benchmarks/start_strategies.py" $quick --out "$out"
 measure falls "$python" "$here/benchmarks/falls.py" $quick --out "$out"

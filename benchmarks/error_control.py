@@ -211,7 +211,7 @@ def draw(curves: dict[str, dict[str, Points]]) -> Any:
         panel.set_title(name, fontsize=9)
         panel.set_xlabel("processor time [s]", fontsize=8)
         panel.set_ylabel("error per second [m, rad]", fontsize=8)
-    page.axes[0].legend(fontsize=7)
+    page.legend(*page.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=8)
     for panel in page.axes[len(curves) :]:
         panel.set_axis_off()
     return page
@@ -242,6 +242,7 @@ def summary(lines: list[list[Any]], curves: dict[str, dict[str, Points]]) -> Rep
     costs = np.array([line[6] for line in solved if line[4] <= 1.0], dtype=float)
     known = costs[np.isfinite(costs)]
     report.rows = [
+        number("runs", float(len(judged))),
         number("got over asked where nothing is told, largest", max(silent, default=0.0), 3.0),
         number("got over asked where nothing is told, median", float(np.median(silent)) if silent else 0.0, 1.0),
         number(

@@ -205,7 +205,7 @@ def take(folder: Path) -> None:
             if key in left:
                 left[key] = "left out here"
         (MEASURED / file.name).write_text(compact(numbers) + "\n", encoding="utf-8")
-    for name in ("accuracy.png", "hopper.png", "learning.png"):
+    for name in ("accuracy.png", "error_control.png", "hopper.png", "learning.png"):
         if (folder / name).is_file():
             shutil.copy(folder / name, ROOT / "docs" / name)
 
