@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
+from sim.mechanism.contact import Contact
 from sim.mechanism.joint import WORLD
 from sim.mechanism.shapes import rotation_matrices, rotation_matrix
 from sim.model.state_columns import BodyState
+from sim.simulator.contact_forces import ContactForces, balanced, least_forces
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
+_TOUCHING = 1e-3  # [m] contacts that are nearer to the ground may carry
 _STEP = 4e-3  # of the differences along a motion, in units of the time in which it turns by one radian
 # f'(0) from f(k s), k = 1, 2, 3, 4, of central differences of order 8
 _ORDER_8 = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)
@@ -277,6 +281,68 @@ class Kinematics:
         forces = inertial + self.bias_forces(q, v) + self.gravity_torques(q)
         return checks.within_range("Kinematics.inverse_dynamics", forces)
 
+    def contact_forces(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        acceleration: ArrayLike,
+        joint_forces: ArrayLike | None = None,
+        *,
+        contacts: Sequence[str] | None = None,
+    ) -> ContactForces:
+        """Forces of the ground for an acceleration: inverse dynamics of a robot on its contacts.
+
+            M dv + b + g = tau + sum J_i^T f_i,   |tangential f_i| <= friction_i normal f_i
+
+        Without `joint_forces`, degrees of freedom without an input balance alone, and the joints with an input add what
+        is missing. Of all forces inside the friction cones, those with the least sum of squares are returned. Where no
+        forces balance the load, the result has those that miss it least, and `success` is False.
+
+        Args:
+            q: (..., nq) coordinates.
+            v: (..., nv) joint velocities.
+            acceleration: (..., nv) rate of the joint velocities [m/s^2, rad/s^2].
+            joint_forces: (..., nv) known forces of the joints [N, N m] (default None: any, where an input acts).
+            contacts: names of contacts with the ground (default None: those within a millimetre of it).
+
+        Returns:
+            The forces. Those of contacts that are farther away are zero.
+
+        Raises:
+            ValueError: a shape is wrong, or a contact unknown.
+        """
+        call, mech = "Kinematics.contact_forces", self.mechanism
+        q = self._q(f"{call}(q)", q)
+        load = self.inverse_dynamics(q, v, acceleration)
+        q = np.broadcast_to(q, (*load.shape[:-1], q.shape[-1]))
+        names = mech.contact_names[: len(mech.contacts)] if contacts is None else tuple(contacts)
+        of_name = dict(zip(mech.contact_names, mech.contacts, strict=False))
+        chosen = [of_name[checks.one_of(f"{call}(contacts=...)", name, of_name)] for name in names]
+        driven = np.zeros(mech.nv, dtype=bool)
+        if joint_forces is None:
+            for part in mech.inputs or ():
+                if part.joint is not None:
+                    driven[mech.v_slice(part.joint).start + part.dof] = True
+        else:
+            load = load - _rows(f"{call}(joint_forces=...)", joint_forces, mech.nv)
+            q = np.broadcast_to(q, (*load.shape[:-1], q.shape[-1]))
+        J, R = self._body_jacobians(q)
+        forces, residual = np.zeros((*load.shape[:-1], len(names), 3)), np.zeros(load.shape[:-1])
+        success, z = np.zeros(load.shape[:-1], dtype=bool), self.sim.bodies(q, np.zeros(load.shape))
+        pushed = np.zeros(load.shape)
+        for row in np.ndindex(load.shape[:-1]):
+            maps = [_ground_map(self._bodies[c.body], c, z[row], J[row], R[row]) for c in chosen]
+            near = [i for i, (_, _, gap) in enumerate(maps) if contacts is not None or gap < _TOUCHING]
+            A = np.array([maps[i][0] for i in near]).reshape(len(near), mech.nv, 3).transpose(1, 0, 2)
+            mu = np.array([0.0 if chosen[i].law == "impact" else chosen[i].friction for i in near])
+            f, residual[row] = least_forces(A[~driven], load[row][~driven], mu)
+            success[row] = balanced(float(residual[row]), load[row])
+            pushed[row] = np.einsum("nka,ka->n", A, f)
+            for i, force in zip(near, f, strict=True):
+                forces[(*row, i)] = maps[i][1].T @ force
+        rest = load - pushed if joint_forces is None else np.broadcast_to(np.asarray(joint_forces, float), load.shape)
+        return ContactForces(tuple(names), forces, np.array(rest), residual, success)
+
     def _frame(self, call: str, name: str) -> tuple[int, Floats, Floats]:
         if isinstance(name, str) and name == WORLD and WORLD not in self._frames:
             return -1, np.zeros(3), np.eye(3)
@@ -326,6 +392,19 @@ def _rows(call: str, value: ArrayLike, length: int) -> Floats:
     if out.ndim == 0 or out.shape[-1] != length:
         raise ValueError(f"{call}: expected shape (..., {length}), got {out.shape}")
     return checks.array(call, out, out.shape)
+
+
+def _ground_map(i: int, contact: Contact, z: Floats, J: Floats, R: Floats) -> tuple[Floats, Floats, float]:
+    """Generalised forces (nv, 3) per unit of normal and tangential forces at the point of a ball nearest to the ground,
+    these directions (3, 3) by rows in world axes, and the gap [m].
+    """
+    center = z[i, BodyState.POSITION] + R[i] @ np.asarray(contact.point, dtype=np.float64)
+    n = np.asarray(contact.normal_at(center), dtype=np.float64)
+    first = np.cross(n, np.eye(3)[int(np.abs(n).argmin())])
+    first /= np.linalg.norm(first)
+    frame = np.stack([n, first, np.cross(n, first)])
+    arm = center - contact.radius * n - z[i, BodyState.POSITION]
+    return (frame @ _shifted(J[i], arm)[:3]).T, frame, float(contact.gap(center))
 
 
 def _times(J: Floats, v: Floats) -> Floats:
