@@ -46,8 +46,10 @@ step="0.001" value="0"><span id="clock"></span><select id="speed" title="speed">
 <script>{viewer}</script>
 <script>
 const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-for (const text of [{commands}])
-    viewer.handle_command_bytearray(Uint8Array.from(atob(text), c => c.charCodeAt(0)));
+for (const part of [{commands}]) {{
+    if (typeof part === "string") viewer.handle_command_bytearray(Uint8Array.from(atob(part), c => c.charCodeAt(0)));
+    else viewer.set_object(part[1], viewer.scene_tree.find([...part[0], "<object>"]).object.clone());  // one mesh
+}}
 viewer.camera.position.set({eye});
 viewer.controls.target.set({target});
 viewer.controls.update();
@@ -160,6 +162,38 @@ def group_of(number: int) -> tuple[str, ...]:
     return ("meshcat",) if number == 0 else ("meshcat", f"motion{number}")
 
 
+def _encoded(commands: list[Any]) -> list[Any]:
+    """Commands as MeshCat reads them, in base64. An object that was drawn before is the pair of the places in the scene
+    of that one and of its copy: feet of the same mesh, and the robots of motions side by side, are in the file once.
+    """
+    from umsgpack import packb
+
+    out: list[Any] = []
+    drawn: dict[bytes, list[str]] = {}
+    for command in commands:
+        data = command.lower()
+        packed = packb(data)
+        if data["type"] == "set_object":
+            place = [part for part in data["path"].split("/") if part]
+            before = drawn.setdefault(_content(data["object"]), place)
+            if before is not place:
+                out.append([before, place])
+                continue
+        out.append(base64.b64encode(packed).decode())
+    return out
+
+
+def _content(drawn: dict[str, Any]) -> bytes:
+    """An object without the identifiers that MeshCat draws at random."""
+    from umsgpack import packb
+
+    packed = packb(drawn)
+    parts = [*drawn.get("geometries", ()), *drawn.get("materials", ()), drawn["object"]]
+    for k, uuid in enumerate(dict.fromkeys(part["uuid"] for part in parts)):
+        packed = packed.replace(uuid.encode(), b"%0*d" % (len(uuid), k))
+    return bytes(packed)
+
+
 def page(motions: Sequence[Motion], commands: list[Any], shown: Mapping[str, bool]) -> str:
     """The page that shows the commands, with the camera beside the motions.
 
@@ -171,9 +205,7 @@ def page(motions: Sequence[Motion], commands: list[Any], shown: Mapping[str, boo
     Returns:
         The text of an HTML file.
     """
-    from umsgpack import packb
-
-    encoded = ",".join(f'"{base64.b64encode(packb(c.lower())).decode()}"' for c in commands)
+    encoded = ",".join(json.dumps(c).replace("<", "\\u003c") for c in _encoded(commands))
     viewer = files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8")
     m, wide = motions[0], 0.5 * (len(motions) - 1) * spacing(motions)
     path, radius = _path(m)

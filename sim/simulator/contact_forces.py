@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-__all__ = ["ContactForces", "balanced", "least_forces"]
+__all__ = ["GroundForces", "balanced", "least_forces"]
 
 _EPS = 1e-12  # eps in units of the mean diagonal entry of A A^T
 _ITERATIONS = 100
@@ -28,7 +28,7 @@ _BALANCED = 1e-8  # of the largest load: what is left of it where forces balance
 
 
 @dataclass(frozen=True)
-class ContactForces:
+class GroundForces:
     """Contact forces for an acceleration, and the forces of the joints beside them.
 
     Attributes:

@@ -13,7 +13,7 @@ from sim.mechanism.contact import Contact
 from sim.mechanism.joint import WORLD
 from sim.mechanism.shapes import rotation_matrices, rotation_matrix
 from sim.model.state_columns import BodyState
-from sim.simulator.contact_forces import ContactForces, balanced, least_forces
+from sim.simulator.contact_forces import GroundForces, balanced, least_forces
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
@@ -289,7 +289,7 @@ class Kinematics:
         joint_forces: ArrayLike | None = None,
         *,
         contacts: Sequence[str] | None = None,
-    ) -> ContactForces:
+    ) -> GroundForces:
         """Forces of the ground for an acceleration: inverse dynamics of a robot on its contacts.
 
             M dv + b + g = tau + sum J_i^T f_i,   |tangential f_i| <= friction_i normal f_i
@@ -341,7 +341,7 @@ class Kinematics:
             for i, force in zip(near, f, strict=True):
                 forces[(*row, i)] = maps[i][1].T @ force
         rest = load - pushed if joint_forces is None else np.broadcast_to(np.asarray(joint_forces, float), load.shape)
-        return ContactForces(tuple(names), forces, np.array(rest), residual, success)
+        return GroundForces(tuple(names), forces, np.array(rest), residual, success)
 
     def _frame(self, call: str, name: str) -> tuple[int, Floats, Floats]:
         if isinstance(name, str) and name == WORLD and WORLD not in self._frames:

@@ -370,6 +370,23 @@ def test_motions_side_by_side_are_apart_and_end_together(quadruped, tmp_path):
 
 
 @pytest.mark.slow
+def test_motions_of_the_same_robot_share_its_meshes(page, tmp_path):
+    """The second robot adds its motion to the file, not its triangles, and is drawn nevertheless."""
+    corners = np.random.default_rng(1).standard_normal((400, 3))
+    shape = dojo.Polytope.about_centroid(0.2 * corners / np.linalg.norm(corners, axis=1)[:, None])
+    body = dojo.Body("rock", 1.0, shape=shape)
+    rock = dojo.Mechanism([body], [dojo.Joint("floating", None, "rock")])
+    fall = dojo.Simulator(rock, time_step=0.01).rollout(np.eye(1, 13, 3)[0], steps=2)
+    sizes = [dojo.viewer.save_html([fall] * n, tmp_path / f"{n}.html").stat().st_size for n in (1, 2, 3)]
+    drawn = animation.html_of(motion(fall), moving=False)
+    triangles = max(len(part) for part in drawn.split('"'))
+    assert sizes[1] - sizes[0] < 0.3 * triangles and sizes[2] - sizes[1] < 0.3 * triangles
+    shown(page, tmp_path / "3.html")
+    find = "viewer.scene_tree.find(['meshcat', 'motion2', 'bodies', '0 rock', 'part0', '<object>']).object"
+    assert page.evaluate(f"{find}.geometry.attributes.position.count") >= 400
+
+
+@pytest.mark.slow
 def test_a_page_steps_from_knot_to_knot_and_shows_its_overlays(page, quadruped, tmp_path):
     page.goto(dojo.viewer.save_html([quadruped, quadruped], tmp_path / "two.html", forces=True).as_uri())
     time.sleep(2.0)
