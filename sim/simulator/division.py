@@ -26,7 +26,8 @@ DIVISIBLE = frozenset(
     )
 )
 
-_ONE_PART, _WHOLE = np.ones(1, dtype=np.int64), np.ones(1)
+_FEW = 1000  # steps of a motion whose division is a copy: np.ones takes ten times as long for a single one
+_PARTS, _WHOLE = np.ones(_FEW, dtype=np.int64), np.ones(_FEW)
 
 
 class Division(NamedTuple):
@@ -39,6 +40,6 @@ class Division(NamedTuple):
     @classmethod
     def none(cls, steps: int) -> Division:
         """The division of a given number of undivided steps."""
-        if steps == 1:  # np.ones takes ten times as long as a copy, a tenth of the Python of a step
-            return cls(_ONE_PART.copy(), _WHOLE.copy(), np.zeros(1))
+        if steps <= _FEW:
+            return cls(_PARTS[:steps].copy(), _WHOLE[:steps].copy(), np.zeros(steps))
         return cls(np.ones(steps, dtype=np.int64), np.ones(steps), np.zeros(steps))
