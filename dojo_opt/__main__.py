@@ -26,6 +26,7 @@ import dojo_opt as dojo
 from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report import STUDIES
 from dojo_opt.report.command import CHECKOUT, MOVED, add_arguments, report
+from dojo_opt.report.result import finite
 from dojo_opt.tasks.plan_task import PlanTask
 from dojo_opt.viewer.show import add_show, show
 from sim.mechanism.checks import nearest, one_of
@@ -97,6 +98,11 @@ def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
     return arguments
 
 
+def _print_json(numbers: Any) -> None:
+    """Print numbers as JSON, which has none that are not finite: those become strings."""
+    print(json.dumps(finite(numbers), allow_nan=False))
+
+
 def _run(args: argparse.Namespace) -> int:
     if args.name in LOOPS:
         return _run_loop(args)
@@ -122,7 +128,7 @@ def _run(args: argparse.Namespace) -> int:
         numbers |= {"message": plan.message, "iterations": int(plan.nit), "cost": float(plan.fun)}
         numbers |= {"violation": float(plan.violation), "seconds": seconds}
         numbers |= {"x": plan.x.tolist(), "u": plan.u.tolist()}
-        print(json.dumps(numbers))
+        _print_json(numbers)
     else:
         for path in filter(None, (args.out, args.html)):
             print(f"wrote {path}")
@@ -143,7 +149,7 @@ def _run_loop(args: argparse.Namespace) -> int:
     numbers |= {"ticks": len(loop.log), "fallbacks": fallbacks}
     numbers |= {"tick_median_ms": float(np.median(ms)), "tick_99_ms": float(np.percentile(ms, 99))} if ms.size else {}
     if args.json:
-        print(json.dumps(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()}))
+        _print_json(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()})
     else:
         print(f"{loop.message}  rms {loop.rms():.3f} (m, rad) in {loop.duration:.2f} s over all tracked coordinates:")
         print("  " + ", ".join(f"{name} {value:.3f}" for name, value in each.items()))
@@ -174,11 +180,12 @@ def _run_suite(args: argparse.Namespace) -> int:
     numbers |= {"tick_median_ms": outcome.median, "tick_99_ms": outcome.late, "fallbacks": outcome.fallbacks}
     numbers |= {"rate_hz": task.rate, "penetration_mm": 1e3 * outcome.penetration}
     if args.json:
-        print(json.dumps(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()}))
+        _print_json(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()})
     else:
         print(f"{'success' if outcome.success else 'no success'}: {loop.message}")
         print("  " + ", ".join(f"{measure} {value:.3g}" for measure, value in outcome.measures.items()))
         ticks = "ticks at {rate_hz:g} Hz: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms of the processor"
+        ticks = ticks if np.isfinite(outcome.median) else "too short for a second tick"
         print((ticks + ", {fallbacks} fallbacks; penetration {penetration_mm:.2g} mm").format(**numbers))
     return 0 if outcome.success else 1
 
@@ -196,7 +203,7 @@ def _plan_task(args: argparse.Namespace, task: PlanTask) -> int:
         dojo.viewer.save_html(plan, args.html)
     numbers = {"task": args.name, "message": plan.message, "seconds": seconds, **outcome._asdict()}
     if args.json:
-        print(json.dumps(numbers | {"x": plan.x.tolist(), "u": plan.u.tolist()}))
+        _print_json(numbers | {"x": plan.x.tolist(), "u": plan.u.tolist()})
     else:
         print(f"{'success' if outcome.success else 'no success'}: {plan.message}")
         print("  " + ", ".join(f"{measure} {value:.3g}" for measure, value in outcome.measures.items()))
@@ -212,7 +219,7 @@ def _models(args: argparse.Namespace) -> int:
             dojo.plots.thumbnail(entry.build()).savefig(args.thumbnails / f"{entry.name}.png", dpi=100)
     if args.json:
         rows = [asdict(entry) for entry in entries]
-        print(json.dumps([{name: row[name] for name in row if name != "builder"} for row in rows]))
+        _print_json([{name: row[name] for name in row if name != "builder"} for row in rows])
         return 0
     print(f"{'name':<18}{'bodies':>7}{'nq':>4}{'nv':>4}{'nu':>4}{'contacts':>9}{'limits':>7}{'kg':>8}  description")
     for e in entries:
@@ -230,7 +237,7 @@ def _warmup(args: argparse.Namespace) -> int:
     numbers |= {"kernels": len(compiled_signatures()), "signatures": sum(compiled_signatures().values())}
     folder = cache_folder()
     if args.json:
-        print(json.dumps({**numbers, "cache": str(folder) if folder else None}))
+        _print_json({**numbers, "cache": str(folder) if folder else None})
     else:
         where = f"cached in {folder}" if folder else "not cached (DOJO_OPT_CACHE=0, or no usable folder)"
         print("{signatures} signatures of {kernels} kernels in {seconds:.1f} s, ".format(**numbers) + where)

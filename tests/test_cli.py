@@ -71,6 +71,19 @@ def test_run_writes_plan_figure_and_animation(tmp_path: Path, capsys: pytest.Cap
     assert page.read_text().count("MeshCat.Viewer") == 1
 
 
+def test_a_run_without_a_second_tick_has_no_nan(capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["run", "idto.acrobot", "--seconds", "0.003"]
+    assert cli.main([*command, "--json"]) == 1
+
+    def refuse(name: str) -> None:
+        raise AssertionError(f"no JSON: {name}")
+
+    result = json.loads(capsys.readouterr().out, parse_constant=refuse)
+    assert result["tick_median_ms"] == "nan"
+    assert cli.main(command) == 1
+    assert "too short for a second tick" in capsys.readouterr().out
+
+
 def test_a_missed_bar_exits_with_1_only_when_strict(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
