@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.mechanism.short_repr import short_repr
+
 Floats = NDArray[np.float64]
 
 __all__ = ["GroundForces", "balanced", "least_forces"]
@@ -44,6 +46,8 @@ class GroundForces:
     joint_forces: Floats
     residual: Floats
     success: NDArray[np.bool_]
+
+    __repr__ = short_repr
 
 
 def least_forces(A: Floats, load: Floats, friction: Floats) -> tuple[Floats, float]:

@@ -1,6 +1,6 @@
 """A slope that is learnt from the feet that stand: the ground that turns, the fit, and references that go with it."""
 
-import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -25,27 +25,14 @@ def test_ground_turned_in_place_is_ground_made_so(robot):
     plant = Plant(robot, slope=SLOPE, slope_heading=HEADING)
     made, turned, x = plant.simulator, robot.replace(), plant.x
     u = np.zeros((4, 12))
-    results = []
-
-    def call(go, done):
-        for _ in range(2):
-            go.wait()
-            go.clear()
-            results.append(turned.rollout(x, u).x)
-            done.set()
-
     planner = turned.horizon(4)
     before = planner.roll(x, np.tile(x, (5, 1)), u, 1e-4).x
-    go, done = threading.Event(), threading.Event()
-    thread = threading.Thread(target=call, args=(go, done))
-    thread.start()
-    for normal in ((0.0, 0.0, 1.0), plant.perturbation.normal):
-        turned.turn_ground(normal)
-        go.set()
-        done.wait()
-        done.clear()
-        np.testing.assert_array_equal(results[-1], turned.rollout(x, u).x)
-    thread.join()
+    results = []
+    with ThreadPoolExecutor(1) as thread:
+        for normal in ((0.0, 0.0, 1.0), plant.perturbation.normal):
+            turned.turn_ground(normal)
+            results.append(thread.submit(turned.rollout, x, u).result().x)
+            np.testing.assert_array_equal(results[-1], turned.rollout(x, u).x)
     assert np.abs(results[0] - results[1]).max() > 1e-4
     np.testing.assert_array_equal(results[1], made.rollout(x, u).x)
     planned = planner.roll(x, np.tile(x, (5, 1)), u, 1e-4).x
