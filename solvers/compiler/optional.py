@@ -42,6 +42,7 @@ from solvers.compiler.kernels import entry, is_kept
 from solvers.compiler.pipeline import OptionalCompiler, RolledCompiler, SeldomCompiler
 from solvers.compiler.progress import parts
 from solvers.compiler.records import RECORDS, load_word
+from solvers.compiler.signals import signals_held
 
 __all__ = ["OptionalKernel", "link", "optional", "optional_kernels"]
 
@@ -138,7 +139,8 @@ class OptionalKernel:
                 found = code.signature.return_type
                 raise TypeError(f"optional kernel {self.name}: expected to return {declared.return_type}, got {found}")
             self._code = code
-        return int(self._code.library.get_pointer_to_function(self._code.fndesc.llvm_func_name))
+        with signals_held():  # llvmlite would keep its lock for ever, if an exception came as it leaves the lock
+            return int(self._code.library.get_pointer_to_function(self._code.fndesc.llvm_func_name))
 
     @cached_property
     def _call(self) -> Any:

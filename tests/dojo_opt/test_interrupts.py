@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -116,6 +117,10 @@ HOP = dojo.problems.hop()
 @pytest.mark.parametrize("name", CALLS)
 def test_no_ctrl_c_is_dropped_wherever_it_comes(name: str) -> None:
     assert dropped(CALLS[name], most=200) == []
+    other = threading.Thread(target=CALLS[name], daemon=True)
+    other.start()
+    other.join(100.0)
+    assert not other.is_alive(), "a lock is kept"
 
 
 def test_ctrl_c_before_the_first_iterate_leaves_no_plan(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -94,7 +94,7 @@ def heard_in(call: Callable[[int], Any], steps: int, after: float, *, in_loop: b
 
 
 class _RaisedAt:
-    """Trace function that raises KeyboardInterrupt where a function begins, which is where Python handles signals."""
+    """Trace function that handles a SIGINT where a function begins, which is where Python handles signals."""
 
     def __init__(self, number: int) -> None:
         self.count, self._number = 0, number
@@ -108,15 +108,18 @@ class _RaisedAt:
         if self.count == self._number:
             self.where = f"{code.co_filename}:{code.co_qualname}"
             sys.settrace(None)
-            raise KeyboardInterrupt
+            handler = signal.getsignal(signal.SIGINT)
+            assert callable(handler)
+            handler(signal.SIGINT, frame)
 
 
 class _Raised:
-    """A call with a KeyboardInterrupt as its function of that number begins; 0: none."""
+    """A call with a SIGINT as its function of that number begins; 0: none."""
 
     def __init__(self, call: Callable[[], Any], number: int) -> None:
         trace, before = _RaisedAt(number), sys.gettrace()
         self.heard = False
+        handler = signal.signal(signal.SIGINT, signal.default_int_handler)
         sys.settrace(trace)
         try:
             call()
@@ -124,6 +127,7 @@ class _Raised:
             self.heard = True
         finally:
             sys.settrace(before)
+            signal.signal(signal.SIGINT, handler)
         self.count, self.where = trace.count, trace.where
 
 
