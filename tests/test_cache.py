@@ -341,6 +341,7 @@ def test_processes_may_write_at_once(filled: Filled) -> None:
 # -- kernels -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_rare_features_are_compiled_only_by_their_scenes() -> None:
     program = """
 import numpy as np, dojo_opt as dojo

@@ -159,6 +159,7 @@ def test_links_that_touch_the_ground_are_named(
     assert "--contacts foot=wide: expected LINK or LINK=RADIUS in metres" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_module_runs_as_a_program() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "dojo_opt", "--version"],

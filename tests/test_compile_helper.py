@@ -70,6 +70,7 @@ def test_each_job_is_done_once_and_those_of_the_helper_come_last(told: Path) -> 
     assert sorted(seen) == sorted(job.name for job in JOBS)
 
 
+@pytest.mark.slow
 def test_a_helper_that_fails_leaves_its_jobs(told: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(helper_process, "_PROGRAM", "print('done', flush=True); input(); raise SystemExit(1)")
     seen = []

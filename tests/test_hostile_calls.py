@@ -56,6 +56,7 @@ def environments() -> dict[str, Any]:
     }
 
 
+@pytest.mark.slow
 def test_actions_are_refused_by_name(environments: dict[str, Any]) -> None:
     for call, environment in environments.items():
         with pytest.raises(RuntimeError, match=r"call reset\(\)"):
@@ -206,6 +207,7 @@ def outcome(command: str) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="of Linux")
 def test_output_that_nobody_takes_is_no_traceback() -> None:
     assert outcome("| true") in ((1, ""), (0, ""))  # whichever is faster

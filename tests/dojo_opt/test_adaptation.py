@@ -45,6 +45,7 @@ def test_mass_and_friction_are_found_from_exact_states(plant):
     assert found.values["friction:*"] == pytest.approx(0.2, rel=2e-2)
 
 
+@pytest.mark.slow
 def test_the_estimate_is_as_far_off_as_its_deviation_says(plant):
     settings = dojo.Adaptation(NAMES, noise=(2e-4, 2e-3))
     off = []

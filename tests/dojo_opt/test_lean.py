@@ -83,6 +83,7 @@ def test_the_report_of_a_robot():
     assert report.figure is not None and json.loads(report.as_json())["details"]["robot"]
 
 
+@pytest.mark.slow
 def test_a_simulation_in_a_new_process_imports_no_heavy_library():
     run = new_process("pendulum", cold=False)
     assert run["success"] and run["modules"] == [] and run["kernels"]

@@ -28,6 +28,7 @@ def reaching(sim, **settings):
     return dojo.MPC(problem, **settings)
 
 
+@pytest.mark.slow
 def test_the_spinner_starts_to_turn():
     """Within 1.5 s, by contact alone; its ticks are on time for the plan before to be in force."""
     task = dojo.tasks.idto.spinner()
@@ -67,6 +68,7 @@ def test_arms_turn_a_box(name, seconds, least):
     assert set(outcome.measures) == {"at the goal [s]", "angle off [deg]", "off [mm]"}
 
 
+@pytest.mark.slow
 def test_a_puck_is_pushed_towards_its_goal():
     """Over a gap of .3 m, which no contact reaches at first; its heading is hardly changed by the rim's friction."""
     task = dojo.tasks.idto.air_hockey()

@@ -65,6 +65,7 @@ print(_last(A), _entry(part, 3), _row(A, 2, 3), _pair(A, 2, 3), _lanes(wide, 1, 
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plain", ["0", "1"])
 def test_a_negative_index_that_is_not_written_as_a_number_is_refused(plain):
     *errors, last = python(PROGRAM, NUMBA_BOUNDSCHECK="1", DOJO_OPT_PLAIN_NUMBA=plain).splitlines()

@@ -20,6 +20,7 @@ print(json.dumps([FAST, sim.energy(x), sim.kinetic_energy(x), *sim.momentum(x)[0
 """
 
 
+@pytest.mark.slow
 def test_numbas_own_pipeline_gives_the_same_digits():
     fast, *numbers = json.loads(python(SIMULATION, DOJO_OPT_PLAIN_NUMBA="0"))
     plain, *others = json.loads(python(SIMULATION, DOJO_OPT_PLAIN_NUMBA="1"))
@@ -98,6 +99,7 @@ def alone() -> str:
     return python(GUEST.format(first=""))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plain", ["0", "1"], ids=["fast", "plain"])
 def test_numba_compiles_others_functions_as_it_does_without_us(alone: str, plain: str):
     """No type is registered with an operator, not even lanes, by either pipeline."""
