@@ -4,6 +4,7 @@ The fast pipeline (fast_pipeline.py) builds on private parts of Numba. The resul
 a step takes about 1.3 times as long, and a cold start twice.
 
     DOJO_OPT_PLAIN_NUMBA=1    Numba's own
+    NUMBA_DEBUGINFO=1         Numba's own, too: the fast pipeline drops the scopes that debug information refers to
 """
 
 from __future__ import annotations
@@ -91,7 +92,7 @@ class _Compilers(NamedTuple):
 
 
 def _compilers() -> _Compilers:
-    if os.environ.get("DOJO_OPT_PLAIN_NUMBA", "0") in ("", "0"):
+    if os.environ.get("DOJO_OPT_PLAIN_NUMBA", "0") in ("", "0") and not config.DEBUGINFO_DEFAULT:
         if any(numba.__version__.startswith(f"{known}.") for known in _KNOWN):
             from solvers.compiler import fast_pipeline as fast
             from solvers.compiler.libraries import inner_result

@@ -44,6 +44,14 @@ def test_an_unknown_numba_is_used_as_it_is_and_said_so_in_one_line():
     assert python(UNKNOWN, DOJO_OPT_PLAIN_NUMBA="1").split() == ["False", "0"]
 
 
+@pytest.mark.parametrize("setting", ["NUMBA_DEBUGINFO", "NUMBA_ENABLE_PROFILING"])
+def test_debug_information_is_for_numbas_own_pipeline(setting: str):
+    """With it the fast pipeline makes invalid modules, or kernels with wrong results."""
+    program = "from solvers.compiler.pipeline import FAST; print(FAST)"
+    assert python(program, DOJO_OPT_PLAIN_NUMBA="0", **{setting: "1"}).split() == ["False"]
+    assert python(program, DOJO_OPT_PLAIN_NUMBA="0", **{setting: "0"}).split() == ["True"]
+
+
 @pytest.mark.slow
 def test_the_cache_keeps_the_pipelines_apart(tmp_path: Path):
     program = "from solvers.compiler import cache_folder; print(cache_folder().name)"
