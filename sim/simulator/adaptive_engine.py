@@ -9,7 +9,8 @@ are rounded. Joints are not released from their limits as exactly as contacts ar
 from __future__ import annotations
 
 import threading
-from typing import NamedTuple, NoReturn
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ from sim.mechanism.servos import limited_servos
 from sim.model.interruptible_loops import pieces
 from sim.model.model import Model
 from sim.model.record_columns import ContactRow, StepReport, StepSetting
+from sim.simulator.central_differences import central_differences
 from sim.simulator.division import Division
 from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted, refuse
 from sim.simulator.link_kernels import link_flight
@@ -50,7 +52,10 @@ _CONVERGED = 1e-6  # tolerance of steps with loops or gears, in accuracies
 _ROWS = 256  # sub-steps between two pauses
 _MOST = 1_000_000  # sub-steps of a step: an input is not held for ever
 
+_NUDGE = 1e-3  # of states and inputs, in differences
+
 Held = tuple[Vector, Cube]  # input (nu,) and external wrenches (1 or 0, nbody, 6) of a step
+Conversion = Callable[[Vector, Held, float], Vector]  # between a node and the mean state of a step of a length
 
 
 class Substeps(NamedTuple):
@@ -247,6 +252,8 @@ class AdaptiveEngine(PythonLoopEngine):
 
     def _mean_slopes(self, x: Vector, held: Held, h: float, mean: Vector) -> tuple[Floats, Floats]:
         """d(mean)/d(x, u):  p_v dv' = (M + C) dv + ((M v)_q - h/2 f_q - p_q) dq - h/2 f_u du."""
+        if not self._is_tree:
+            return self._closed_slopes(self._mean, x, held, h)
         nv, (slopes, force) = self.sizes.nv, self._node_terms(x, held)
         by_q, by_v = self._momentum_slopes(h, mean)
         A, B = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
@@ -257,6 +264,8 @@ class AdaptiveEngine(PythonLoopEngine):
 
     def _end_slopes(self, mean: Vector, held: Held, h: float, x: Vector) -> tuple[Floats, Floats]:
         """d(x)/d(mean, u):  (M + C) dv = p_v dv' + (p_q + h/2 f_q - (M v)_q) dq + h/2 f_u du."""
+        if not self._is_tree:
+            return self._closed_slopes(self._node, mean, held, h)
         nv, (slopes, force) = self.sizes.nv, self._node_terms(x, held)
         by_q, by_v = self._momentum_slopes(h, mean)
         A, B = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
@@ -265,10 +274,23 @@ class AdaptiveEngine(PythonLoopEngine):
         B[nv:] = np.linalg.solve(damped, 0.5 * h * slopes.f_u)
         return A, B
 
+    def _closed_slopes(self, convert: Conversion, x: Vector, held: Held, h: float) -> tuple[Floats, Floats]:
+        """Derivatives of a conversion by the state x (nx,) and the input, by differences.
+
+        Loops and gears are closed by projections, whose derivatives have second derivatives of the closures.
+        """
+        (u, wrench), end = held, convert(x, held, h)
+
+        def moved(change: Floats) -> Floats:
+            start = self.integrate(x[None], change[None, : self.ndx])[0]
+            to = convert(start, (u + change[self.ndx :], wrench), h)
+            return np.asarray(self.difference(end[None], to[None])[0])
+
+        both = central_differences(moved, self.ndx + self.nu, _NUDGE)
+        return both[:, : self.ndx], both[:, self.ndx :]
+
     def slopes(self, path: Substeps, held: Held, kappa: float | None = None) -> tuple[Floats, Floats, float]:
         """(A, B, accuracy of them) of a step: the products of those of its sub-steps, whose lengths are held."""
-        if self.sizes.nloop + self.sizes.ngear:
-            self._refuse("derivatives through closed loops and gears are")
         A, B, accuracy = np.eye(self.ndx), np.zeros((self.ndx, self.nu)), 0.0
         for x, h, order in zip(path.starts, path.lengths, path.orders, strict=True):
             _, dx, du, report = self.part_slopes(x, held, h, int(order), kappa)
@@ -365,9 +387,6 @@ class AdaptiveEngine(PythonLoopEngine):
         carried: Floats = self._kept.contacts
         impulses = carried[:, ContactRow.IMPULSE : ContactRow.POINT]
         return np.asarray(np.linalg.norm(impulses, axis=1) <= self.settings.tolerance)
-
-    def _refuse(self, feature: str) -> NoReturn:
-        raise ValueError(f"Simulator(accuracy=...): {feature} those of steps of order 2; use replace(accuracy=None)")
 
 
 def _lightest(model: Model) -> float:

@@ -13,6 +13,7 @@ from sim.mechanism.contact import Contact
 from sim.mechanism.joint import WORLD
 from sim.mechanism.shapes import rotation_matrices, rotation_matrix
 from sim.model.state_columns import BodyState
+from sim.simulator.central_differences import ORDER_8
 from sim.simulator.contact_forces import GroundForces, balanced, least_forces
 from sim.simulator.simulator import Simulator
 
@@ -20,8 +21,6 @@ Floats = NDArray[np.float64]
 
 _TOUCHING = 1e-3  # [m] contacts that are nearer to the ground may carry
 _STEP = 4e-3  # of the differences along a motion, in units of the time in which it turns by one radian
-# f'(0) from f(k s), k = 1, 2, 3, 4, of central differences of order 8
-_ORDER_8 = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)
 
 
 class Kinematics:
@@ -253,7 +252,7 @@ class Kinematics:
         twist = _times(J, v)
         step = _STEP / np.maximum(1.0, np.abs(v).max(axis=-1, initial=0.0))
         rate = np.zeros_like(twist)
-        for k, weight in enumerate(_ORDER_8, start=1):
+        for k, weight in enumerate(ORDER_8, start=1):
             moves = (sign * k * step[..., None] * v for sign in (1.0, -1.0))
             ahead, behind = (_times(self._body_jacobians(self.moved(q, dq))[0], v) for dq in moves)
             rate += weight / step[..., None, None] * (ahead - behind)
