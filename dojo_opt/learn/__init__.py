@@ -5,6 +5,7 @@ If Gymnasium is installed, registration.py registers the tasks with it: `gymnasi
 
 from importlib.util import find_spec
 
+from dojo_opt.learn.dojo_tasks import ant_ars, quadruped_sampling, sampled_gait
 from dojo_opt.learn.evaluation import Evaluation, evaluate
 from dojo_opt.learn.gymnasium_tasks import ant, cartpole, half_cheetah, hopper, humanoid, pendulum, walker2d
 from dojo_opt.learn.imitate import ImitationOptions, imitate
@@ -14,9 +15,10 @@ from dojo_opt.learn.policy_search import GradientSearchOptions, RandomSearchOpti
 from dojo_opt.learn.randomisation import Randomisation
 from dojo_opt.learn.seed_runs import best_of, seeds
 from dojo_opt.learn.shac import ShacOptions, shac
+from dojo_opt.learn.swimmer_task import swimmer
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.training_result import Learned
-from dojo_opt.learn.velocity_task import quadruped, velocity_error
+from dojo_opt.learn.velocity_task import go2, quadruped, velocity_error
 from dojo_opt.learn.waypoint_tasks import quadrotor, uuv, youbot
 
 if find_spec("gymnasium") is not None:
@@ -37,10 +39,12 @@ __all__ = [
     "ShacOptions",
     "Task",
     "ant",
+    "ant_ars",
     "ars",
     "best_of",
     "cartpole",
     "evaluate",
+    "go2",
     "gradient_search",
     "half_cheetah",
     "hopper",
@@ -49,9 +53,12 @@ __all__ = [
     "pendulum",
     "quadrotor",
     "quadruped",
+    "quadruped_sampling",
     "roll_policy_batch",
+    "sampled_gait",
     "seeds",
     "shac",
+    "swimmer",
     "uuv",
     "velocity_error",
     "walker2d",

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.randomisation import Drawn
 from dojo_opt.learn.task import Task
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.monte_carlo import Sampler
@@ -49,7 +50,8 @@ class _TaskEpisode:
         self.observations, self.steps, self.knot_time = task.observations, task.steps, task.knot_time
         self.edge, self.kind = np.ones(task.sim.nu), np.float32
         self.x, self._count = np.zeros((1, task.nx)), task.steps
-        self._rngs, self._quick = [np.random.default_rng()], task.sim.has_single_rows
+        self._rngs, self._model = [np.random.default_rng()], Drawn.of(task)
+        self._quick = task.sim.has_single_rows and task.touch_groups is None
 
     def reset(self, rng: np.random.Generator) -> Vector:
         """To a first state."""
@@ -63,8 +65,7 @@ class _TaskEpisode:
             raise RuntimeError("Environment.step: the episode is over, or has not begun; call reset()")
         plain = type(action) is np.ndarray and action.dtype.kind == "f"  # which `_limited` looks at
         given = np.array(action if plain else _numbers(action, task.sim.nu), dtype=np.float64)
-        after, message = self._step(before, given)
-        self.x = after if task.commands == 0 else np.concatenate([after, before[:, task.sim.nx :]], axis=1)
+        self.x, message = self._step(before, given)
         self._count += 1
         late = self._count >= task.steps
         if message:
@@ -77,16 +78,16 @@ class _TaskEpisode:
 
     def _step(self, x: Vector, action: Vector) -> tuple[Vector, str]:
         """The state (1, nx) after one action, and why it was not reached; checks of arguments take longer than that."""
-        sim, steps = self.sim, self.task.substeps
+        sim, nx = self.sim, self.sim.nx
         inputs = self.task.inputs(_limited(action, sim.nu))
         if not self._quick:
-            found = sim.step_batch(x[:, : sim.nx], inputs[None], steps)
-        else:
-            row = sim.single_row(steps)
-            if row.advance(x[0, : sim.nx], inputs):
-                return row.end[None].copy(), ""
-            found = row.result(x[:, : sim.nx])
-        return found.x, "" if found.success else found.message
+            found = self._model.step(x, inputs[None])
+            return found.x, "" if found.success else found.message
+        row = sim.single_row(self.task.substeps)
+        if not row.advance(x[0, :nx], inputs):
+            return x, row.result(x[:, :nx]).message
+        after = row.end[None].copy()
+        return after if x.shape[1] == nx else np.concatenate([after, x[:, nx:]], axis=1), ""
 
     def state(self) -> Vector:
         """The present one, of the simulator."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -70,7 +71,8 @@ def evaluate(
     model = Drawn.of(task)
     if substeps is not None:
         steps = whole_number("evaluate(substeps=...)", substeps)
-        model = Drawn(task.sim.replace(time_step=task.knot_time / steps, kappa=task.sim.kappa), steps, None, {}, 0.0)
+        sim = task.sim.replace(time_step=task.knot_time / steps, kappa=task.sim.kappa)
+        model = replace(model, sim=sim, substeps=steps)
     delays = ActionDelay(whole_number("evaluate(delay=...)", delay, 0), count, task.sim.nu)
     rngs = [np.random.default_rng((seed, i)) for i in range(count)]
     xs = task.starts(rngs)

@@ -1,24 +1,23 @@
 """Tasks of Gymnasium, version 5: its models, observations, rewards, ends and limits, in this simulator.
 
 The models are the MJCF files in Gymnasium's own package. Where a random first state is below the ground, which is hard
-here, it is lifted onto it. Forces of contacts are neither observed nor paid for: the ant is the one of
-`include_cfrc_ext_in_observation=False, contact_cost_weight=0`.
+here, it is lifted onto it. Ant and humanoid observe forces of contacts, and pay for them, only where they are asked to:
+these forces are those of contacts with the ground, in the last time step of an action.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.contact_observation import contact_fields, model_path
 from dojo_opt.learn.randomisation import Randomisation
+from dojo_opt.learn.survival import within
 from dojo_opt.learn.task import Task, never
-from dojo_opt.planning.residual import kernel
 from sim.io.mjcf.load import load_mjcf
 from sim.io.mjcf.report import MjcfMechanism, MjcfWarning
 from sim.mechanism.body import Body
@@ -70,12 +69,10 @@ _ANT = {**_RARELY, "epochs": 2100, "episode": 128, "rate": 3e-3, "randomisation"
 
 def _model(file: str) -> MjcfMechanism:
     """A model of Gymnasium's package."""
-    found = find_spec("gymnasium")
-    if found is None or found.origin is None:
-        raise ImportError('tasks of Gymnasium read its models: pip install "dojo-opt[gym,mjcf]"')
+    path = model_path(file)
     with warnings.catch_warnings():  # about collisions that could be added
         warnings.simplefilter("ignore", MjcfWarning)
-        return load_mjcf(Path(found.origin).parent / "envs" / "mujoco" / "assets" / file)
+        return load_mjcf(path)
 
 
 def _starts(
@@ -120,12 +117,6 @@ def _runs(time: float, effort: float) -> Callable[..., Any]:
         return total
 
     return reward
-
-
-@kernel
-def within(value, low, high, width):  # type: ignore[no-untyped-def]
-    """1 well between two bounds, 1/2 on them, 0 outside, over a few widths: a smooth probability of survival."""
-    return 1.0 / ((1.0 + np.exp((low - value) / width)) * (1.0 + np.exp((value - high) / width)))
 
 
 def _task(mech: MjcfMechanism, substeps: int, time_step: float, **fields: Any) -> Task:
@@ -194,13 +185,22 @@ def walker2d() -> Task:
     return _legged("Walker2d", "walker2d_v5.xml", 17, terminated, survival_probability)
 
 
-def ant() -> Task:
-    """Ant-v5 without forces of contacts: run along x; 27 observations, 8 actions, 0.05 s each.
+def ant(include_cfrc_ext_in_observation: bool = False, contact_cost_weight: float = 0.0) -> Task:
+    """Ant-v5: run along x; 27 observations, or 105 with forces of contacts, 8 actions, 0.05 s each.
+
+    Args:
+        include_cfrc_ext_in_observation: whether the observation ends with torque and force on each of MuJoCo's 13
+            bodies, clipped to 1 (default False; that of Gymnasium is True).
+        contact_cost_weight: of the squares of the clipped torques and forces (default 0; that of Gymnasium is 5e-4).
 
     Returns:
         The task.
     """
     mech = _model("ant.xml")
+    seen = _tailed(2, mech.nq, np.inf), 27
+    fields = contact_fields(
+        mech, "ant.xml", (*seen, _runs(0.05, 0.5)), include_cfrc_ext_in_observation, contact_cost_weight, 1.0, np.inf
+    )
 
     def terminated(x):  # type: ignore[no-untyped-def]
         return not 0.2 <= x[2] <= 1.0
@@ -209,18 +209,23 @@ def ant() -> Task:
         return within(x[2], 0.2, 1.0, 0.02)
 
     return _task(
-        mech, 5, 0.01, observation=_tailed(2, mech.nq, np.inf), observations=27, reward=_runs(0.05, 0.5),
-        start=_starts(mech, 2, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)), terminated=terminated, survival=1.0,
-        survival_probability=survival_probability, name="Ant", settings=_ANT,
+        mech, 5, 0.01, start=_starts(mech, 2, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)), terminated=terminated,
+        survival=1.0, survival_probability=survival_probability, name="Ant", settings=_ANT, **fields,
     )  # fmt: skip
 
 
-def humanoid() -> Task:
-    """Humanoid-v5 with positions and velocities only: run along x; 45 observations, 17 actions, 0.015 s each.
+def humanoid(include_cfrc_ext_in_observation: bool = False, contact_cost_weight: float = 0.0) -> Task:
+    """Humanoid-v5: run along x; 45 observations, or 123 with forces of contacts, 17 actions, 0.015 s each.
 
-    It is the task with all `include_..._in_observation=False` and `contact_cost_weight=0`, but with the forward
-    velocity of the torso instead of the centre of mass; over an episode they differ little. The knees start within
-    their limits, 3 degrees bent.
+    Inertias, velocities of bodies and forces of actuators are not observed, and the forward velocity is that of the
+    torso instead of the centre of mass; over an episode they differ little. The knees start within their limits,
+    3 degrees bent.
+
+    Args:
+        include_cfrc_ext_in_observation: whether the observation ends with torque and force on each of MuJoCo's 13
+            bodies (default False; that of Gymnasium is True).
+        contact_cost_weight: of the squares of the torques and forces, at most 10 in all (default 0; that of Gymnasium
+            is 5e-7).
 
     Returns:
         The task.
@@ -242,10 +247,13 @@ def humanoid() -> Task:
             total -= 0.1 * (0.4 * a[i]) ** 2  # of Gymnasium's controls, up to 0.4
         return total
 
+    seen = _tailed(2, mech.nq, np.inf), 45
+    fields = contact_fields(
+        mech, "humanoid.xml", (*seen, reward), include_cfrc_ext_in_observation, contact_cost_weight, np.inf, 10.0
+    )
     return _task(
-        mech, 3, 0.005, observation=_tailed(2, mech.nq, np.inf), observations=45, reward=reward,
-        start=_starts(mech, 2, 0.01, lambda rng, n: rng.uniform(-0.01, 0.01, n), home), terminated=terminated,
-        survival=5.0, survival_probability=survival_probability, name="Humanoid",
+        mech, 3, 0.005, start=_starts(mech, 2, 0.01, lambda rng, n: rng.uniform(-0.01, 0.01, n), home),
+        terminated=terminated, survival=5.0, survival_probability=survival_probability, name="Humanoid", **fields,
     )  # fmt: skip
 
 

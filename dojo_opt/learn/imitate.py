@@ -87,6 +87,8 @@ class _Knots:
 
     def __init__(self, task: Task, plans: Sequence[Any]) -> None:
         call, sim = "imitate(plans)", task.sim
+        if task.nx != sim.nx:
+            raise ValueError("imitate(task): states of this task end with commands or forces, which plans do not have")
         half = 0.5 * (task.high - task.low)
         parts: list[tuple[Floats, Floats, Floats]] = []
         if isinstance(plans, str) or not isinstance(plans, Iterable):

@@ -12,6 +12,7 @@ from dojo_opt.learn.task import Task
 from sim.mechanism import checks
 from sim.mechanism.memory_limit import room_for
 from sim.mechanism.short_repr import short_repr
+from sim.simulator.contact_groups import ContactGroups
 from sim.simulator.row_batch import BatchStep
 from sim.simulator.simulator import Simulator
 
@@ -117,7 +118,8 @@ class Models:
 
     def drawn(self, substeps: int, kappa: Floats | None, parameters: Mapping[str, Floats], delay: int) -> Drawn:
         """Models of these values, of rows."""
-        return Drawn(self._sims[substeps], substeps, kappa, parameters, self._given.noise, delay)
+        touch = self._task.touch_groups
+        return Drawn(self._sims[substeps], substeps, kappa, parameters, self._given.noise, delay, touch)
 
 
 @dataclass(frozen=True)
@@ -130,14 +132,27 @@ class Drawn:
     parameters: Mapping[str, Floats]  # each (n, components), or (1, components) of all rows
     noise: float
     delay: int = 0  # of actions [control steps]
+    touch: ContactGroups | None = None  # whose forces end the states
 
     __repr__ = short_repr
 
     def step(self, xs: Floats, inputs: Floats, derivatives: bool = False, kappa: float | None = None) -> BatchStep:
-        """One action of every row, from states of the task to states of the task; a kappa instead of that of rows."""
+        """One action of every row, from states of the task to states of the task; a kappa instead of that of rows.
+
+        Forces at the end of states have no derivatives: beside these, they are those of a second call.
+        """
         nx, level = self.sim.nx, self.kappa if kappa is None else kappa
-        found = self.sim.step_batch(xs[:, :nx], inputs, self.substeps, derivatives, level, self.parameters)
-        return found if xs.shape[1] == nx else replace(found, x=np.concatenate([found.x, xs[:, nx:]], axis=1))
+        asked = xs[:, :nx], inputs, self.substeps
+        touched = self.touch is not None
+        found = self.sim.step_batch(*asked, derivatives, level, self.parameters, contacts=touched and not derivatives)
+        if xs.shape[1] == nx:
+            return found
+        x = np.concatenate([found.x, xs[:, nx:]], axis=1)
+        if self.touch is not None:
+            felt = self.sim.step_batch(*asked, False, level, self.parameters, contacts=True) if derivatives else found
+            assert felt.contacts is not None
+            x[:, -6 * self.touch.count :] = self.touch.wrenches(felt.x, felt.contacts).reshape(len(x), -1)
+        return replace(found, x=x)
 
     def rows(self, chosen: NDArray[np.int64]) -> Drawn:
         """Models of some rows."""
@@ -148,4 +163,4 @@ class Drawn:
     @classmethod
     def of(cls, task: Task) -> Drawn:
         """The model of the task, for all rows."""
-        return cls(task.sim, task.substeps, None, {}, 0.0)
+        return cls(task.sim, task.substeps, None, {}, 0.0, touch=task.touch_groups)

@@ -26,7 +26,11 @@ TASKS = {  # name: module and function, steps of an episode
     "Humanoid": ("gymnasium_tasks", "humanoid", 1000),
     "Cartpole": ("gymnasium_tasks", "cartpole", 1000),
     "Pendulum": ("gymnasium_tasks", "pendulum", 200),
+    "Swimmer": ("swimmer_task", "swimmer", 1000),
     "Quadruped": ("velocity_task", "quadruped", 500),
+    "Go2": ("velocity_task", "go2", 500),
+    "AntArs": ("dojo_tasks", "ant_ars", 150),
+    "QuadrupedSampling": ("dojo_tasks", "quadruped_sampling", 200),
     "QuadrotorWaypoint": ("waypoint_tasks", "quadrotor", 500),
     "UuvWaypoint": ("waypoint_tasks", "uuv", 300),
     "YoubotWaypoint": ("waypoint_tasks", "youbot", 300),
@@ -34,25 +38,34 @@ TASKS = {  # name: module and function, steps of an episode
 
 
 @cache
-def task_of(name: str) -> Task:
-    """One task for all environments of a process: its models and compiled functions are shared."""
+def task_of(name: str, **options: Any) -> Task:
+    """One task for all environments of a process: its models and compiled functions are shared.
+
+    options: arguments of its function.
+    """
     module, function, _ = TASKS[name]
-    found: Task = getattr(import_module(f"dojo_opt.learn.{module}"), function)()
+    found: Task = getattr(import_module(f"dojo_opt.learn.{module}"), function)(**options)
     return found
 
 
-def environment(task: str, render_mode: str | None = None) -> Environment:
+def environment(task: str, render_mode: str | None = None, **options: Any) -> Environment:
     """A single environment."""
     from dojo_opt.learn.environment import Environment
 
-    return Environment(task_of(task), render_mode=render_mode)
+    return Environment(task_of(task, **options), render_mode=render_mode)
 
 
-def vector_environment(task: str, num_envs: int = 1, **options: Any) -> VectorEnvironment:
+def vector_environment(
+    task: str,
+    num_envs: int = 1,
+    autoreset_mode: Any = None,
+    max_episode_steps: int | None = None,
+    **options: Any,
+) -> VectorEnvironment:
     """Many environments."""
     from dojo_opt.learn.vector_environment import VectorEnvironment
 
-    return VectorEnvironment(task_of(task), num_envs, **options)
+    return VectorEnvironment(task_of(task, **options), num_envs, autoreset_mode, max_episode_steps)
 
 
 def register() -> None:

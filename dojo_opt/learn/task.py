@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
@@ -16,6 +16,7 @@ from dojo_opt.planning.manifold import displace, tangent_layout
 from dojo_opt.planning.residual import kernel
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
+from sim.simulator.contact_groups import ContactGroups
 from sim.simulator.simulator import Simulator
 from solvers.compiler import reduced, users_loop
 
@@ -146,7 +147,9 @@ class Task:
 
     The functions are compiled, as by `dojo.kernel`, and differentiated by central differences on the manifold of
     states; they must not write into their arguments other than `out`. With a command, such as a velocity to keep, the
-    state x of the task is that of the simulator, followed by the command: x[sim.nx:].
+    state x of the task is that of the simulator, followed by the command: x[sim.nx:]. The forces of contacts come last:
+    for each of the `touch` groups (6,), force [N] and torque about the centre of mass [N m], world axes, in the time
+    step before; zero at first, and not differentiated.
 
     Attributes:
         sim: simulator.
@@ -166,6 +169,7 @@ class Task:
             multiplies the rewards after x by this probability instead (default None: 1 or 0).
         commands: number of entries of a command (default 0).
         command: function of a generator that draws a command (commands,) (default None).
+        touch: groups of names of contacts, whose forces end the state (default (): none).
         hold: actions after which a command is drawn anew (default None: never; random search does not, either).
         settings: options of `shac` that suit the task; those of a call come first (default: none).
     """
@@ -185,6 +189,7 @@ class Task:
     survival_probability: Callable[..., Any] | None = None
     commands: int = 0
     command: Callable[[np.random.Generator], Floats] | None = None
+    touch: Sequence[Sequence[str]] = ()
     hold: int | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
 
@@ -208,6 +213,7 @@ class Task:
             checks.whole_number("Task(hold=...)", self.hold)
         for name in ("low", "high"):
             object.__setattr__(self, name, checks.array(f"Task({name}=...)", getattr(self, name), (self.sim.nu,)))
+        ContactGroups(self.sim, self.touch)  # checks the names
         if not np.all(self.low < self.high):
             raise ValueError(f"Task(low=..., high=...): expected low < high, got {self.low} and {self.high}")
 
@@ -222,8 +228,13 @@ class Task:
 
     @property
     def nx(self) -> int:
-        """Size of a state: that of the simulator and of a command."""
-        return self.sim.nx + self.commands
+        """Size of a state: that of the simulator, of a command, and of forces."""
+        return self.sim.nx + self.commands + 6 * len(self.touch)
+
+    @cached_property
+    def touch_groups(self) -> ContactGroups | None:
+        """The groups of contacts whose forces end the state."""
+        return ContactGroups(self.sim, self.touch) if self.touch else None
 
     @property
     def knot_time(self) -> float:
@@ -363,7 +374,8 @@ class Task:
             (nx,) state.
         """
         x = checks.array("Task(start=...)", self.start(rng), (self.sim.nx,))
-        return x if self.command is None else np.concatenate([x, self._command(rng)])
+        command = np.zeros(0) if self.command is None else self._command(rng)
+        return np.concatenate([x, command, np.zeros(6 * len(self.touch))]) if self.nx > self.sim.nx else x
 
     def starts(self, rngs: Any) -> Floats:
         """First states (n, nx), each from its own generator.
@@ -391,4 +403,4 @@ class Task:
         """
         if self.hold is not None and self.command is not None:
             for i in np.flatnonzero((ages > 0) & (ages % self.hold == 0)):
-                xs[i, self.sim.nx :] = self._command(rngs[i])
+                xs[i, self.sim.nx : self.sim.nx + self.commands] = self._command(rngs[i])

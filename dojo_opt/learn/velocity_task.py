@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,9 @@ from dojo_opt.learn.randomisation import Randomisation
 from dojo_opt.learn.task import Task
 from dojo_opt.models.quadruped import quadruped as default_quadruped
 from dojo_opt.planning.residual import kernel
+from sim.io.urdf.load import load_urdf
 from sim.mechanism import checks
+from sim.mechanism.contact import Contact
 from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
 from sim.model.state_columns import BaseState
@@ -21,7 +25,7 @@ from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
-__all__ = ["WALKING", "quadruped", "velocity_error"]
+__all__ = ["WALKING", "go2", "quadruped", "velocity_error"]
 
 _TIME_STEP, _SUBSTEPS = 0.01, 2  # [s], per action
 _KAPPA = 1e-4  # [N s m]
@@ -29,6 +33,9 @@ _HOLD = 100  # actions of 20 ms: a new command every 2 s
 _PUSH = (0.3, 0.3, 0.1, 0.3, 0.3, 0.3)  # of a floating base [m/s, rad/s]
 _TURN, _JOINTS = BaseState.QUATERNION.start, BaseState.JOINTS  # columns of a state, for kernels
 _WIDTH = 0.1  # [m/s, rad/s] errors beyond count linearly
+_GO2 = "example-robot-data"  # the package with its file
+_GO2_FOOT = 0.022  # radius of Go2's feet [m], which its file has as meshes
+_GO2_STANCE = {"hip": 0.0, "thigh": 0.8, "calf": -1.5}  # [rad]
 
 # Models on which policies of quadrupeds learn: slippery and rough ground, heavier and lighter bodies, pushes.
 WALKING = Randomisation(
@@ -194,3 +201,34 @@ def quadruped(
             "randomisation": WALKING,
         },
     )  # fmt: skip
+
+
+def go2(urdf: str | Path | None = None, **options: Any) -> Task:
+    """Keep a velocity with Unitree's Go2: `quadruped` with its URDF file, whose feet are balls here.
+
+    Args:
+        urdf: path of the file (default None: that of the package example-robot-data,
+            `pip install "dojo-opt[robots]"`).
+        **options: arguments of `quadruped`: fastest, stiffness, damping, reach.
+
+    Returns:
+        The task.
+
+    Raises:
+        ImportError: without a path and the package.
+        OSError: the file does not exist.
+    """
+    legs = ("FL", "FR", "RL", "RR")
+    feet = [Contact(f"{leg}_foot", radius=_GO2_FOOT, name=f"{leg}_foot") for leg in legs]
+    neutral = {f"{leg}_{part}_joint": angle for leg in legs for part, angle in _GO2_STANCE.items()}
+    mech = load_urdf(_go2_file() if urdf is None else urdf, contacts=feet, neutral=neutral)
+    return quadruped(mech, **options)
+
+
+def _go2_file() -> Path:
+    """Go2's URDF file in the package example-robot-data."""
+    try:
+        files = distribution(_GO2).files or []
+        return Path(str(next(file for file in files if file.name == "go2.urdf").locate()))
+    except (PackageNotFoundError, StopIteration):
+        raise ImportError('go2 reads a URDF file: pip install "dojo-opt[robots]", or go2(urdf=...)') from None

@@ -15,6 +15,7 @@ import dojo_opt as dojo
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
 from sim.model.state_columns import BaseState
+from sim.simulator.contact_groups import ContactGroups
 from sim.simulator.simulator import Simulator
 from solvers.compiler.optional import OptionalKernel, optional_kernels
 
@@ -117,6 +118,9 @@ def _learning() -> None:
     X, U = np.stack([sim.neutral()] * 4), np.zeros((4, sim.nu))
     for derivatives in (False, True):
         sim.step_batch(X, U, 2, derivatives=derivatives)
+    found = sim.step_batch(X, U, 2, contacts=True)
+    assert found.contacts is not None
+    ContactGroups(sim, ()).wrenches(found.x, found.contacts)
     network = Network((3, 4, 1), "tanh")
     LearnedPolicy(network, np.zeros(network.count), np.zeros(3), np.ones(3), None).action(np.zeros(3))
 

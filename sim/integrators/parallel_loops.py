@@ -37,14 +37,14 @@ def linearize_knots(
 
 
 class BatchBuffers(NamedTuple):
-    """Motions from several states, kept as their states only."""
+    """Motions from several states, kept as their states, and in `roll_rows` their contacts, if there are rows."""
 
     xs: Cube  # (n, T + 1, nx), of which the first rows are given
     us: Cube  # (n, T, nu)
     reports: Cube  # (n, 1, 6) of the last step of each, zeros
     knots: Integers  # (n,) number of solved steps, zeros
-    wrenches: Cube  # these without rows: they are not kept
-    contacts: Cube
+    wrenches: Cube  # without rows, as A and B: they are not kept
+    contacts: Cube  # (n T, ncontact, 11) of all steps, in `roll_rows` only, or (0, ncontact, 11)
     A: Cube
     B: Cube
 
@@ -122,7 +122,8 @@ def _roll_some(rows: RowTables, part: tuple[int, int], motions: BatchBuffers) ->
                 return
             begun = True
             x, u = motions.xs[i], motions.us[i]
-            one = MotionBuffers(x, u, motions.wrenches, report, motions.contacts, motions.A, motions.B)
+            contacts = motions.contacts[i * steps : (i + 1) * steps]  # without rows where none are kept
+            one = MotionBuffers(x, u, motions.wrenches, report, contacts, motions.A, motions.B)
             knot = motions.knots[i]
             motions.knots[i] = roll(rows.models[i], rows.scratch[i], rows.settings[i], one, knot, None, None)
             if report[0, StepReport.STATUS] == _SOLVED and motions.knots[i] < steps:

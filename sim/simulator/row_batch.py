@@ -23,7 +23,7 @@ from sim.model.interruptible_loops import pieces
 from sim.model.record_columns import StepReport, StepSetting
 from sim.simulator.division import DIVISIBLE, Division
 from sim.simulator.engine import REPORT, Engine, finite_rows, refuse
-from sim.simulator.results import Result, ended, sentence
+from sim.simulator.results import Contacts, Result, contacts_of, ended, sentence
 from sim.simulator.state_space import StateSpace
 from solvers.status import Status
 from solvers.types import Integers
@@ -43,6 +43,7 @@ class BatchStep(Result):
     A: Floats  # (n, ndx, ndx) derivatives by its state, or (0, ndx, ndx)
     B: Floats  # (n, ndx, nu) by its input, held over the knot
     detail: str = ""
+    contacts: Contacts | None = None  # of the last step of each row, if the call asked for them
 
     @property
     def unsolved(self) -> Integers:
@@ -130,6 +131,7 @@ class RowBatch:
     us: Floats  # (n, nu)
     substeps: int
     kappas: Floats  # (n,), NaN for that of the engine
+    contacts: Floats  # (n, ncontact, 11) out, of the last step of each row, or (0, ncontact, 11): not kept
 
     __repr__ = short_repr
 
@@ -198,7 +200,8 @@ class RowBatch:
         xs[:, 0] = self.xs
         us = np.repeat(self.us[:, None], self.substeps, axis=1)
         knots = np.zeros(n, dtype=np.int64)
-        motions = BatchBuffers(xs, us, reports[:, None], knots, first.no_wrenches, *first.unkept)
+        contacts = np.zeros((len(self.contacts) * self.substeps, *self.contacts.shape[1:]))
+        motions = BatchBuffers(xs, us, reports[:, None], knots, first.no_wrenches, contacts, *first.unkept[1:])
         deadline = np.zeros(len(StepSetting))
         for _ in pieces(deadline, 2):
             rows.settings[:, StepSetting.DEADLINE] = deadline[StepSetting.DEADLINE]
@@ -206,6 +209,7 @@ class RowBatch:
             if np.all((knots == self.substeps) | (reports[:, StepReport.STATUS] != Status.SOLVED)):
                 break
         x_next[:] = xs[:, -1]
+        self.contacts[:] = contacts[self.substeps - 1 :: self.substeps]
 
     def _divide(self, row: int, derivatives: bool, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
         """A row that was not solved in whole steps."""
@@ -216,6 +220,8 @@ class RowBatch:
         if rolled.knot < self.substeps:
             return
         x_next[row] = rolled.xs[-1]
+        if len(self.contacts):
+            self.contacts[row] = rolled.contacts[-1]
         if derivatives:
             A[row], B[row] = np.eye(engine.ndx), 0.0
             for dx, du in zip(rolled.A, rolled.B, strict=True):
@@ -241,12 +247,14 @@ class SingleRow:
         mechanism: of a simulator.
         engine: of the simulator.
         steps: per knot.
+        contacts: whether those of the last step are kept.
     """
 
-    def __init__(self, mechanism: Mechanism, engine: Engine, steps: int) -> None:
+    def __init__(self, mechanism: Mechanism, engine: Engine, steps: int, contacts: bool) -> None:
         self._mechanism, self._engine, self._steps = mechanism, engine, steps
         xs, us, reports = np.empty((steps + 1, engine.nx)), np.empty((steps, engine.nu)), np.empty((steps, REPORT))
-        self._motion = MotionBuffers(xs, us, engine.external(None), reports, *engine.unkept)
+        rows = np.zeros((steps if contacts else 0, *engine.unkept[0].shape[1:]))
+        self._motion = MotionBuffers(xs, us, engine.external(None), reports, rows, *engine.unkept[1:])
         self._division = Division.none(steps)
         self._none = np.zeros((0, engine.ndx, engine.ndx)), np.zeros((0, engine.ndx, engine.nu))
         self._start, self.end, self._knot = xs[0], xs[-1], 0
@@ -264,6 +272,7 @@ class SingleRow:
         motion = self._motion
         self._start[:], motion.us[:] = x, u
         motion.reports.fill(0.0)
+        motion.contacts.fill(0.0)
         self._knot = self._engine.take_steps(self._engine.step_table(), motion, None, self._division)
         return self._knot == self._steps
 
@@ -287,9 +296,15 @@ class SingleRow:
         last = self._motion.reports[-1 if solved else self._knot]
         status, iterations = last[:2].astype(np.int64)[:, None]
         if solved:
-            return BatchStep(self.end[None].copy(), status, iterations, *self._none)
+            return BatchStep(self.end[None].copy(), status, iterations, *self._none, contacts=self.contacts)
         detail = sentence(self._mechanism, "Simulator.step_batch: row 0", last, self._engine.settings.tolerance)
-        return BatchStep(states, status, iterations, *self._none, detail)
+        return BatchStep(states, status, iterations, *self._none, detail, self.contacts)
+
+    @property
+    def contacts(self) -> Contacts | None:
+        """Contacts (1, ncontact) of the last step, where they are kept."""
+        rows = self._motion.contacts
+        return contacts_of(self._mechanism, self._engine.settings.time_step, rows[-1:].copy()) if len(rows) else None
 
 
 class RowStepping(StateSpace):
@@ -304,6 +319,7 @@ class RowStepping(StateSpace):
         kappa: ArrayLike | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
         *,
+        contacts: bool = False,
         throw: bool = False,
     ) -> BatchStep:
         """One knot of independent rows, over all cores: row i goes from X[i] by `substeps` steps with U[i] held.
@@ -319,6 +335,7 @@ class RowStepping(StateSpace):
             parameters: {name: (n,) or (n, components), or one row for all}, as in `parameters`: the rows are those of
                 `with_parameters`, with the kappa of this simulator. A model is made once for each row of new values,
                 and kept.
+            contacts: whether to return those of the last step of every row, too; without derivatives.
             throw: raise SimulationError where a step is not solved.
 
         Returns:
@@ -335,7 +352,7 @@ class RowStepping(StateSpace):
         states = self._arguments.states(f"{call}(X)", given)
         steps = room_for(f"{call}(substeps=...)", substeps, 8.0 * (self.nx + self.nu) * max(count, 1))
         if count == 1 and kappa is None and not parameters and not derivatives and self.has_single_rows:
-            return ended(self.single_row(steps).step(states, inputs), throw)
+            return ended(self.single_row(steps, contacts).step(states, inputs), throw)
         kappas = np.full(count, np.nan)
         if kappa is not None:
             if self.order > 2:
@@ -345,23 +362,29 @@ class RowStepping(StateSpace):
             )
             if not np.all(kappas > 0.0):
                 raise ValueError(f"{call}(kappa=...): expected numbers above 0, got {kappa!r}")
+        if contacts and (derivatives or not self._engine.in_one_kernel):
+            raise ValueError(f"{call}(contacts=True): expected no derivatives, and a simulator without an accuracy")
         engines, index = self._row_models.of(f"{call}(parameters=...)", parameters, count)
-        found, reports = RowBatch(engines, index, states, inputs, steps, kappas).step(bool(derivatives))
+        rows = np.zeros((count if contacts else 0, *self._engine.unkept[0].shape[1:]))
+        found, reports = RowBatch(engines, index, states, inputs, steps, kappas, rows).step(bool(derivatives))
+        if contacts:
+            found = replace(found, contacts=contacts_of(self.mechanism, self.time_step, rows))
         if len(found.unsolved):
             i = int(found.unsolved[0])
             found = replace(found, detail=sentence(self.mechanism, f"{call}: row {i}", reports[i], self.tolerance))
         return ended(found, throw)
 
     @cached_property
-    def _single_rows(self) -> dict[tuple[int, int], SingleRow]:
-        """By threads and numbers of steps."""
+    def _single_rows(self) -> dict[tuple[int, int, bool], SingleRow]:
+        """By threads, numbers of steps, and whether they keep contacts."""
         return {}
 
-    def single_row(self, substeps: int = 1) -> SingleRow:
+    def single_row(self, substeps: int = 1, contacts: bool = False) -> SingleRow:
         """The steps of a single row, as `step_batch` takes them, without checks of arguments: for many short calls.
 
         Args:
             substeps: time steps per knot.
+            contacts: whether those of the last step are kept.
 
         Returns:
             SingleRow of this thread, whose `step(X, U)` takes finite (1, nx) and (1, nu).
@@ -369,7 +392,7 @@ class RowStepping(StateSpace):
         Raises:
             ValueError: substeps is not a whole number above 0, or the simulator has no single rows.
         """
-        key = get_ident(), substeps
+        key = get_ident(), substeps, contacts
         if key not in self._single_rows:
             steps = checks.whole_number("Simulator.single_row(substeps)", substeps)
             if not self.has_single_rows:
@@ -377,7 +400,7 @@ class RowStepping(StateSpace):
                     "Simulator.single_row: expected a simulator without an accuracy, and of order 2 where there are "
                     "contacts or limits"
                 )
-            self._single_rows[key] = SingleRow(self.mechanism, self._engine, steps)
+            self._single_rows[key] = SingleRow(self.mechanism, self._engine, steps, contacts)
         return self._single_rows[key]
 
     @property

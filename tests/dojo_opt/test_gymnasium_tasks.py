@@ -7,14 +7,17 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.learn import environment
+from dojo_opt.learn.vector_environment import VectorEnvironment
 
 gymnasium = pytest.importorskip("gymnasium")
 pytest.importorskip("mujoco")
 from gymnasium.vector import AutoresetMode  # noqa: E402
 
+from support.robot_files import has_robots  # noqa: E402
+
 NAMES = (
     "Pendulum", "Cartpole", "HalfCheetah", "Hopper", "Walker2d", "Ant", "Humanoid", "Quadruped", "QuadrotorWaypoint",
-    "UuvWaypoint", "YoubotWaypoint",
+    "UuvWaypoint", "YoubotWaypoint", "Swimmer", "Go2", "AntArs", "QuadrupedSampling",
 )  # fmt: skip
 
 
@@ -25,6 +28,8 @@ NAMES = (
 def test_environments_are_as_gymnasium_has_them(name, monkeypatch):
     from gymnasium.utils.env_checker import check_env
 
+    if name == "Go2" and not has_robots():
+        pytest.skip("example-robot-data is not installed")
     monkeypatch.setattr("webbrowser.open", lambda url: True)
     env = gymnasium.make(f"dojo_opt.learn:dojo/{name}-v0", render_mode="rgb_array")
     check_env(env.unwrapped)
@@ -51,6 +56,26 @@ def test_people_watch_in_the_browser(monkeypatch):
     env.close()
     with pytest.raises(ValueError, match="closed"):
         view.show(np.zeros(2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*NAMES, "Ant, forces"])
+def test_every_batch_is_its_environments_one_by_one(name):
+    """Ten actions from the seeds of the batch, in Gymnasium's own SyncVectorEnv."""
+    if name == "Go2" and not has_robots():
+        pytest.skip("example-robot-data is not installed")
+    options = {"include_cfrc_ext_in_observation": True} if name.endswith("forces") else {}
+    made = f"dojo_opt.learn:dojo/{name.partition(',')[0]}-v0"
+    batch = gymnasium.make_vec(made, num_envs=2, **options)
+    single = gymnasium.vector.SyncVectorEnv([lambda: gymnasium.make(made, **options)] * 2)
+    (a, _), (b, _) = batch.reset(seed=7), single.reset(seed=7)
+    np.testing.assert_array_equal(a, b)
+    assert batch.observation_space == single.observation_space and batch.action_space == single.action_space
+    batch.action_space.seed(2)
+    for _ in range(10):
+        actions = batch.action_space.sample()
+        for ours, theirs in zip(batch.step(actions)[:4], single.step(actions)[:4], strict=True):
+            np.testing.assert_array_equal(ours, theirs)
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
@@ -105,6 +130,56 @@ def test_observations_and_rewards_of_the_cheetah_agree_with_mujoco():
     np.testing.assert_allclose(task.observe(end)[0][0], np.r_[data.qpos[1:], data.qvel], atol=0.05)
     reward = task.rewards(x[None], action[None], end)[0][0]
     np.testing.assert_allclose(reward, data.qpos[0] / 0.05 - 0.1 * np.sum(action**2), atol=1e-2)
+
+
+@pytest.mark.slow
+def test_forces_of_contacts_are_those_of_mujoco():
+    """Ants that have come to rest in both: the same bodies press, in Gymnasium's order; all forces add up to the
+    weight, and their torques about the centre of mass to nothing.
+    """
+    task = dojo.learn.ant(include_cfrc_ext_in_observation=True, contact_cost_weight=5e-4)
+    peer = gymnasium.make("Ant-v5")
+    assert task.observations == peer.observation_space.shape[0] == 105
+    idle, x = np.zeros(8), task.first(np.random.default_rng(0))
+    assert not x[task.sim.nx :].any()
+    peer.reset(seed=0)
+    ours = VectorEnvironment(task, 2)
+    ours.reset(seed=0)
+    for _ in range(60):
+        theirs = peer.step(idle)[0]
+        seen, rewards, *_ = ours.step(np.zeros((2, 8)))
+    felt = ours.x[:, task.sim.nx :].reshape(2, 13, 6)
+    clipped = np.clip(felt[0][:, [3, 4, 5, 0, 1, 2]], -1.0, 1.0)
+    np.testing.assert_array_equal(seen[0, 27:], clipped.ravel())
+    press = [np.flatnonzero(np.abs(o[27:].reshape(13, 6)[:, 5]) > 0.5).tolist() for o in (seen[0], theirs)]
+    assert press[0] == press[1] == [3, 6, 9, 12]
+    weight = 9.81 * sum(body.mass for body in task.sim.mechanism.bodies)
+    np.testing.assert_allclose(felt[0].sum(axis=0), [0.0, 0.0, weight, 0.0, 0.0, 0.0], atol=0.02 * weight)
+    plain = dojo.learn.ant()
+    assert plain.nx == plain.sim.nx and plain.observations == 27
+    before = ours.x.copy()
+    after = before.copy()
+    after[:, 0] += 0.05
+    acts = np.zeros((2, 8))
+    paid = plain.rewards(before[:, : plain.nx], acts, after[:, : plain.nx])[0] - task.rewards(before, acts, after)[0]
+    np.testing.assert_allclose(paid[0], 5e-4 * np.sum(clipped**2), rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_forces_of_contacts_are_paid_for_without_being_observed():
+    task = dojo.learn.humanoid(contact_cost_weight=5e-7)
+    assert task.observations == 45 and task.nx == task.sim.nx + 78
+    x = task.first(np.random.default_rng(0))
+    x[task.sim.nx + 2] = 2000.0
+    acts = np.zeros((2, 17))
+    rows = np.array([x, np.r_[x[: task.sim.nx], np.zeros(78)]])
+    pressed, free = task.rewards(rows, acts, rows)[0]
+    np.testing.assert_allclose(free - pressed, 5e-7 * 2000.0**2, rtol=1e-9)
+    x[task.sim.nx + 2] = 1e5
+    np.testing.assert_allclose(free - task.rewards(x[None], acts[:1], x[None])[0][0], 10.0, rtol=1e-9)
+    np.testing.assert_array_equal(*(task.observe(row[None])[0] for row in rows))
+    learned = dojo.learn.shac(task, epochs=1, environments=4, evaluations=1, episodes=1)
+    assert learned.infinite == learned.unsolved == 0
 
 
 def test_hopper_and_walker_end_where_gymnasium_says():

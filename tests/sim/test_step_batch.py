@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from sim.simulator.contact_groups import ContactGroups
 from solvers.compiler import threads
 
 
@@ -35,6 +36,27 @@ def test_a_row_is_the_rollout_of_its_state_whatever_its_neighbours(sim):
     np.testing.assert_array_equal(sim.step_batch(X, U, substeps=3).x, found.x)
     with threads(1):
         np.testing.assert_array_equal(sim.step_batch(X, U, substeps=3, derivatives=True).B, found.B)
+
+
+def test_contacts_are_those_of_the_last_step_of_every_row(sim):
+    X, U = _rows(sim)
+    X[:, 2] -= np.linspace(0.0, 0.6, len(X))
+    found = sim.step_batch(X, U, substeps=6, contacts=True)
+    np.testing.assert_array_equal(found.x, sim.step_batch(X, U, substeps=6).x)
+    groups = [sim.mechanism.contact_names[:2], sim.mechanism.contact_names[-1:]]
+    wrenches = ContactGroups(sim, groups).wrenches(found.x, found.contacts)
+    touched = 0
+    for i, (x, u) in enumerate(zip(X, U, strict=True)):
+        path = sim.rollout(x, np.tile(u, (6, 1)))
+        alone = sim.step_batch(x[None], u[None], substeps=6, contacts=True).contacts  # in buffers of its own
+        for ours in (found.contacts.impulse[i], alone.impulse[0]):
+            np.testing.assert_array_equal(ours, path.contacts.impulse[-1])
+        force, point = path.contacts.force[-1], path.contacts.point[-1]
+        arms = point - dojo.Kinematics(sim).center_of_mass(found.x[i, : sim.nq])
+        own = np.concatenate([force, np.cross(arms, force)], axis=1)
+        np.testing.assert_allclose(wrenches[i], [own[:2].sum(axis=0), own[-1]], rtol=1e-12, atol=1e-12)
+        touched += int(np.abs(force).max() > 1.0)
+    assert 0 < touched < len(X), touched
 
 
 def test_derivatives_agree_with_central_differences(sim):
@@ -94,6 +116,7 @@ def test_an_unsolved_row_stands_still_and_is_named():
         ({"kappa": [1.0, 1.0]}, r"step_batch\(kappa=\.\.\.\): expected shape \(3,\)"),
         ({"kappa": -1.0}, r"kappa=\.\.\.\): expected numbers above 0"),
         ({"parameters": {"friction:*": [1.0, 2.0]}}, r"'friction:\*': expected shape \(3, 1\)"),
+        ({"contacts": True, "derivatives": True}, r"contacts=True\): expected no derivatives"),
         ({"substeps": 0}, r"substeps=\.\.\.\)"),
     ],
 )

@@ -1,0 +1,121 @@
+"""Cost of environments: Python over the simulation in `step`, and batches of 64 beside a single environment.
+
+    NUMBA_NUM_THREADS=1 python benchmarks/environments.py [--tasks HalfCheetah ...]
+
+Processor time, medians of rounds of 50 actions, uniformly drawn. The simulation is the compiled call with the same
+states and inputs, right after the round; what `step` takes beyond it is Python. The batch is `make_vec(...,
+num_envs=64)`, per environment and action. An environment of `forces` observes contacts; its simulation writes them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from time import process_time
+from typing import Any
+
+import gymnasium
+import numpy as np
+from command import deliver, number, parser, progress
+from numpy.typing import NDArray
+
+from dojo_opt.learn.registration import TASKS
+from dojo_opt.report.result import Report, Table
+
+Floats = NDArray[np.float64]
+
+ACTIONS, ROUNDS, ROWS = 50, 15, 64
+FORCES = "Ant, forces"
+MOST, LEAST = 30.0, 15.0  # [us] of Python; times faster
+
+
+def _named(name: str) -> tuple[str, dict[str, Any]]:
+    """Name and options of an environment."""
+    if name == FORCES:
+        return "dojo/Ant-v0", {"include_cfrc_ext_in_observation": True, "contact_cost_weight": 5e-4}
+    return f"dojo/{name}-v0", {}
+
+
+def single(name: str, rounds: int) -> tuple[float, float]:
+    """(time of an action in `step`, time of its compiled call) [us], medians of rounds."""
+    made, options = _named(name)
+    env = gymnasium.make(made, **options).unwrapped
+    task: Any = env._episode.task  # type: ignore[attr-defined]
+    row = task.sim.single_row(task.substeps, contacts=bool(task.touch))
+    env.action_space.seed(0)
+    steps, sims = [], []
+    for k in range(rounds + 1):
+        env.reset(seed=k)
+        actions = [env.action_space.sample() for _ in range(ACTIONS)]
+        states: list[Floats] = []
+        spent = 0.0
+        for a in actions:
+            states.append(env._episode.x[0].copy())  # type: ignore[attr-defined]
+            began = process_time()
+            over = env.step(a)[2]
+            spent += process_time() - began
+            if over:
+                env.reset()
+        inputs = [task.inputs(a.astype(np.float64)) for a in actions]
+        began = process_time()
+        for x, u in zip(states, inputs, strict=True):
+            row.advance(x[: task.sim.nx], u)
+        sims.append((process_time() - began) / ACTIONS)
+        steps.append(spent / ACTIONS)
+    return 1e6 * float(np.median(steps[1:])), 1e6 * float(np.median(sims[1:]))
+
+
+def batch(name: str, rounds: int) -> float:
+    """Time of an action of one of 64 environments [us], median of rounds."""
+    made, options = _named(name)
+    env = gymnasium.make_vec(made, num_envs=ROWS, **options)
+    env.action_space.seed(0)
+    found = []
+    for k in range(rounds + 1):
+        env.reset(seed=k)
+        actions = [env.action_space.sample() for _ in range(ACTIONS)]
+        began = process_time()
+        for a in actions:
+            env.step(a)
+        found.append((process_time() - began) / (ACTIONS * ROWS))
+    return 1e6 * float(np.median(found[1:]))
+
+
+def run(given: argparse.Namespace) -> Report:
+    """All tasks, or some."""
+    rounds = 2 if given.quick else ROUNDS
+    names = given.tasks or (["Cartpole"] if given.quick else [*TASKS, FORCES])
+    report, cells = Report("Cost of environments, per action", ""), []
+    for name in progress()([(n, n) for n in names], "environment"):
+        try:
+            step, simulated = single(name, rounds)
+        except ImportError as error:  # Go2 without its file
+            print(f"{name}: {error}", file=sys.stderr)
+            continue
+        each = batch(name, rounds)
+        cells.append([name, simulated, step, step - simulated, each, step / each])
+    report.tables.append(
+        Table(
+            "environments",
+            ("environment", "simulation [us]", "step [us]", "Python [us]", "one of 64 [us]", "single / one of 64"),
+            cells,
+        )
+    )
+    over, gains = [row[3] for row in cells], [row[5] for row in cells]
+    report.rows = [
+        number("environments", len(cells)),
+        number("largest Python per step", max(over), MOST, unit="us"),
+        number("least gain of a batch of 64, 15 over it", LEAST / min(gains), 1.0),
+    ]
+    return report
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--tasks", nargs="+", choices=[*TASKS, FORCES])
+    return deliver("environments", run, arguments, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,62 @@
+"""ContactGroups: forces and torques of groups of contacts, as touch sensors of a robot's parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.contact.group_wrenches import group_wrenches
+from sim.mechanism import checks
+from sim.mechanism.short_repr import short_repr
+from sim.simulator.results import Contacts
+from sim.simulator.simulator import Simulator
+
+Floats = NDArray[np.float64]
+
+__all__ = ["ContactGroups"]
+
+
+class ContactGroups:
+    """Groups of contacts with the ground, such as those of each part of a robot.
+
+    Args:
+        sim: the simulator.
+        groups: names of the contacts of each group; a contact is in one group, or in none.
+
+    Raises:
+        ValueError: an unknown name, or a contact in two groups.
+    """
+
+    def __init__(self, sim: Simulator, groups: Sequence[Sequence[str]]) -> None:
+        call, names = "ContactGroups(groups)", sim.mechanism.contact_names
+        numbers = np.full(len(names), -1, dtype=np.int64)
+        for g, group in enumerate(groups):
+            for name in checks.names(call, group):
+                checks.one_of(call, name, names)
+                if numbers[k := names.index(name)] >= 0:
+                    raise ValueError(f"{call}: {name!r} is in two groups")
+                numbers[k] = g
+        self.sim, self.count, self._numbers = sim, len(groups), numbers
+
+    __repr__ = short_repr
+
+    def wrenches(self, X: ArrayLike, contacts: Contacts) -> Floats:
+        """Forces of groups on the robot, and their torques about its centre of mass, in world axes.
+
+        Args:
+            X: (n, nx) states at the end of the step of the contacts.
+            contacts: (n, ncontact), as of `step_batch(..., contacts=True)`.
+
+        Returns:
+            (n, count, 6) forces [N], then torques [N m].
+
+        Raises:
+            ValueError: a wrong shape.
+        """
+        forces, points = np.ascontiguousarray(contacts.force), np.ascontiguousarray(contacts.point)
+        states = checks.array("ContactGroups.wrenches(X)", X, (len(forces), self.sim.nx))
+        out, engine = np.empty((len(forces), self.count, 6)), self.sim._engine
+        group_wrenches(engine.step_table(), engine.table(), states, forces, points, self._numbers, out)
+        return out
