@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 __all__ = ["push"]
 
 _CALL = "problems.push"
+_AHEAD = (0.35, 0.45, 0.55, 0.65)  # of the length of the arm: where the object stands
 _GAP = 0.01  # [m] between the hand and the object at the beginning
 _REST = 0.2  # of the duration, at the end
 # weights of squares per second: place of the object over its way, its heading, angles of the arm, and their rates
@@ -67,7 +68,7 @@ def push(
         radius: radius of the ball [m].
         start: (nq,) coordinates from which the search for the starting pose begins (default None: the neutral ones).
         at: (3,) point of the table below the object at the beginning [m] (default None: on the ground, below the ball
-            of the coordinates `start`).
+            of the coordinates `start`; without these, and if it cannot push from there, further away from the base).
         duration: duration of the motion, a fifth of which is rest at the end [s].
         time_step: time step of the simulator [s].
 
@@ -91,14 +92,15 @@ def push(
     q = alone.neutral()[: alone.nq]
     q = q if start is None else np.array(checks.array(f"{_CALL}(start=...)", start, (alone.nq,)))
     below = np.append(kin.pose(_TIP, q)[0][:2], 0.0) if at is None else checks.array(f"{_CALL}(at=...)", at, (3,))
-    place = below + (0.0, 0.0, _half(object, np.array([0.0, 0.0, -1.0])))
+    up = (0.0, 0.0, _half(object, np.array([0.0, 0.0, -1.0])))
     forward = way / far
-    touch = place - (_half(object, np.array([-1.0, 0.0, 0.0])) + radius) * forward
-    pose = np.array([*place, *_heading(forward)])
     horizon = max(5, round(duration / time_step))
     share = np.clip(np.arange(-1.0, horizon + 1.0) / ((1.0 - _REST) * horizon), 0.0, 1.0)
     moved = -_GAP + (far + _GAP) * _smooth(share)
-    hands = _follow(kin, q, touch + moved[:, None] * forward)
+    hand = up - (_half(object, np.array([-1.0, 0.0, 0.0])) + radius) * forward + moved[:, None] * forward
+    below, hands = _reached(kin, q, [below, *(_ahead(kin, way) if start is None and at is None else ())], hand)
+    place = below + up
+    pose = np.array([*place, *_heading(forward)])
     sim = _scene(kin, object, pose, radius, float(below[2]))
     states = _states(sim, hands, place + np.maximum(moved, 0.0)[:, None] * forward)
     held = _holding(alone, hands[1:-1])
@@ -165,13 +167,42 @@ def _reach(shape: Solid, direction: Array) -> float:
     return float((shape.place(stance.points) @ direction).max()) + stance.radius
 
 
+def _ahead(kin: Kinematics, way: Array) -> list[Array]:
+    """Points of the ground before the base, from which an object that moves by `way` (3,) stays within reach."""
+    mech = kin.mechanism
+    joint_of = {joint.child: joint for joint in mech.joints}
+    number, tip, _ = kin.place(_TIP)
+    joint, reach = joint_of[mech.body_names[number]], 0.0
+    while True:
+        reach += float(np.linalg.norm(tip - np.asarray(joint.child_point, dtype=float)))
+        tip = np.asarray(joint.parent_point, dtype=float)
+        if joint.parent is None or joint.parent not in joint_of:
+            break
+        joint = joint_of[joint.parent]
+    base, far = np.array([tip[0], tip[1], 0.0]), float(np.linalg.norm(way))
+    return [base + share * reach / far * way for share in _AHEAD if share * reach + far < reach]
+
+
+def _reached(kin: Kinematics, q: Array, tables: list[Array], hand: Array) -> tuple[Array, Array]:
+    """The first of some points (3,) from which the hand (n, 3) can go its way, and the coordinates (n, nq) there."""
+    errors = []
+    for below in tables:
+        try:
+            return below, _follow(kin, q, below + hand)
+        except ValueError as error:
+            errors.append(error)
+    raise errors[0]
+
+
 def _follow(kin: Kinematics, q: Array, tips: Array) -> Array:
     """(n, nq) coordinates of the arm with its ball at the places (n, 3), each from those before."""
     out = []
     for place in tips:
         found = ik(kin, {_TIP: place}, q)
         if not found.success:
-            raise ValueError(f"{_CALL}(at=..., goal): the hand at {np.round(place, 3)}: {found.message}")
+            raise ValueError(
+                f"{_CALL}(at=..., goal): the hand at {np.round(place, 3)}: {found.message} Give at=..., or start=..."
+            )
         q = found.q
         out.append(q)
     return np.array(out)

@@ -61,6 +61,7 @@ def save_video(
 
     Raises:
         ImportError: playwright or imageio is not installed.
+        RuntimeError: there is no browser.
         TypeError: the result is none of these.
         ValueError: another kind of file, a motion without a duration, or an argument out of range.
         OSError: the file cannot be written.
@@ -109,6 +110,7 @@ def save_picture(
 
     Raises:
         ImportError: playwright is not installed.
+        RuntimeError: there is no browser.
         TypeError: the result is none of these.
         ValueError: another kind of file, or an argument out of range.
         OSError: the file cannot be written.
@@ -171,12 +173,20 @@ def _frames(m: Motion, times: Any, size: tuple[int, int]) -> Iterator[Pixels]:
 def _browser() -> Iterator[Any]:
     """A Chromium without a window: the system's, or playwright's own."""
     try:
-        from playwright.sync_api import sync_playwright
+        from playwright.sync_api import Error, sync_playwright
     except ImportError:
         raise ImportError('a video needs a browser: pip install "dojo-opt[video]"') from None
     path = next((found for found in map(shutil.which, _BROWSERS) if found), None)
     with sync_playwright() as session:
-        browser = session.chromium.launch(executable_path=path, args=_ARGUMENTS)
+        try:
+            browser = session.chromium.launch(executable_path=path, args=_ARGUMENTS)
+        except Error as error:
+            if path is not None:
+                raise
+            raise RuntimeError(
+                f"found no browser: none of {', '.join(_BROWSERS)} is on the PATH, and Playwright has none of its own; "
+                "run: playwright install chromium"
+            ) from error
         try:
             yield browser
         finally:

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
-from sim.mechanism.contact import Contact
 from sim.mechanism.joint import WORLD
 from sim.mechanism.shapes import rotation_matrices, rotation_matrix
 from sim.model.state_columns import BodyState
 from sim.simulator.central_differences import ORDER_8
 from sim.simulator.contact_forces import GroundForces, balanced, least_forces
+from sim.simulator.ground_balls import GroundBalls
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
@@ -247,21 +247,10 @@ class Kinematics:
         """
         q = self._q("Kinematics.bias_forces(q)", q)
         v = _rows("Kinematics.bias_forces(v)", v, self.sim.nv)
-        q, v = (np.broadcast_to(a, (*np.broadcast_shapes(q.shape[:-1], v.shape[:-1]), a.shape[-1])) for a in (q, v))
+        q, v = _broadcast(q, v)
         J, R = self._body_jacobians(q)
-        twist = _times(J, v)
-        step = _STEP / np.maximum(1.0, np.abs(v).max(axis=-1, initial=0.0))
-        rate = np.zeros_like(twist)
-        for k, weight in enumerate(ORDER_8, start=1):
-            moves = (sign * k * step[..., None] * v for sign in (1.0, -1.0))
-            ahead, behind = (_times(self._body_jacobians(self.moved(q, dq))[0], v) for dq in moves)
-            rate += weight / step[..., None, None] * (ahead - behind)
-        I = self._world_inertia(R)
-        w = twist[..., 3:]
-        force = self._mass[:, None] * rate[..., :3]
-        torque = (I @ rate[..., 3:, None])[..., 0] + np.cross(w, (I @ w[..., None])[..., 0])
-        forces = np.einsum("...bkd,...bk->...d", J, np.concatenate([force, torque], axis=-1))
-        return checks.within_range("Kinematics.bias_forces", forces)
+        twist, rate = self._twist_rates(q, v)
+        return checks.within_range("Kinematics.bias_forces", self._carried(J, R, twist, rate))
 
     @np.errstate(over="ignore", invalid="ignore")  # an overflow is refused at the end
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, acceleration: ArrayLike) -> Floats:
@@ -275,10 +264,11 @@ class Kinematics:
         Returns:
             (..., nv) forces and torques [N, N m].
         """
+        q, v = self._q("Kinematics.inverse_dynamics(q)", q), _rows("Kinematics.inverse_dynamics(v)", v, self.sim.nv)
         dv = _rows("Kinematics.inverse_dynamics(acceleration)", acceleration, self.sim.nv)
-        inertial = (self.mass_matrix(q) @ dv[..., None])[..., 0]
-        forces = inertial + self.bias_forces(q, v) + self.gravity_torques(q)
-        return checks.within_range("Kinematics.inverse_dynamics", forces)
+        q, v, dv = _broadcast(q, v, dv)
+        J, R = self._body_jacobians(q)
+        return checks.within_range("Kinematics.inverse_dynamics", self._inverse_dynamics(q, v, dv, J, R))
 
     def contact_forces(
         self,
@@ -311,36 +301,70 @@ class Kinematics:
             ValueError: a shape is wrong, or a contact unknown.
         """
         call, mech = "Kinematics.contact_forces", self.mechanism
-        q = self._q(f"{call}(q)", q)
-        load = self.inverse_dynamics(q, v, acceleration)
-        q = np.broadcast_to(q, (*load.shape[:-1], q.shape[-1]))
+        q, v = self._q(f"{call}(q)", q), _rows(f"{call}(v)", v, mech.nv)
+        dv = _rows(f"{call}(acceleration)", acceleration, mech.nv)
         names = mech.contact_names[: len(mech.contacts)] if contacts is None else tuple(contacts)
         of_name = dict(zip(mech.contact_names, mech.contacts, strict=False))
         chosen = [of_name[checks.one_of(f"{call}(contacts=...)", name, of_name)] for name in names]
         driven = np.zeros(mech.nv, dtype=bool)
+        known = np.zeros(mech.nv)
         if joint_forces is None:
             for part in mech.inputs or ():
                 if part.joint is not None:
                     driven[mech.v_slice(part.joint).start + part.dof] = True
         else:
-            load = load - _rows(f"{call}(joint_forces=...)", joint_forces, mech.nv)
-            q = np.broadcast_to(q, (*load.shape[:-1], q.shape[-1]))
+            known = _rows(f"{call}(joint_forces=...)", joint_forces, mech.nv)
+        q, v, dv, known = _broadcast(q, v, dv, known)
         J, R = self._body_jacobians(q)
+        load = checks.within_range(call, self._inverse_dynamics(q, v, dv, J, R)) - known
         forces, residual = np.zeros((*load.shape[:-1], len(names), 3)), np.zeros(load.shape[:-1])
         success, z = np.zeros(load.shape[:-1], dtype=bool), self.sim.bodies(q, np.zeros(load.shape))
         pushed = np.zeros(load.shape)
+        ground = GroundBalls(chosen, [self._bodies[c.body] for c in chosen])
         for row in np.ndindex(load.shape[:-1]):
-            maps = [_ground_map(self._bodies[c.body], c, z[row], J[row], R[row]) for c in chosen]
-            near = [i for i, (_, _, gap) in enumerate(maps) if contacts is not None or gap < _TOUCHING]
-            A = np.array([maps[i][0] for i in near]).reshape(len(near), mech.nv, 3).transpose(1, 0, 2)
-            mu = np.array([0.0 if chosen[i].law == "impact" else chosen[i].friction for i in near])
-            f, residual[row] = least_forces(A[~driven], load[row][~driven], mu)
+            centres, gap = ground.places(z[row][:, BodyState.POSITION], R[row])
+            near = [i for i in range(len(names)) if contacts is not None or gap[i] < _TOUCHING]
+            maps = [ground.force_map(i, centres[i], z[row], J[row]) for i in near]
+            A = np.array([push for push, _ in maps]).reshape(len(near), mech.nv, 3).transpose(1, 0, 2)
+            f, residual[row] = least_forces(A[~driven], load[row][~driven], ground.friction[near])
             success[row] = balanced(float(residual[row]), load[row])
             pushed[row] = np.einsum("nka,ka->n", A, f)
-            for i, force in zip(near, f, strict=True):
-                forces[(*row, i)] = maps[i][1].T @ force
-        rest = load - pushed if joint_forces is None else np.broadcast_to(np.asarray(joint_forces, float), load.shape)
+            for i, (_, frame), force in zip(near, maps, f, strict=True):
+                forces[(*row, i)] = frame.T @ force
+        rest = load - pushed if joint_forces is None else known
         return GroundForces(tuple(names), forces, np.array(rest), residual, success)
+
+    def _inverse_dynamics(self, q: Floats, v: Floats, dv: Floats, J: Floats, R: Floats) -> Floats:
+        """M dv + b + g, with Jacobians and rotations of the bodies at q."""
+        mech = self.mechanism
+        twist, rate = self._twist_rates(q, v)
+        rate += _times(J, dv)
+        share = np.array([1.0 - b.gravity_compensation for b in mech.bodies])
+        rate[..., :3] -= np.outer(share, np.asarray(mech.gravity))
+        armature = np.concatenate([np.asarray(j.armature) for j in mech.joints])
+        return self._carried(J, R, twist, rate) + armature * dv
+
+    def _twist_rates(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Twists J_i v (..., nbody, 6) of the bodies, and their rates d/dt (J_i(q) v) at constant v."""
+        step = _STEP / np.maximum(1.0, np.abs(v).max(axis=-1, initial=0.0))[..., None]
+        steps = np.array([sign * k for k in range(1, len(ORDER_8) + 1) for sign in (1.0, -1.0)])
+        weights = np.repeat(ORDER_8, 2) * np.sign(steps)
+        moves = steps.reshape(-1, *(1,) * v.ndim) * (step * v)
+        there = self._twists(self.moved(np.broadcast_to(q, (*moves.shape[:-1], q.shape[-1])), moves), v)
+        return self._twists(q, v), np.tensordot(weights, there, axes=1) / step[..., None]
+
+    def _twists(self, q: Floats, v: Floats) -> Floats:
+        """Velocities and angular velocities (..., nbody, 6) of the bodies, world axes."""
+        z = checks.within_range("Kinematics", self.sim.bodies(q, v))
+        spin = _rotations(z[..., BodyState.QUATERNION]) @ z[..., 10:13, None]
+        return np.concatenate([z[..., 3:6], spin[..., 0]], axis=-1)
+
+    def _carried(self, J: Floats, R: Floats, twist: Floats, rate: Floats) -> Floats:
+        """sum J_i^T [m_i a_i; J_i al_i + w_i x J_i w_i] of the bodies' twists and rates (..., nbody, 6)."""
+        I, w = self._world_inertia(R), twist[..., 3:]
+        force = self._mass[:, None] * rate[..., :3]
+        torque = (I @ rate[..., 3:, None])[..., 0] + np.cross(w, (I @ w[..., None])[..., 0])
+        return np.einsum("...bkd,...bk->...d", J, np.concatenate([force, torque], axis=-1))
 
     def _frame(self, call: str, name: str) -> tuple[int, Floats, Floats]:
         if isinstance(name, str) and name == WORLD and WORLD not in self._frames:
@@ -393,17 +417,10 @@ def _rows(call: str, value: ArrayLike, length: int) -> Floats:
     return checks.array(call, out, out.shape)
 
 
-def _ground_map(i: int, contact: Contact, z: Floats, J: Floats, R: Floats) -> tuple[Floats, Floats, float]:
-    """Generalised forces (nv, 3) per unit of normal and tangential forces at the point of a ball nearest to the ground,
-    these directions (3, 3) by rows in world axes, and the gap [m].
-    """
-    center = z[i, BodyState.POSITION] + R[i] @ np.asarray(contact.point, dtype=np.float64)
-    n = np.asarray(contact.normal_at(center), dtype=np.float64)
-    first = np.cross(n, np.eye(3)[int(np.abs(n).argmin())])
-    first /= np.linalg.norm(first)
-    frame = np.stack([n, first, np.cross(n, first)])
-    arm = center - contact.radius * n - z[i, BodyState.POSITION]
-    return (frame @ _shifted(J[i], arm)[:3]).T, frame, float(contact.gap(center))
+def _broadcast(*arrays: Floats) -> tuple[Floats, ...]:
+    """The arrays (..., n_i) with the same leading axes."""
+    lead = np.broadcast_shapes(*(a.shape[:-1] for a in arrays))
+    return tuple(np.broadcast_to(a, (*lead, a.shape[-1])) for a in arrays)
 
 
 def _times(J: Floats, v: Floats) -> Floats:

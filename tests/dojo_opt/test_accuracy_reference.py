@@ -12,6 +12,7 @@ from benchmarks.engines import mujoco_scene
 from dojo_opt.report.accuracy.reference import TreeReference, pendulum
 from sim.mechanism.pack import pack
 from support.mechanisms import chain_with, random_state
+from support.pinocchio_robots import pinocchio_coordinates, pinocchio_robot
 
 
 def test_a_pendulum_in_absolute_angles_agrees_with_the_tree() -> None:
@@ -48,25 +49,8 @@ def test_accelerations_of_screws_agree_with_pinocchio(base: str) -> None:
         joints[0] = replace(joints[1], parent=None, child="a", name="a", pitch=0.6)
     mech = dojo.Mechanism([b for b in mech.bodies if b.name in "abc"], joints)
     q, v = random_state(np.random.default_rng(8), mech, speed=2.0)
-    robot, ids = pin.Model(), {"world": 0}
-    robot.gravity.linear = np.array(mech.gravity)
-    for body, joint in zip(mech.bodies, mech.joints, strict=True):
-        parent = next((j for j in mech.joints if j.child == joint.parent), None)
-        point = np.asarray(joint.parent_point) - (np.asarray(parent.child_point) if parent else 0.0)
-        place = pin.SE3(pin.Quaternion(*joint.orientation).toRotationMatrix(), point)
-        kinds = {
-            "floating": pin.JointModelComposite(pin.JointModelTranslation()),
-            "revolute": pin.JointModelRevoluteUnaligned(np.array(joint.axis)),
-            "screw": pin.JointModelHelicalUnaligned(np.array(joint.axis), joint.lead),
-        }
-        if joint.kind == "floating":
-            kinds["floating"].addJoint(pin.JointModelSpherical())
-        ids[body.name] = robot.addJoint(ids[joint.parent or "world"], kinds[joint.kind], place, joint.name)
-        inertia = pin.Inertia(body.mass, -np.asarray(joint.child_point), np.array(body.inertia))
-        robot.appendBodyToJoint(ids[body.name], inertia, pin.SE3.Identity())
-    theirs = q.copy()
-    if base == "floating":
-        theirs[3:7] = np.roll(q[3:7], -1)
+    robot, _ = pinocchio_robot(mech)
+    theirs = pinocchio_coordinates(mech, q)
     exact = pin.aba(robot, robot.createData(), theirs, v, np.zeros(mech.nv))
     np.testing.assert_allclose(TreeReference(pack(mech)).accelerations(q, v), exact, rtol=1e-9, atol=1e-9)
 

@@ -53,6 +53,23 @@ def test_an_unknown_gait_or_command_is_refused():
         dojo.tasks.legged_mpc(dojo.models.quadruped(), velocity=(0.1, 0.2))
 
 
+def test_an_arm_that_is_folded_finds_a_place_to_push_from():
+    """Below the hand of straight links that stand on end is the base, where no hand reaches."""
+    names, link = ("a", "b", "c"), dojo.Capsule(0.02, 0.3)
+    joints = [
+        dojo.Joint("revolute", parent, child, parent_point=(0, 0, 0.15) if parent else (0, 0, 0),
+                   child_point=(0, 0, -0.15), axis=axis, limits=(-2.2, 2.2))
+        for parent, child, axis in zip((None, "a", "b"), names, ((0, 0, 1), (0, 1, 0), (0, 1, 0)), strict=True)
+    ]  # fmt: skip
+    arm = dojo.Mechanism([dojo.Body(name, 1.0, shape=link) for name in names], joints)
+    box = dojo.Body("box", 0.2, shape=dojo.Box(0.1, 0.1, 0.1))
+    problem = dojo.problems.push(arm, box, (0.0, 0.1), duration=0.5)
+    at = problem.sim.mechanism.q_slice("box").start
+    assert problem.start[at] == pytest.approx(0.0, abs=1e-9) and 0.2 < problem.start[at + 1] < 0.6
+    with pytest.raises(ValueError, match=r"out of reach.*start=\.\.\."):
+        dojo.problems.push(arm, box, (0.0, 0.1), at=(0.0, 0.0, 0.0))
+
+
 @pytest.mark.slow
 def test_an_arm_pushes_a_box_along_a_table():
     box = dojo.Body("box", 0.5, shape=dojo.Box(0.1, 0.1, 0.1))

@@ -54,3 +54,11 @@ def test_other_formats_and_odd_sizes_are_refused(fall, tmp_path):
         dojo.viewer.save_video(fall.simulator.mechanism, tmp_path / "fall.gif")
     with pytest.raises(ValueError, match="width"):
         dojo.viewer.save_picture(fall, tmp_path / "fall.png", size=(1, 2, 3))
+
+
+def test_a_missing_browser_is_named(fall, tmp_path, monkeypatch):
+    pytest.importorskip("playwright")
+    monkeypatch.setattr("dojo_opt.viewer.video._BROWSERS", ("no-such-browser",))
+    monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path))
+    with pytest.raises(RuntimeError, match="found no browser: .*no-such-browser.*playwright install chromium"):
+        dojo.viewer.save_picture(fall, tmp_path / "fall.png")

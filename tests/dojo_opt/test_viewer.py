@@ -25,6 +25,7 @@ from sim.mechanism.short_repr import short_table
 # a browser process that is closed leaves sockets to the garbage collector
 pytestmark = [
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore:zmq.eventloop.ioloop:DeprecationWarning"),  # which MeshCat loads with its server
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
 DRAWN = 500  # pixels of 480 x 360 that a robot covers at least
@@ -185,7 +186,6 @@ def test_obstacles_are_drawn():
     assert sum("floor" in path for path in drawn) == 2 and sum("wall" in path for path in drawn) == 2
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # MeshCat loads its server, and that an old part of zmq
 def test_an_ellipsoid_is_a_ball_with_three_radii():
     stone = dojo.Body("stone", 1.0, shape=dojo.Ellipsoid(0.3, 0.2, 0.1, orientation=(0.6, 0.8, 0.0, 0.0)))
     mech = dojo.Mechanism([stone], [dojo.Joint("floating", None, "stone")])

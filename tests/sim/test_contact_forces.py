@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import minimize
 
 import dojo_opt as dojo
-from sim.simulator.contact_forces import _projected, _slope, least_forces
+from sim.simulator.contact_forces import _projected, _slope, balanced, least_forces
+from support.pinocchio_robots import pinocchio_coordinates, pinocchio_robot
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +70,56 @@ def test_joint_forces_and_contact_forces_accelerate_a_robot_as_asked(robot, rng)
     u = [found.joint_forces[mech.v_slice(i.joint).start + i.dof] for i in mech.inputs]
     end = sim.step(np.concatenate([q, v]), u, wrenches=wrenches).x
     np.testing.assert_allclose((end[sim.nq :] - v) / 1e-5, dv, atol=0.02 * np.abs(dv).max())
+
+
+def test_inverse_dynamics_on_contacts_agree_with_pinocchio(robot, rng):
+    """Its recursive algorithm of Newton and Euler, with our contact forces on its links, has our joint forces."""
+    pin = pytest.importorskip("pinocchio")
+    mech, kin = robot.mechanism, dojo.Kinematics(robot)
+    model, ids = pinocchio_robot(mech)
+    data = model.createData()
+    for _ in range(5):
+        q, v, dv = motion(robot, rng, 0.5)
+        q = kin.moved(q, np.r_[np.zeros(6), 0.1 * rng.standard_normal(12)])
+        found = kin.contact_forces(q, v, dv, contacts=[c.name for c in mech.contacts])
+        assert found.success
+        theirs = pinocchio_coordinates(mech, q)
+        pin.forwardKinematics(model, data, theirs)
+        wrenches = [pin.Force.Zero() for _ in range(model.njoints)]
+        for contact, force in zip(mech.contacts, found.forces, strict=True):
+            place = data.oMi[ids[contact.body]]
+            own = mech.joints[mech.body_names.index(contact.body)]
+            center = place.act(np.asarray(contact.point) - np.asarray(own.child_point))
+            lowest = center - (0.0, 0.0, contact.radius)
+            wrenches[ids[contact.body]] += place.actInv(pin.Force(force, np.cross(lowest, force)))
+        tau = pin.rnea(model, data, theirs, v, dv, wrenches)
+        armature = np.concatenate([np.asarray(joint.armature) for joint in mech.joints])
+        np.testing.assert_allclose(found.joint_forces, tau + armature * dv, atol=1e-9 * np.abs(found.forces).max())
+
+
+def test_loads_that_forces_can_balance_are_balanced(rng):
+    """Also those of forces on the edges of the cones, where no other forces balance them."""
+    for trial in range(60):
+        A, mu = rng.standard_normal((rng.integers(1, 7), rng.integers(1, 9), 3)), rng.uniform(0.0, 1.0)
+        friction = np.full(A.shape[1], mu)
+        inside = _projected(rng.standard_normal(friction.size * 3), friction)
+        if trial % 2:
+            side = np.maximum(np.hypot(inside[:, 1], inside[:, 2]), 1e-300)
+            inside[:, 1:] *= (mu * inside[:, 0] / side)[:, None]
+        load = np.einsum("nka,ka->n", A, inside)
+        assert balanced(least_forces(A, load, friction)[1], load)
+
+
+def test_forces_that_miss_the_load_miss_it_least(rng):
+    """A^T (A f - r) is in the dual cone and orthogonal to f, the conditions of the nearest point of a convex cone."""
+    for _ in range(10):
+        A, mu = rng.standard_normal((6, 2, 3)), rng.uniform(0.2, 0.8, 2)
+        load = rng.standard_normal(6)
+        f, residual = least_forces(A, load, mu)
+        assert not balanced(residual, load)
+        slope = np.einsum("nka,n->ka", A, np.einsum("nka,ka->n", A, f) - load)
+        assert abs(np.sum(slope * f)) < 1e-5
+        assert np.all(slope[:, 0] > mu * np.hypot(slope[:, 1], slope[:, 2]) - 1e-5)
 
 
 def test_forces_are_the_least(rng):
