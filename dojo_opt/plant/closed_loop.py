@@ -32,7 +32,7 @@ _RECORD = 500.0  # bytes of the objects that keep a step
 
 @dataclass(frozen=True, repr=False)
 class ClosedLoop:
-    """The record of a run, up to the end, a fall, or the first step of the plant that could not be solved.
+    """The record of a run, up to the end, its aim, a fall, or the first step of the plant that could not be solved.
 
     Attributes:
         simulator: simulator of the plant, perturbation included.
@@ -41,7 +41,7 @@ class ClosedLoop:
         u: (N, nu of the plant) inputs that acted, pushes included [N, N m].
         status: (N,) or (N + 1,) Status of every step that was tried.
         contacts: contacts of every step, world axes.
-        survived: whether the run reached its end.
+        survived: whether the run reached its end or its aim.
         message: the end of the run as a sentence.
         softened: number of steps of the plant that needed softer contact than its own, see `Plant`.
         log: every tick of the controller; empty for a controller without ticks.
@@ -132,6 +132,7 @@ def closed_loop(
     control_step: float | None = None,
     reference: Any = None,
     fallen: Callable[[Vector], bool] | None = None,
+    finished: Callable[[float, Vector], bool] | None = None,
 ) -> ClosedLoop:
     """Run u = controller(time, measured state) on the plant, from the start of both.
 
@@ -146,9 +147,11 @@ def closed_loop(
             controller, raised by the height of the ground that the controller has learnt by then).
         fallen: function of a state that returns whether the robot has fallen, which ends the run (default None:
             `plant.fallen`).
+        finished: function of (time [s], state) after every step that returns whether the aim is achieved, which ends
+            the run before its duration (default None: never).
 
     Returns:
-        The motion, up to the end, a fall, or the first step of the plant that could not be solved.
+        The motion, up to the end, the aim, a fall, or the first step of the plant that could not be solved.
 
     Raises:
         TypeError: for an argument of the wrong kind.
@@ -170,7 +173,7 @@ def closed_loop(
         controller.reset()
     run = _LoopRecord([plant.x])
     try:
-        _drive(run, controller, plant, steps, every, plant.fallen if fallen is None else fallen)
+        _drive(run, controller, plant, steps, every, plant.fallen if fallen is None else fallen, finished)
     except KeyboardInterrupt:
         run.survived, run.message = False, MESSAGES[Status.INTERRUPTED]
         raise Interrupted(_closed_loop(run, controller, plant, reference)) from None
@@ -240,9 +243,15 @@ class _LoopRecord:
 
 
 def _drive(
-    run: _LoopRecord, controller: Controller, plant: Plant, steps: int, every: int, has_fallen: Callable[[Vector], bool]
+    run: _LoopRecord,
+    controller: Controller,
+    plant: Plant,
+    steps: int,
+    every: int,
+    has_fallen: Callable[[Vector], bool],
+    finished: Callable[[float, Vector], bool] | None,
 ) -> None:
-    """Call the controller at regular steps of the plant, until the end, a fall, or an unsolved step."""
+    """Call the controller at regular steps of the plant, until the end, the aim, a fall, or an unsolved step."""
     command = np.zeros(plant.sim.nu)
     own, log = getattr(controller, "references", None), getattr(controller, "log", [])
     for k in range(steps):
@@ -261,6 +270,9 @@ def _drive(
         run.u.append(u)  # last: Ctrl-C may come between two of them, and counts the steps by this one
         if has_fallen(plant.x.copy()):
             run.message, run.survived = f"Fell at {plant.time:.3f} s.", False
+            break
+        if finished is not None and finished(plant.time, plant.x.copy()):
+            run.message = f"Achieved its aim at {plant.time:.3f} s."
             break
 
 

@@ -5,7 +5,7 @@ Tasks of reinforcement learning are in dojo_opt/learn.
 
 from typing import TYPE_CHECKING, Any
 
-from dojo_opt.tasks import crisp, idto
+from dojo_opt.tasks import crisp, idto, jin
 from dojo_opt.tasks.free_gait import free_gait_mpc
 from dojo_opt.tasks.hopping import Hopping, hopper_mpc
 from dojo_opt.tasks.legged import legged_mpc
@@ -13,7 +13,7 @@ from dojo_opt.tasks.plants import plant
 from dojo_opt.tasks.trotting import quadruped_mpc
 from sim.mechanism.checks import nearest
 
-__all__ = ["Hopping", "crisp", "free_gait_mpc", "hopper_mpc", "idto", "legged_mpc", "plant", "quadruped_mpc"]
+__all__ = ["Hopping", "crisp", "free_gait_mpc", "hopper_mpc", "idto", "jin", "legged_mpc", "plant", "quadruped_mpc"]
 
 
 if not TYPE_CHECKING:

@@ -64,6 +64,8 @@ class SuiteTask:
         rate: rate at which the publication replans [Hz].
         rise: coordinate that lifts a start out of the ground (default None: starts are taken as they are).
         lost: function of a state that returns whether a run has failed there, which ends it (default None: none has).
+        finished: function of (time [s], state) that returns whether the aim is achieved, which ends a run (default
+            None: runs last their duration).
     """
 
     name: str
@@ -76,6 +78,7 @@ class SuiteTask:
     rate: float = 0.0
     rise: int | None = None
     lost: Callable[[Vector], bool] | None = field(default=None, repr=False)
+    finished: Callable[[float, Vector], bool] | None = field(default=None, repr=False)
 
     __repr__ = short_repr
 
@@ -126,7 +129,8 @@ class SuiteTask:
             Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the run so far.
         """
         plant = self.plant(seed) if plant is None else plant
-        return closed_loop(self.mpc, plant, self.duration if seconds is None else seconds, fallen=self.lost)
+        duration = self.duration if seconds is None else seconds
+        return closed_loop(self.mpc, plant, duration, fallen=self.lost, finished=self.finished)
 
     def outcome(self, loop: ClosedLoop) -> TaskOutcome:
         """How a run ended.

@@ -1,0 +1,114 @@
+"""Dexterous manipulation by contact-implicit MPC: the given trials of Jin (arXiv 2408.07855), beside its figures.
+
+    NUMBA_NUM_THREADS=1 python benchmarks/dexterous.py [CASE ...] [--trials N]
+
+Objects, starts, goals, success and budgets are those of the publication, which has 20 trials per case; on two plants:
+ours, at 2 ms with kappa 1e-8, and MuJoCo's with its default contacts, where it is installed. What differs is in
+`help(dojo.tasks.jin.TASK)`. A successful run ends when the object has been at its goal for 20 ticks; errors are those
+at its end, and their means those over successful runs, as a failed run can end anywhere. Published are 96.5 % of
+success, 11 degrees and 7.8 mm as means over all hands and objects, and 50 to 100 Hz on an Apple M2 Pro. Ticks are timed
+by the processor, on one core.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from command import deliver, number, parser, progress
+
+import dojo_opt as dojo
+from dojo_opt.plant.tick import milliseconds
+from dojo_opt.report.result import Cell, Report, Row, Table
+
+CASES = {
+    f"fingertips_{item}_{motion}".replace(" ", "_").replace("-", "_"): ("fingertips", (item, motion))
+    for item, motion in (
+        ("cube", "rotation"),
+        ("cube", "flip"),
+        ("cube", "in-air"),
+        ("foam brick", "rotation"),
+        ("foam brick", "flip"),
+        ("foam brick", "in-air"),
+        ("stick", "flip"),
+    )
+}
+TRIALS = 20
+SUCCESS, ANGLE, DISTANCE, RATE = 96.5, 11.0, 7.8, 50.0  # [%], [deg], [mm], [Hz] of the publication
+OURS, MUJOCO = "ours, 2 ms, kappa 1e-8", "MuJoCo, default contacts"
+HEADER = (
+    *("case", "succeed", "of", "angle off [deg]", "off [mm]", "time [s]", "tick [ms]", "99 % [ms]", "fell back"),
+    *("of ticks", "penetration [mm]", "other ends"),
+)
+QUICK = 0.2  # [s] of a run that only checks that it runs
+
+
+def plant_of(task: Any, kind: str) -> Any:
+    """The plant of a task."""
+    if kind == OURS:
+        return task.plant()
+    from benchmarks.engines.mujoco_plant import MujocoPlant
+
+    return MujocoPlant(task.model, task.begin())
+
+
+def line(case: str, kind: str, trials: int, seconds: float | None) -> tuple[list[Cell], list[Any]]:
+    """One line of a table, and the outcomes behind it."""
+    family, arguments = CASES[case]
+    tasks = [getattr(dojo.tasks.jin, family)(*arguments, trial=trial) for trial in range(trials)]
+    loops = [task.run(plant=plant_of(task, kind), seconds=seconds) for task in tasks]
+    outcomes = [task.outcome(loop) for task, loop in zip(tasks, loops, strict=True)]
+    cpu = np.concatenate([milliseconds(loop.log, cpu=True) for loop in loops])
+    times = [float(np.median(cpu)), float(np.percentile(cpu, 99))] if cpu.size else [np.nan, np.nan]
+    good = [outcome.measures for outcome in outcomes if outcome.success]
+    angle, off = (float(np.mean([m[key] for m in good])) if good else np.nan for key in ("angle off [deg]", "off [mm]"))
+    time = float(np.median([m["time [s]"] for m in good])) if good else np.nan
+    depth = 1e3 * max(outcome.penetration for outcome in outcomes)
+    ends = "; ".join(sorted({loop.message for loop in loops if not loop.survived})[:3])
+    counts = sum(outcome.fallbacks for outcome in outcomes), sum(len(loop.log) for loop in loops)
+    cells: list[Cell] = [case, len(good), trials, angle, off, time, *times, *counts, depth]
+    return [*cells, ends], outcomes
+
+
+def run(args: argparse.Namespace) -> Report:
+    """The requested cases."""
+    report = Report("Dexterous manipulation", "")
+    kinds = [OURS] + ([MUJOCO] if find_spec("mujoco") is not None else [])
+    trials, seconds = (1, QUICK) if args.quick else (args.trials, None)
+    for kind in kinds:
+        lines = []
+        for case in progress()([(case, case) for case in args.cases or CASES], kind):
+            cells, outcomes = line(case, kind, trials, seconds)
+            lines.append(cells)
+            report.rows += rows(f"{case}, {kind}", cells, bars=not args.quick)
+            report.details[f"{case}, {kind}"] = [outcome._asdict() for outcome in outcomes]
+        report.tables.append(Table(f"plant: {kind}", HEADER, lines))
+    return report
+
+
+def rows(name: str, cells: list[Cell], bars: bool) -> list[Row]:
+    """The numbers of a line, beside the means of the publication."""
+    _, succeeded, trials, angle, off, _, tick, late, *_ = cells
+    share = 100.0 * float(succeeded or 0) / float(trials or 1)
+    return [
+        Row(f"{name}: succeed", share, "%", SUCCESS if bars else None, at_least=True),
+        number(f"{name}: angle off, mean", float(angle or 0.0), ANGLE if bars else None, unit="deg"),
+        number(f"{name}: off, mean", float(off or 0.0), DISTANCE if bars else None, unit="mm"),
+        number(f"{name}: tick, median", float(tick or 0.0), 1e3 / RATE if bars else None, unit="ms"),
+        number(f"{name}: tick, 99 %", float(late or 0.0), unit="ms"),
+    ]
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report."""
+    arguments = parser(__doc__)
+    arguments.add_argument("cases", nargs="*", metavar="CASE", help="; ".join(CASES))
+    arguments.add_argument("--trials", type=int, default=TRIALS, help="the first of them per case")
+    return deliver("dexterous", run, arguments, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

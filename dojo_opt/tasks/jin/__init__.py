@@ -1,0 +1,26 @@
+"""Dexterous manipulation of Jin (arXiv 2408.07855) with hard contact: objects, trials and success are theirs.
+
+Every builder returns a `SuiteTask` for one of 20 given trials, a start and a goal of the object:
+
+    task = dojo.tasks.jin.fingertips("cube", "in-air", trial=3)
+    loop = task.run()
+    print(task.outcome(loop))
+
+Theirs plans with a quasi-static model, whose contacts are frozen at the measured state and act at a distance, and
+lets a servo follow positions. Here the state has velocities, the inputs are forces, and contact is hard.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from dojo_opt.tasks.jin.fingertips import fingertips
+from sim.mechanism.checks import nearest
+
+__all__ = ["fingertips"]
+
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """A task that is not there, with the ones that are."""
+        raise AttributeError(f"dojo_opt.tasks.jin has no {name!r}; there are {', '.join(__all__)}"
+                             f"{nearest(name, __all__)}")  # fmt: skip

@@ -1,0 +1,105 @@
+"""The tasks of Jin: their trials are those of the publication, and fingertips bring an object to its goal."""
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt.plant.closed_loop import closed_loop
+from dojo_opt.tasks.jin.fingertips import mechanism, trial_of
+from dojo_opt.tasks.jin.placing import Placing
+
+# starts (x, y, yaw) and goals of the publication, drawn by its own code
+GIVEN = [
+    ("cube", "in-air", 0, (0.00217024709, -0.01108153075, -0.2349187542), (-0.09905622876, -0.07568617584, 0.09223880662)),
+    ("cube", "rotation", 0, (0.00217024709, -0.01108153075, -0.2349187542), (0.06895522646, -0.09905622876, 0.03)),
+    ("foam brick", "in-air", 1, (0.0008199313851, 0.003533379343, -0.9960016207), (0.03705539634, 0.06677937253, 0.04857608281)),
+    ("stick", "flip", 1, (0.0008199313851, 0.003533379343, -0.9960016207), (-0.06569566875, 0.03705539634, 0.015)),
+]  # fmt: skip
+TURNS = {
+    ("cube", "in-air", 0): (0.8595417078, -0.007920421717, 0.3486898099, 0.3735515171),
+    ("cube", "rotation", 0): (0.3727034302, 0.0, 0.0, -0.9279505122),
+    ("cube", "flip", 0): (0.192874106, 0.3904174859, -0.3521392237, -0.8284755477),
+    ("stick", "flip", 0): (0.3593778894, 0.09876932455, -0.2459141448, -0.8947728128),
+}
+
+
+@pytest.mark.parametrize(("item", "motion", "number", "start", "goal"), GIVEN)
+def test_places_of_trials_are_those_of_the_publication(item, motion, number, start, goal):
+    trial = trial_of(item, motion, number)
+    np.testing.assert_allclose(trial.start[[0, 1, 6]], start, atol=1e-9)
+    np.testing.assert_allclose(trial.goal[:3], goal, atol=1e-9)
+
+
+@pytest.mark.parametrize(("case", "quaternion"), TURNS.items())
+def test_turns_of_trials_are_those_of_the_publication(case, quaternion):
+    np.testing.assert_allclose(trial_of(*case).goal[3:], quaternion, atol=1e-9)
+
+
+def test_unknown_trials_are_refused():
+    with pytest.raises(ValueError, match="from 0 to 19"):
+        dojo.tasks.jin.fingertips(trial=20)
+    with pytest.raises(ValueError, match="flip"):
+        dojo.tasks.jin.fingertips("stick", "in-air")
+    with pytest.raises(ValueError, match="foam brick"):
+        dojo.tasks.jin.fingertips("foam brik")
+    with pytest.raises(AttributeError, match="there are"):
+        _ = dojo.tasks.jin.fingertip
+
+
+@pytest.mark.parametrize("item", ["cube", "foam brick", "stick"])
+def test_an_object_rests_on_the_table(item):
+    """Put down at the height of its trials it lies still, and the tips do not fall."""
+    sim = dojo.Simulator(mechanism(item), time_step=2e-3, kappa=1e-8)
+    start = sim.neutral()
+    start[:7] = trial_of(item, "flip", 0).start
+    x = sim.rollout(start, np.zeros((500, 9))).x[-1]
+    lowest = {"cube": 0.03, "foam brick": 0.0258, "stick": 0.015}[item]
+    assert x[2] == pytest.approx(lowest, abs=3e-4)  # kappa over the impulse of a weight of .1 N is .2 mm
+    assert np.all(x[[9, 12, 15]] >= 0.01)
+    assert np.abs(x[sim.nq :][:3]).max() < 1e-2
+
+
+def test_an_object_is_placed_after_twenty_periods():
+    """Leaving the goal begins the count anew, and so does a new run."""
+    goal = np.array([0.0, 0.0, 0.03, 1.0, 0.0, 0.0, 0.0])
+    placing = Placing(slice(0, 7), goal, 0.02, 0.015, 0.02)
+    there, away = goal.copy(), goal + (0.03, 0, 0, 0, 0, 0, 0)
+    turned = np.array([0.0, 0.0, 0.03, np.cos(0.15), 0.0, 0.0, np.sin(0.15)])  # .3 rad, of which .25 are allowed
+    assert placing.error(turned).turn == pytest.approx(np.sin(0.15) ** 2)
+    assert not placing.near(turned)
+    assert placing.near(-goal * (-1, -1, -1, 1, 1, 1, 1))  # the same turn by the other quaternion
+    assert not any(placing.finished(0.02 * k, there) for k in range(20))
+    assert placing.finished(0.4, there)
+    assert not placing.finished(0.42, away)
+    assert not any(placing.finished(0.44 + 0.02 * k, there) for k in range(20))
+    assert not placing.finished(0.02, there)  # of a new run
+    assert placing.finished(0.42, there)
+
+
+def test_a_loop_ends_when_its_aim_is_achieved():
+    sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01)
+    plant = dojo.Plant(sim, [0.3, 0.0])
+    loop = closed_loop(lambda t, x: [0.0], plant, 1.0, finished=lambda t, x: t > 0.255)
+    assert loop.survived
+    assert loop.message == "Achieved its aim at 0.260 s."
+    assert len(loop.x) == 27
+
+
+@pytest.mark.slow
+def test_fingertips_turn_a_cube_on_the_table():
+    """By 70 degrees, and over 75 mm, within 5 s."""
+    task = dojo.tasks.jin.fingertips("cube", "rotation", trial=1)
+    loop = task.run(seconds=5.0)
+    outcome = task.outcome(loop)
+    assert outcome.success, loop.message
+    assert outcome.penetration < 1e-4
+    assert outcome.measures["angle off [deg]"] < 14.1
+    assert outcome.measures["off [mm]"] < 20.0
+
+
+@pytest.mark.slow
+def test_fingertips_lift_a_cube():
+    task = dojo.tasks.jin.fingertips("cube", "in-air", trial=1)
+    loop = task.run(seconds=2.0)
+    assert loop.survived
+    assert loop.x[:, 2].max() > 0.04
