@@ -20,6 +20,7 @@ from numba.core.types.misc import unliteral
 
 from solvers.compiler.cache import CALLEE, INNER, STORE, KernelCache, cache_folder, prepare, shipped
 from solvers.compiler.pipeline import EntryCompiler, InnerCompiler, OptionalCompiler, UsersCompiler
+from solvers.compiler.signals import signals_outside_locks
 
 __all__ = [
     "FLAGS",
@@ -74,6 +75,7 @@ class _Form(CPUDispatcher):
                 raise TypeError(f"kernel {name}: expected to return numbers and plain tuples to Python, got {kind}")
         return compiled
 
+    @signals_outside_locks
     def _compiled(self, sig: Any) -> Any:
         """Numba's `compile` without its clocks: one per function that waits for its callees, each of which is told of
         every call of LLVM.
@@ -232,16 +234,18 @@ class UsersKernel(Kernel):
     @cached_property
     def entry(self) -> Any:
         """The form with a way in for Python."""
-        prepare()
-        return numba.jit(nopython=True, pipeline_class=UsersCompiler, **self.flags)(self.py_func)
+        return self._form()
 
     @cached_property
     def inner(self) -> Any:
         """The form without."""
+        return self._form(no_cpython_wrapper=True)
+
+    def _form(self, **flags: bool) -> Any:
         prepare()
-        return numba.jit(nopython=True, no_cpython_wrapper=True, pipeline_class=UsersCompiler, **self.flags)(
-            self.py_func
-        )
+        form = numba.jit(nopython=True, pipeline_class=UsersCompiler, **flags, **self.flags)(self.py_func)
+        form.compile = signals_outside_locks(form.compile)
+        return form
 
 
 def users_kernel(func: F, boundscheck: bool = True) -> F:

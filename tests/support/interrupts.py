@@ -8,7 +8,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from typing import Any, NamedTuple
@@ -93,34 +93,17 @@ def heard_in(call: Callable[[int], Any], steps: int, after: float, *, in_loop: b
     pytest.fail(f"heard after {found.seconds:.2f} s")
 
 
-class _RaisedAt:
-    """Trace function that handles a SIGINT where a function begins, which is where Python handles signals."""
-
-    def __init__(self, number: int) -> None:
-        self.count, self._number = 0, number
-        self.where = ""
-
-    def __call__(self, frame: Any, event: str, arg: object) -> None:
-        code = frame.f_code
-        if code.co_flags & inspect.CO_GENERATOR:  # traced as it is closed, too, where Python handles no signals
-            return
-        self.count += 1
-        if self.count == self._number:
-            self.where = f"{code.co_filename}:{code.co_qualname}"
-            sys.settrace(None)
-            handler = signal.getsignal(signal.SIGINT)
-            assert callable(handler)
-            handler(signal.SIGINT, frame)
-
-
 class _Raised:
-    """A call with a SIGINT as its function of that number begins; 0: none."""
+    """A call with a SIGINT where Python may handle it: as its function of that number begins; 0: none.
 
-    def __init__(self, call: Callable[[], Any], number: int) -> None:
-        trace, before = _RaisedAt(number), sys.gettrace()
-        self.heard = False
-        handler = signal.signal(signal.SIGINT, signal.default_int_handler)
-        sys.settrace(trace)
+    within: count only these functions, and each of their lines.
+    """
+
+    def __init__(self, call: Callable[[], Any], number: int, within: Collection[Any] = ()) -> None:
+        self.count, self._number, self._within = 0, number, {function.__code__ for function in within}
+        self.where, self.heard = "", False
+        before, handler = sys.gettrace(), signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.settrace(self._trace)
         try:
             call()
         except KeyboardInterrupt:
@@ -128,12 +111,27 @@ class _Raised:
         finally:
             sys.settrace(before)
             signal.signal(signal.SIGINT, handler)
-        self.count, self.where = trace.count, trace.where
+
+    def _trace(self, frame: Any, event: str, arg: object) -> Any:
+        code = frame.f_code
+        if code.co_flags & inspect.CO_GENERATOR:  # traced as it is closed, too, where Python handles no signals
+            return None
+        if event not in ("call", "line") or (self._within and code not in self._within):
+            return None if event == "call" else self._trace
+        self.count += 1
+        if self.count == self._number:
+            self.where = f"{code.co_filename}:{frame.f_lineno}:{code.co_qualname}"
+            sys.settrace(None)
+            handler = signal.getsignal(signal.SIGINT)
+            assert callable(handler)
+            handler(signal.SIGINT, frame)
+        return self._trace if self._within else None
 
 
-def dropped(call: Callable[[], Any], most: int = 300) -> list[str]:
-    """Functions in which a KeyboardInterrupt during the call is lost, of all, or of `most` spread over it."""
+def dropped(call: Callable[[], Any], most: int = 300, within: Collection[Any] = ()) -> list[str]:
+    """Places in which a KeyboardInterrupt during the call is lost, of all, or of `most` spread over it; see _Raised."""
     call()
-    counted = _Raised(call, 0)
+    counted = _Raised(call, 0, within)
+    assert counted.count > 0
     numbers = range(1, counted.count + 1, 1 + counted.count // most)
-    return [found.where for found in (_Raised(call, k) for k in numbers) if found.where and not found.heard]
+    return [found.where for found in (_Raised(call, k, within) for k in numbers) if found.where and not found.heard]
