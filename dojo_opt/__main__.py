@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import ast
-import json
 import os
 import sys
 import time
@@ -26,9 +25,9 @@ import dojo_opt as dojo
 from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report import STUDIES
 from dojo_opt.report.command import CHECKOUT, MOVED, add_arguments, report
-from dojo_opt.report.result import finite
 from dojo_opt.tasks.plan_task import PlanTask
 from dojo_opt.viewer.show import add_show, show
+from sim.io.json_text import json_text
 from sim.mechanism.checks import nearest, one_of
 
 # names for `run`; the gaits of the quadruped also have the names of their examples, quadruped_trot and so on
@@ -98,11 +97,6 @@ def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
     return arguments
 
 
-def _print_json(numbers: Any) -> None:
-    """Print numbers as JSON, which has none that are not finite: those become strings."""
-    print(json.dumps(finite(numbers), allow_nan=False))
-
-
 def _run(args: argparse.Namespace) -> int:
     if args.name in LOOPS:
         return _run_loop(args)
@@ -128,7 +122,7 @@ def _run(args: argparse.Namespace) -> int:
         numbers |= {"message": plan.message, "iterations": int(plan.nit), "cost": float(plan.fun)}
         numbers |= {"violation": float(plan.violation), "seconds": seconds}
         numbers |= {"x": plan.x.tolist(), "u": plan.u.tolist()}
-        _print_json(numbers)
+        print(json_text(numbers))
     else:
         for path in filter(None, (args.out, args.html)):
             print(f"wrote {path}")
@@ -149,7 +143,7 @@ def _run_loop(args: argparse.Namespace) -> int:
     numbers |= {"ticks": len(loop.log), "fallbacks": fallbacks}
     numbers |= {"tick_median_ms": float(np.median(ms)), "tick_99_ms": float(np.percentile(ms, 99))} if ms.size else {}
     if args.json:
-        _print_json(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()})
+        print(json_text(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()}))
     else:
         print(f"{loop.message}  rms {loop.rms():.3f} (m, rad) in {loop.duration:.2f} s over all tracked coordinates:")
         print("  " + ", ".join(f"{name} {value:.3f}" for name, value in each.items()))
@@ -180,7 +174,7 @@ def _run_suite(args: argparse.Namespace) -> int:
     numbers |= {"tick_median_ms": outcome.median, "tick_99_ms": outcome.late, "fallbacks": outcome.fallbacks}
     numbers |= {"rate_hz": task.rate, "penetration_mm": 1e3 * outcome.penetration}
     if args.json:
-        _print_json(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()})
+        print(json_text(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()}))
     else:
         print(f"{'success' if outcome.success else 'no success'}: {loop.message}")
         print("  " + ", ".join(f"{measure} {value:.3g}" for measure, value in outcome.measures.items()))
@@ -203,7 +197,7 @@ def _plan_task(args: argparse.Namespace, task: PlanTask) -> int:
         dojo.viewer.save_html(plan, args.html)
     numbers = {"task": args.name, "message": plan.message, "seconds": seconds, **outcome._asdict()}
     if args.json:
-        _print_json(numbers | {"x": plan.x.tolist(), "u": plan.u.tolist()})
+        print(json_text(numbers | {"x": plan.x.tolist(), "u": plan.u.tolist()}))
     else:
         print(f"{'success' if outcome.success else 'no success'}: {plan.message}")
         print("  " + ", ".join(f"{measure} {value:.3g}" for measure, value in outcome.measures.items()))
@@ -219,7 +213,7 @@ def _models(args: argparse.Namespace) -> int:
             dojo.plots.thumbnail(entry.build()).savefig(args.thumbnails / f"{entry.name}.png", dpi=100)
     if args.json:
         rows = [asdict(entry) for entry in entries]
-        _print_json([{name: row[name] for name in row if name != "builder"} for row in rows])
+        print(json_text([{name: row[name] for name in row if name != "builder"} for row in rows]))
         return 0
     print(f"{'name':<18}{'bodies':>7}{'nq':>4}{'nv':>4}{'nu':>4}{'contacts':>9}{'limits':>7}{'kg':>8}  description")
     for e in entries:
@@ -237,7 +231,7 @@ def _warmup(args: argparse.Namespace) -> int:
     numbers |= {"kernels": len(compiled_signatures()), "signatures": sum(compiled_signatures().values())}
     folder = cache_folder()
     if args.json:
-        _print_json({**numbers, "cache": str(folder) if folder else None})
+        print(json_text({**numbers, "cache": str(folder) if folder else None}))
     else:
         where = f"cached in {folder}" if folder else "not cached (DOJO_OPT_CACHE=0, or no usable folder)"
         print("{signatures} signatures of {kernels} kernels in {seconds:.1f} s, ".format(**numbers) + where)

@@ -18,6 +18,7 @@ from benchmarks import compare
 from dojo_opt import __main__ as cli
 from dojo_opt.report.command import MOVED
 from dojo_opt.report.result import Report, Row
+from sim.io.json_text import json_text
 from support.programs import HOME
 from support.urdf_files import branched, collision, inertial, joint, link, write
 
@@ -71,14 +72,14 @@ def test_run_writes_plan_figure_and_animation(tmp_path: Path, capsys: pytest.Cap
     assert page.read_text().count("MeshCat.Viewer") == 1
 
 
+def _refuse(name: str) -> None:
+    raise AssertionError(f"no JSON: {name}")
+
+
 def test_a_run_without_a_second_tick_has_no_nan(capsys: pytest.CaptureFixture[str]) -> None:
     command = ["run", "idto.acrobot", "--seconds", "0.003"]
     assert cli.main([*command, "--json"]) == 1
-
-    def refuse(name: str) -> None:
-        raise AssertionError(f"no JSON: {name}")
-
-    result = json.loads(capsys.readouterr().out, parse_constant=refuse)
+    result = json.loads(capsys.readouterr().out, parse_constant=_refuse)
     assert result["tick_median_ms"] == "nan"
     assert cli.main(command) == 1
     assert "too short for a second tick" in capsys.readouterr().out
@@ -231,6 +232,17 @@ def test_show_plays_the_motion_until_it_is_interrupted(
     assert len(shown) == 12 and all(0.0 <= pause <= 1.0 for pause in pauses)  # the neutral state first
     np.testing.assert_array_equal(shown[1:6], shown[7:])
     assert shown[1][2] > shown[5][2]
+
+
+def test_numbers_that_json_has_not_are_strings(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    value = {1: np.array([0.5, np.nan]), "low": -np.inf, "pair": (np.float64(1.0), np.inf), "none": None}
+    expected = {"1": [0.5, "nan"], "low": "-inf", "pair": [1.0, "inf"], "none": None}
+    assert json.loads(json_text(value), parse_constant=_refuse) == expected
+    monkeypatch.setattr("dojo_opt.viewer.show._numbers", lambda sim, motion: value)
+    assert cli.main(["show", "pendulum", "--seconds", "0.05", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out, parse_constant=_refuse) == expected
 
 
 def test_show_prints_one_json_object(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 from dojo_opt.report.page import write_page
 from dojo_opt.report.study import STUDIES, Studies, run_reports
 from dojo_opt.viewer.show import touching
+from sim.io.json_text import json_text
 from sim.io.urdf.load import load_urdf
 
 CHECKOUT = "For reference scenes and other engines, run python benchmarks/compare.py --help from a checkout."
@@ -74,7 +74,7 @@ def report(
     for name, made in reports.items():
         made.command = _command(args, name, program)
     if args.json:
-        print(json.dumps({name: json.loads(made.as_json()) for name, made in reports.items()}, indent=1))
+        print(json_text({name: made.as_dict() for name, made in reports.items()}, indent=1))
     else:
         print("\n\n".join(made.as_text() for made in reports.values()))
     if args.out:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import base64
 import io
-import json
 import re
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
-from dojo_opt.report.result import Cell, Report, Table, finite, shown, verdict
+from dojo_opt.report.result import Cell, Report, Table, shown, verdict
+from sim.io.json_text import json_text
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 70em; margin: 2em auto; padding: 0 1em; color: #222; }
@@ -55,7 +55,7 @@ def write_page(reports: Mapping[str, Report], folder: Path, command: str) -> lis
     texts = {
         "report.html": _html(reports, pictures, command),
         "report.md": _markdown(reports, command),
-        "report.json": json.dumps(finite(numbers), indent=1) + "\n",
+        "report.json": json_text(numbers, indent=1) + "\n",
     }
     for name, text in texts.items():
         files.append(folder / name)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import sys
@@ -11,6 +10,8 @@ from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+from sim.io.json_text import json_text
 
 Cell = str | float | int | bool | None
 
@@ -125,7 +126,7 @@ class Report:
         Returns:
             Text of everything but the figure. Infinities and NaN, for which JSON has no numbers, are strings.
         """
-        return json.dumps(finite(self.as_dict()), indent=1)
+        return json_text(self.as_dict(), indent=1)
 
     def as_text(self) -> str:
         """The report as aligned tables.
@@ -162,19 +163,6 @@ def aligned(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Lines of a table with columns of equal width."""
     widths = [max(len(line[k]) for line in [header, *rows]) for k in range(len(header))]
     return ["  ".join(f"{c:<{w}}" for c, w in zip(line, widths, strict=True)).rstrip() for line in [header, *rows]]
-
-
-def finite(value: Any) -> Any:
-    """A value that JSON can hold: arrays as lists, numbers that are not finite as strings."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, dict):
-        return {str(k): finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(v) for v in value]
-    if isinstance(value, float) and value - value != 0.0:
-        return str(value)
-    return value
 
 
 def machine() -> dict[str, Any]:

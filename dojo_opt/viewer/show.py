@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from collections.abc import Sequence
 from inspect import signature
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
+from sim.io.json_text import json_text
 from sim.mechanism import checks
 from sim.mechanism.checks import nearest
 from sim.mechanism.memory_limit import check_room
@@ -144,7 +144,7 @@ def show(args: argparse.Namespace) -> int:
     if args.html:
         dojo.viewer.save_html(motion, args.html)
     if args.json:
-        print(json.dumps(_numbers(sim, motion)))
+        print(json_text(_numbers(sim, motion)))
         return 0 if motion.success else 1
     print(f"released for {motion.time[-1]:g} s without inputs: {motion.message}")
     for path in filter(None, (args.out, args.html)):
