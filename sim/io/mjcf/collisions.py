@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from itertools import combinations
 from typing import Any
 
+from sim.io.loader_choices import LoaderChoices
 from sim.io.mjcf.contacts import STANDING, fixed_planes, label_on, meet, mixed, plane_pose
 from sim.io.mjcf.welded_bodies import NO_SHAPE, PLANE, GeomGroup, Where, name_of, solid_of
 from sim.io.urdf.report import Notes
@@ -19,12 +20,10 @@ from sim.mechanism.collision import Collision
 from sim.mechanism.joint import WORLD
 from sim.mechanism.shapes import HalfSpace, Solid
 
-Settings = tuple[float | None, str, int]
 
-
-def find_collisions(model: Any, where: Where, settings: Settings, notes: Notes) -> list[Collision]:
-    """The collisions of all geoms that may meet; settings: friction, law, and further settings of contacts."""
-    chosen, law, _ = settings
+def find_collisions(model: Any, where: Where, choices: LoaderChoices, notes: Notes) -> list[Collision]:
+    """The collisions of all geoms that may meet."""
+    chosen, law = choices.friction, choices.law
     out = []
     for a, b, (friction, slippery) in _pairs(model, where):
         names = [name_of(model, "geom", g) for g in (a, b)]
@@ -37,13 +36,13 @@ def find_collisions(model: Any, where: Where, settings: Settings, notes: Notes) 
         one, other = (group.name if group else WORLD for group in (_owner(model, where, a), _owner(model, where, b)))
         mu = friction if chosen is None else chosen
         name = f"{names[0]}-{names[1]}"
-        out.append(Collision(one, other, first, second, mu, "impact" if slippery else law, name))
+        out.append(Collision(one, other, first, second, friction=mu, law="impact" if slippery else law, name=name))
     return out
 
 
-def find_on_planes(model: Any, where: Where, settings: Settings) -> list[Collision]:
+def find_on_planes(model: Any, where: Where, choices: LoaderChoices) -> list[Collision]:
     """The collisions of geoms without balls and points with all planes that they touch."""
-    chosen, law, _ = settings
+    chosen, law = choices.friction, choices.law
     planes = fixed_planes(model, where)
     out = []
     for g in range(model.ngeom):
@@ -57,7 +56,9 @@ def find_on_planes(model: Any, where: Where, settings: Settings) -> list[Collisi
             ground = HalfSpace(center=plane.point, orientation=plane.quaternion)
             mu = friction if chosen is None else chosen
             name = label_on(model, g, p, touched)
-            out.append(Collision(group.name, None, solid, ground, mu, "impact" if slippery else law, name))
+            out.append(
+                Collision(group.name, None, solid, ground, friction=mu, law="impact" if slippery else law, name=name)
+            )
     return out
 
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.io.loader_choices import LoaderChoices
 from sim.io.mjcf.welded_bodies import (
     BOX,
     CAPSULE,
@@ -42,10 +43,8 @@ STANDING = (SPHERE, CAPSULE, BOX, CYLINDER, MESH)  # on balls and points
 _UNLESS = "are no obstacles (collisions=True makes them)"
 
 
-def find_contacts(
-    model: Any, where: Where, settings: tuple[float | None, str, int], collisions: bool, notes: Notes
-) -> list[Contact]:
-    """The contacts of all geoms with all planes; settings: friction, law, points per rim of a cylinder.
+def find_contacts(model: Any, where: Where, choices: LoaderChoices, collisions: bool, notes: Notes) -> list[Contact]:
+    """The contacts of all geoms with all planes.
 
     collisions: whether the other fixed geoms are obstacles, by sim/io/mjcf/collisions.py.
     """
@@ -72,12 +71,12 @@ def find_contacts(
                 "meshes are convex hulls of at most 32 corners, at these largest distances from the hulls of the meshes"
             )
             notes.add(text, [f"{name_of(model, 'geom', g)} ({error:.2g} mm)"])
-        balls = _balls(model, g, frame, settings[2])
+        balls = _balls(model, g, frame, choices.rim_points)
         for p in touched:
             label = label_on(model, g, p, touched)
             names = [label if len(balls) == 1 else f"{label}_{k}" for k in range(len(balls))]
             out += [
-                _contact(model, (g, p), group, ball, name, settings) for ball, name in zip(balls, names, strict=True)
+                _contact(model, (g, p), group, ball, name, choices) for ball, name in zip(balls, names, strict=True)
             ]
     return out
 
@@ -121,11 +120,11 @@ def mixed(model: Any, a: int, b: int) -> tuple[float, bool]:
 
 
 def _contact(
-    model: Any, pair: tuple[int, int], group: GeomGroup, ball: tuple[Floats, float], name: str, settings: Any
+    model: Any, pair: tuple[int, int], group: GeomGroup, ball: tuple[Floats, float], name: str, choices: LoaderChoices
 ) -> Contact:
     """One ball of a geom against a plane."""
     g, p = pair
-    chosen, law, _ = settings
+    chosen, law = choices.friction, choices.law
     plane = plane_pose(model, p)
     normal = plane.rotation[:, 2]
     friction, slippery = mixed(model, g, p)
@@ -133,11 +132,11 @@ def _contact(
         group.name,
         ball[0] - group.com,
         ball[1],
-        friction if chosen is None else chosen,
-        "impact" if slippery else law,
-        normal,
-        float(normal @ plane.point),
-        name,
+        friction=friction if chosen is None else chosen,
+        law="impact" if slippery else law,
+        normal=normal,
+        height=float(normal @ plane.point),
+        name=name,
     )
 
 

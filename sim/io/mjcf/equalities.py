@@ -67,7 +67,7 @@ def find_gears(model: Any, homes: dict[int, tuple[str, int]], notes: Notes) -> l
             (joint, dof), (leader, leading) = homes[first], homes[second]
             offset = start + float(poly[0]) - float(poly[1]) * other
             notes.add("equality constraints are rigid here", [name])
-            out.append(Gear(joint, leader, float(poly[1]), offset, dof, leading, name))
+            out.append(Gear(joint, leader, float(poly[1]), offset, dof=dof, other_dof=leading, name=name))
     return out
 
 

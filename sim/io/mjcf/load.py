@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.io.contact_choices import contact_choices
+from sim.io.loader_choices import loader_choices
 from sim.io.mjcf.actuators import find_inputs, left_out, with_friction
 from sim.io.mjcf.collisions import find_collisions, find_on_planes
 from sim.io.mjcf.contacts import find_contacts
@@ -70,36 +70,43 @@ def load_mjcf(
         ValueError: MuJoCo cannot read the file, or no rigid body has the inertia of the named body.
         OSError: the file does not exist.
     """
-    if not isinstance(collisions, bool):
-        checks.one_of("load_mjcf(collisions=...)", collisions, ("self",))
     model, file = _compile(source)
     with _named(file):
-        touching = contact_choices("load_mjcf", friction, law, rim_points)
+        choices = loader_choices(
+            "load_mjcf",
+            ground=ground,
+            friction=friction,
+            law=law,
+            rim_points=rim_points,
+            joint_friction=joint_friction,
+            gravity=model.opt.gravity if gravity is None else gravity,
+            collisions=None if isinstance(collisions, bool) else collisions,
+        )
         notes = Notes()
         groups, where = find_groups(model)
         bodies, joints, homes = _tree(model, groups, merge, notes)
         if not joints:
             raise ValueError(f"load_mjcf: {file}: no joint is free to move")
         inputs, gear, low, high = find_inputs(model, homes, where, notes)
-        joints = with_friction(model, joints, homes, joint_friction, notes)
+        joints = with_friction(model, joints, homes, choices.joint_friction, notes)
         left_out(model, bool(collisions), notes)
         mech = MjcfMechanism(
             bodies,
             [*joints, *find_loops(model, where, notes)],
-            find_contacts(model, where, touching, collisions is True, notes) if ground else [],
+            find_contacts(model, where, choices, collisions is True, notes) if choices.ground else [],
             inputs,
-            gravity=model.opt.gravity if gravity is None else gravity,
+            gravity=choices.gravity,
             name=Path(file).stem,
             neutral=_neutral(model, keyframe, notes),
             collisions=[
-                *(find_on_planes(model, where, touching) if ground else []),
-                *(find_collisions(model, where, touching, notes) if collisions is True else []),
+                *(find_on_planes(model, where, choices) if choices.ground else []),
+                *(find_collisions(model, where, choices, notes) if collisions is True else []),
             ],
             gears=find_gears(model, homes, notes),
         )
         mech = _without_constant_gaps(mech, notes)
         mech = _clear(mech) if keyframe is None else mech
-        if collisions == "self":
+        if choices.itself:
             pairs, overlapping = mech.self_collisions()
             mech = replace(mech, collisions=[*mech.collisions, *pairs])
             if overlapping:

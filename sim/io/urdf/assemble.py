@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.io.contact_choices import ContactChoices
+from sim.io.loader_choices import LoaderChoices
 from sim.io.urdf.contacts import find_contacts
 from sim.io.urdf.inertia import RigidInertia, combined, fault, repaired
 from sim.io.urdf.loops import UrdfLoop, closing_joint, zero_poses
@@ -43,7 +43,7 @@ _ENDS_SHOWN = 6  # last links named in the message about a robot without contact
 
 @dataclass(frozen=True)
 class Choices:
-    """The arguments of `load_urdf`; see there."""
+    """The arguments of `load_urdf`, but for those about meshes; see there."""
 
     file: str
     fixed_base: bool
@@ -55,10 +55,7 @@ class Choices:
     position: tuple[float, ...]
     actuated: tuple[str, ...] | None
     contacts: Sequence[str | Contact] | None
-    touching: ContactChoices
-    gravity: tuple[float, ...]
-    collisions: str | None
-    joint_friction: bool
+    shared: LoaderChoices
 
 
 def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, notes: Notes) -> UrdfMechanism:
@@ -86,7 +83,7 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
         checks.one_of("load_urdf(neutral=...): joint", name, known)
     if not any(joint.nv for joint in joints):
         raise UrdfError(f"load_urdf: {choices.file}: no joint is free to move")
-    found = find_contacts(places, coms, choices.contacts, choices.touching, notes)
+    found = find_contacts(places, coms, choices.contacts, choices.shared, notes)
     neutral: dict[str, ArrayLike] = {j.name: _neutral(robot, choices, j.name) for j in joints if j.nv == 1}
     neutral |= {j.name: choices.neutral[j.name] for j in joints if j.nv > 1 and j.name in choices.neutral}
     mech = UrdfMechanism(
@@ -94,7 +91,7 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
         [*joints, *closing],
         found,
         _inputs(joints, closing, {**robot.joints, **{n: loop.joint for n, loop in loops.items()}}, choices),
-        gravity=choices.gravity,
+        gravity=choices.shared.gravity,
         name=robot.name,
         neutral=neutral,
         scenery=_scenery(places, coms, choices),
@@ -107,11 +104,11 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
     rough = [
         body.joint.name
         for body in groups
-        if body.joint and body.joint.friction and not (choices.joint_friction and _may_rub(body, body.joint))
+        if body.joint and body.joint.friction and not (choices.shared.joint_friction and _may_rub(body, body.joint))
     ]
     if rough:
         notes.add("joints move without the dry friction of the file, which joint_friction=True adds to hinges", rough)
-    if choices.collisions is not None:
+    if choices.shared.itself:
         pairs, overlapping = mech.self_collisions()
         mech = replace(mech, collisions=pairs)
         if overlapping:
@@ -219,7 +216,7 @@ def _joint(
         axis=joint.axis,
         orientation=frame.quaternion,
         damper=0.0 if body.fixed else joint.damping,
-        friction=max(joint.friction, 0.0) if choices.joint_friction and _may_rub(body, joint) else 0.0,
+        friction=max(joint.friction, 0.0) if choices.shared.joint_friction and _may_rub(body, joint) else 0.0,
         limits=None if body.fixed else joint.limits,
     )
 
@@ -230,7 +227,7 @@ def _may_rub(body: MergedLinks, joint: UrdfJoint) -> bool:
 
 
 def _body(body: MergedLinks, part: RigidInertia) -> Body:
-    return Body(body.name, part.mass, part.inertia, body_shapes(body, part.com), body_visuals(body, part.com))
+    return Body(body.name, part.mass, part.inertia, body_shapes(body, part.com), visuals=body_visuals(body, part.com))
 
 
 def _scenery(places: Mapping[str, Place], coms: Mapping[str, Floats], choices: Choices) -> list[Visual]:

@@ -16,6 +16,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.io.loader_choices import LoaderChoices
 from sim.io.urdf.report import Notes
 from sim.io.urdf.robot import Geometry
 from sim.io.urdf.tree import MergedLinks, Place
@@ -36,12 +37,12 @@ def find_contacts(
     places: dict[str, Place],
     coms: dict[str, Floats],
     chosen: Sequence[str | Contact] | None,
-    settings: tuple[float | None, str, int],
+    choices: LoaderChoices,
     notes: Notes,
 ) -> list[Contact]:
     """The contacts of the chosen links, or of all, with points measured from the centres of mass of their bodies.
 
-    coms: centre of mass of every body in its own frame; settings: friction, law, points per rim.
+    coms: centre of mass of every body in its own frame.
     """
     picked = _picked(places, chosen)
     out: list[Contact] = []
@@ -56,14 +57,21 @@ def find_contacts(
                 notes.add("no contacts on links that are fixed to the world", [name])
             continue
         link = place.link
-        mu, law, rim = settings
+        mu, law, rim = choices.friction, choices.law, choices.rim_points
         friction = mu if mu is not None else link.friction if link.friction is not None else FRICTION
         for contact in given:
             point = place.pose.at(contact.point) - coms[body]
             label = _free(contact.name or name, taken)
             out.append(
                 Contact(
-                    body, point, contact.radius, contact.friction, contact.law, contact.normal, contact.height, label
+                    body,
+                    point,
+                    contact.radius,
+                    friction=contact.friction,
+                    law=contact.law,
+                    normal=contact.normal,
+                    height=contact.height,
+                    name=label,
                 )
             )
         if given:
@@ -71,7 +79,7 @@ def find_contacts(
         balls = [ball for shape in _shapes(place) for ball in _balls(shape, place, rim)]
         for k, (point, radius) in enumerate(balls):
             label = _free(name if len(balls) == 1 else f"{name}_{k}", taken)
-            out.append(Contact(body, point - coms[body], radius, friction, law, name=label))
+            out.append(Contact(body, point - coms[body], radius, friction=friction, law=law, name=label))
         other = sorted({s.kind for s in link.collisions if s.kind not in SHAPES})
         for kind in other:
             notes.add(f"no contact from collision shapes of kind {kind!r}", [name])

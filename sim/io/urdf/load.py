@@ -7,7 +7,7 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from sim.io.contact_choices import contact_choices
+from sim.io.loader_choices import loader_choices
 from sim.io.meshes.reduced_hull import CORNERS
 from sim.io.urdf.assemble import Choices, assemble
 from sim.io.urdf.collision_meshes import mesh_choices, with_shapes
@@ -31,20 +31,20 @@ def load_urdf(
     contacts: Sequence[str | Contact] | None = None,
     merge_fixed: bool = True,
     *,
+    position: ArrayLike = (0.0, 0.0, 0.0),
+    neutral: Mapping[str, ArrayLike] | None = None,
+    locked: Collection[str] = (),
+    mimic: str = "auto",
+    actuated: Sequence[str] | None = None,
+    joint_friction: bool = False,
+    law: str = "nonlinear",
+    rim_points: int = 4,
+    collisions: str | None = None,
     meshes: str | Mapping[str, str] = "hull",
     mesh_corners: int = CORNERS,
     mesh_dirs: Sequence[str | Path] = (),
-    locked: Collection[str] = (),
-    mimic: str = "auto",
     repair: bool = False,
-    neutral: Mapping[str, ArrayLike] | None = None,
-    position: ArrayLike = (0.0, 0.0, 0.0),
-    actuated: Sequence[str] | None = None,
-    law: str = "nonlinear",
-    rim_points: int = 4,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
-    collisions: str | None = None,
-    joint_friction: bool = False,
 ) -> UrdfMechanism:
     """Load the robot of a URDF file.
 
@@ -61,6 +61,20 @@ def load_urdf(
             frame of the link; None: all that have a sphere, box (8 corners), capsule (2 balls) or cylinder (points on
             both rims; 2 balls for a wheel, a cylinder that turns about its own axis) or mesh.
         merge_fixed: whether links on fixed joints become one body; a link without mass always does.
+        position: (3,) place of the root's frame, if it is fixed [m].
+        neutral: coordinates of the neutral state by joint [rad, m]; others are at zero, or in the middle of their range
+            if that excludes zero. The base then stands so high that the lowest contact touches.
+        locked: names of the joints that are held at their neutral coordinate, as if they were fixed.
+        mimic: treatment of joints that follow another one: "gear" couples them (see Gear) and refuses those that it
+            cannot, "auto" couples them and lets those go free, with a warning; "free" and "locked" ignore it. A coupled
+            joint has no input of its own.
+        actuated: names of the joints with an input, in the order of u; None: all that move, but for floating ones.
+        joint_friction: whether joints have the dry friction that the file gives them, see `Joint.friction`. Steps of a
+            higher order or of a given accuracy are for joints without it.
+        law: law of contacts with friction, see `dojo.Contact`.
+        rim_points: number of points per rim of a cylinder.
+        collisions: "self" lets all links collide but those that a joint connects; `report` lists pairs of shapes that
+            overlap in the neutral state, which do not. None: the robot does not touch itself.
         meshes: replacement of a collision mesh: "hull", its convex hull reduced to `mesh_corners`; "decompose", several
             such hulls, by CoACD; "sphere", "box" or "capsule", fitted ones, for feet and for speed; "none"; or a table
             of these by link, with "*" for all others. `report` has the largest distances from the meshes. Needs trimesh
@@ -68,24 +82,10 @@ def load_urdf(
         mesh_corners: largest number of corners of a convex hull. Each is a contact point with the ground, and costs
             time. With 8 a hull takes the time of a box.
         mesh_dirs: folders with meshes, before those of ROS_PACKAGE_PATH and the ones around the file.
-        locked: names of the joints that are held at their neutral coordinate, as if they were fixed.
-        mimic: treatment of joints that follow another one: "gear" couples them (see Gear) and refuses those that it
-            cannot, "auto" couples them and lets those go free, with a warning; "free" and "locked" ignore it. A coupled
-            joint has no input of its own.
         repair: whether an inertia that no rigid body has is replaced by the nearest one of a ball's extent or more. One
             that is missing becomes that of the collision shapes, which also give a link without mass one, with 1000
             kg/m^3; without shapes it is a ball of 1 g and 1 cm. False refuses them.
-        neutral: coordinates of the neutral state by joint [rad, m]; others are at zero, or in the middle of their range
-            if that excludes zero. The base then stands so high that the lowest contact touches.
-        position: (3,) place of the root's frame, if it is fixed [m].
-        actuated: names of the joints with an input, in the order of u; None: all that move, but for floating ones.
-        law: law of contacts with friction, see `dojo.Contact`.
-        rim_points: number of points per rim of a cylinder.
         gravity: (3,) acceleration of gravity [m/s^2].
-        collisions: "self" lets all links collide but those that a joint connects; `report` lists pairs of shapes that
-            overlap in the neutral state, which do not. None: the robot does not touch itself.
-        joint_friction: whether joints have the dry friction that the file gives them, see `Joint.friction`. Steps of a
-            higher order or of a given accuracy are for joints without it.
 
     Returns:
         UrdfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion
@@ -114,11 +114,17 @@ def load_urdf(
         neutral=dict(neutral or {}),
         position=checks.vector("load_urdf(position=...)", position, 3),
         actuated=None if actuated is None else tuple(actuated),
-        contacts=(contacts if ground else ()),
-        touching=contact_choices("load_urdf", friction, law, rim_points),
-        gravity=checks.vector("load_urdf(gravity=...)", gravity, 3),
-        collisions=None if collisions is None else checks.one_of("load_urdf(collisions=...)", collisions, ("self",)),
-        joint_friction=joint_friction,
+        contacts=contacts if ground else (),
+        shared=loader_choices(
+            "load_urdf",
+            ground=ground,
+            friction=friction,
+            law=law,
+            rim_points=rim_points,
+            joint_friction=joint_friction,
+            gravity=gravity,
+            collisions=collisions,
+        ),
     )
     return assemble(robot, loops, choices, notes)
 

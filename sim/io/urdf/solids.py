@@ -47,7 +47,17 @@ def body_visuals(body: MergedLinks, com: Floats) -> tuple[Visual, ...]:
             if shape.kind == "mesh":
                 if shape.file:
                     place = at.point - com
-                    out.append(Visual(None, shape.file, None, shape.scale, place, at.quaternion, shape.color))
+                    out.append(
+                        Visual(
+                            None,
+                            mesh=shape.file,
+                            triangles=None,
+                            scale=shape.scale,
+                            center=place,
+                            orientation=at.quaternion,
+                            color=shape.color,
+                        )
+                    )
             elif (solid := solid_of(shape, at, com, "", None)) is not None:
                 out.append(Visual(solid, color=shape.color))
     return tuple(out)
