@@ -33,6 +33,8 @@ PARTS = {
     "no inertia": (lambda: dojo.Body("arm", 1.0), "arm", "inertia"),
     "no name": (lambda: dojo.Body("", 1.0, (1, 1, 1)), "name"),
     "unknown joint": (lambda: dojo.Joint("hinge", None, "arm"), "arm", "kind", "hinge", "revolute"),
+    "name before kind": (lambda: dojo.Joint("hip", "revolute", None, "arm"), "Joint('revolute', parent, child", "hip"),
+    "kind last": (lambda: dojo.Joint("base", "arm", "revolute"), "Joint('revolute', parent, child, name)", "base"),
     "zero axis": (lambda: dojo.Joint("revolute", None, "arm", axis=(0, 0, 0)), "arm", "axis"),
     "quaternion length": (lambda: dojo.Joint("revolute", None, "arm", orientation=(1, 1, 0, 0)), "arm", "orientation"),
     "point shape": (lambda: dojo.Joint("revolute", None, "arm", parent_point=(1, 2)), "arm", "parent_point", "(2,)"),
@@ -190,6 +192,26 @@ ROOMS = {
 @pytest.mark.parametrize("case", ROOMS)
 def test_other_rooms(case):
     check_refused(*ROOMS[case])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda: dojo.Joint("revolute", None, "arm", "hip", (0, 0, 0), (0, 0, 1), (0, 1, 0), 3.0),
+            r"Joint\(kind, parent, child, name, parent_point, child_point\): expected at most 6 .* got 8.* axis=\.\.\., ",
+        ),
+        (
+            lambda: dojo.Contact("arm", (0, 0, 0), 0.1, 0.5),
+            r"Contact\(body, point, radius\): .* got 4.* friction=\.\.\., ",
+        ),
+        (lambda: dojo.Body("arm", 1.0, (1, 1, 1), None, ()), r"Body\(name, mass, inertia, shape\): .*visuals=\.\.\., "),
+        (lambda: dojo.Gear("a", "b", 1.0, 0.0, 1), r"Gear\(joint, other, ratio, offset\): .*dof=\.\.\., other_dof"),
+    ],
+)
+def test_rows_of_numbers_have_names(call, message):
+    with pytest.raises(TypeError, match=message):
+        call()
 
 
 @pytest.mark.parametrize("mech", [free_body(), block(), chain("spherical", 1)])

@@ -111,6 +111,7 @@ def _feet_of(mech: Mechanism, given: Any) -> list[Contact]:
     kin, x = Kinematics(sim), sim.neutral()
     joints = {joint.child: joint for joint in mech.joints}
     if given is not None:
+        checks.names("Legs(feet=...)", given)
         return [contact for name in given for contact in _named(mech, kin, name, given)]
     if not mech.contacts:
         raise ValueError(f"Legs(robot): {mech.name!r} has no contact with the ground; name its feet with feet=...")

@@ -18,7 +18,7 @@ from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.footfall import Footfall
 from dojo_opt.gaits.gait import Gait, assemble
 from sim.mechanism import checks
-from sim.mechanism.memory_limit import room_for
+from sim.mechanism.memory_limit import check_room, room_for
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
@@ -232,8 +232,10 @@ def jump(
         checks.number(f"{call}({name}=...)", value)
     for name, value in (("height", height), ("crouch", crouch), ("before", before), ("after", after)):
         checks.number(f"{call}({name}=...)", value, above=0.0)
-    speed = np.sqrt(2.0 * 9.81 * height)
-    sink, push, fly, rest = (max(1, round(d / h)) for d in (before, 2.0 * crouch / speed, 2.0 * speed / 9.81, after))
+    speed = float(np.sqrt(2.0 * 9.81 * height))
+    durations = before, 2.0 * crouch / speed, 2.0 * speed / 9.81, after
+    sink, push, fly, rest = (max(1, round(min(d / h, 1e300))) for d in durations)
+    check_room(f"{call}: time steps", sink + 2 * push + fly + rest, 8.0 * sim.nx, "jump in less time")
     ends = np.cumsum([0, sink, push, fly, push, rest]) * h
     t = h * np.arange(-1, round(ends[-1] / h) + 1)
     forward, up = _jump_path(np.clip(t, 0.0, None), ends, distance, crouch, height)

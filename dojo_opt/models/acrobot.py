@@ -6,11 +6,13 @@ from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.npendulum import npendulum
 from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
 
 
+@checked_numbers("models")
 def acrobot(
     *,
     mass: float = 1.0,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import Link, Mount, bodies, degrees, grounded, joints, rod, touch
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
@@ -21,6 +22,7 @@ LEGS = {
 }
 
 
+@checked_numbers("models")
 def ant(
     *,
     spring: float = 0.0,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import Link, Mount, bodies, grounded, joints, padded, touch
 from sim.mechanism import checks
 from sim.mechanism.contact import Contact
@@ -99,6 +100,7 @@ SOLE = ((-0.08, -0.04), (0.12, -0.02), (-0.08, 0.04), (0.12, 0.02))  # x, y from
 SOLE_HEIGHT, SOLE_RADIUS = 0.015, 0.025  # [m]
 
 
+@checked_numbers("models")
 def atlas(
     *,
     spring: float = 0.0,

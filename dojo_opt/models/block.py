@@ -6,6 +6,7 @@ from itertools import product
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism.body import Body
 from sim.mechanism.contact import Contact
 from sim.mechanism.input import Input
@@ -14,6 +15,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Box
 
 
+@checked_numbers("models")
 def block(
     *,
     edge: float = 0.5,
@@ -48,7 +50,9 @@ def block(
     return Mechanism(
         bodies=[Body("block", mass, shape=Box(edge, edge, edge))],
         joints=[Joint("floating", None, "block")],
-        contacts=[Contact("block", p, radius, friction, law, name=f"corner_{k}") for k, p in enumerate(corners)],
+        contacts=[
+            Contact("block", p, radius, friction=friction, law=law, name=f"corner_{k}") for k, p in enumerate(corners)
+        ],
         inputs=[
             Input(body="block", force=axis, name=f"force_{label}")
             for label, axis in (("x", (1, 0, 0)), ("y", (0, 1, 0)), ("z", (0, 0, 1)))

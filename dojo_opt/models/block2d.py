@@ -6,6 +6,7 @@ from itertools import product
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism.body import Body
 from sim.mechanism.contact import Contact
 from sim.mechanism.joint import Joint
@@ -13,6 +14,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Box
 
 
+@checked_numbers("models")
 def block2d(
     *,
     edge: float = 0.5,
@@ -47,7 +49,9 @@ def block2d(
     return Mechanism(
         bodies=[Body("block", mass, shape=Box(edge, edge, edge))],
         joints=[Joint("planar_axis", None, "block", axis=(1.0, 0.0, 0.0))],
-        contacts=[Contact("block", p, radius, friction, law, name=f"corner_{k}") for k, p in enumerate(corners)],
+        contacts=[
+            Contact("block", p, radius, friction=friction, law=law, name=f"corner_{k}") for k, p in enumerate(corners)
+        ],
         gravity=gravity,
         name="block2d",
         neutral={"block": (0.0, edge / 2, 0.0)},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism import checks
 from sim.mechanism.body import Body
 from sim.mechanism.input import Input
@@ -15,6 +16,7 @@ CART_INERTIA = (0.106974, 0.106974, 0.00636812)
 POLE_INERTIA = (0.0422274, 0.0422274, 0.0012155)
 
 
+@checked_numbers("models")
 def cartpole(
     *,
     cart_mass: float = 1.0063,

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import from_z
 from sim.mechanism.body import Body
 from sim.mechanism.input import Input
@@ -18,6 +19,7 @@ from sim.mechanism.shapes import Box, Cylinder, rotation_matrix
 Floats = NDArray[np.float64]
 
 
+@checked_numbers("models")
 def delta(
     *,
     base_radius: float = 0.2,

@@ -6,6 +6,7 @@ from math import pi
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import Link, Mount, bodies, degrees, joints
 from sim.mechanism.mechanism import Mechanism
 
@@ -20,6 +21,7 @@ UNITS = {
 }
 
 
+@checked_numbers("models")
 def exoskeleton(
     *,
     spring: float = 0.0,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism.body import Body
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
@@ -16,6 +17,7 @@ from sim.mechanism.shapes import Box
 Y = (0.0, 1.0, 0.0)
 
 
+@checked_numbers("models")
 def fivebar(
     *,
     crank: float = 0.3,

@@ -6,6 +6,7 @@ from math import pi
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism.body import Body
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
@@ -15,6 +16,7 @@ from sim.mechanism.shapes import Box
 X = (1.0, 0.0, 0.0)
 
 
+@checked_numbers("models")
 def fourbar(
     *,
     mass: float = 1.0,

@@ -7,6 +7,7 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.hopper import DOWN
 from dojo_opt.models.links import Mount, rod
 from dojo_opt.models.planar import Ball, planar_robot
@@ -29,6 +30,7 @@ LIMBS = {
 }
 
 
+@checked_numbers("models")
 def halfcheetah(
     *,
     springs: float = 1.0,

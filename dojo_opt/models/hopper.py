@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import Mount, degrees, rod
 from dojo_opt.models.planar import planar_robot
 from sim.mechanism.mechanism import Mechanism
@@ -11,6 +12,7 @@ from sim.mechanism.mechanism import Mechanism
 DOWN, FORWARD = (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)
 
 
+@checked_numbers("models")
 def hopper(
     *,
     spring: float = 0.0,

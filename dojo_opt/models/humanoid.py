@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import Link, Mount, bodies, from_z, grounded, joints, padded, touch
 from sim.mechanism import checks
 from sim.mechanism.input import Input
@@ -77,6 +78,7 @@ def _mounts() -> list[Mount]:
     return out
 
 
+@checked_numbers("models")
 def humanoid(
     *,
     spring: float = 0.0,

@@ -106,7 +106,7 @@ def touch(
     links: Mapping[str, Link], body: str, point: ArrayLike, radius: float, name: str, *, friction: float, law: str
 ) -> Contact:
     """A ball at a point of a link's own frame."""
-    return Contact(body, np.asarray(point) - np.asarray(links[body].com), radius, friction, law, name=name)
+    return Contact(body, np.asarray(point) - np.asarray(links[body].com), radius, friction=friction, law=law, name=name)
 
 
 def rod(mass: float, length: float, radius: float, start: ArrayLike, direction: ArrayLike) -> Link:

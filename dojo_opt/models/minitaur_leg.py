@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism.body import Body
 from sim.mechanism.contact import Contact
 from sim.mechanism.input import Input
@@ -17,6 +18,7 @@ from sim.mechanism.shapes import Box
 Y = (0.0, 1.0, 0.0)
 
 
+@checked_numbers("models")
 def minitaur_leg(
     *,
     body_mass: float = 2.0,
@@ -85,7 +87,7 @@ def minitaur_leg(
         neutral |= {f"{side}_hip": -sign * angle, f"{side}_knee": sign * knee}
     end = (0.0, 0.0, -lower / 2)
     pin = Joint("revolute", "front_shank", "back_shank", "foot", end, end, axis=Y, close=True)
-    foot = Contact("front_shank", end, foot_radius, friction, law, name="foot")
+    foot = Contact("front_shank", end, foot_radius, friction=friction, law=law, name="foot")
     hull = Contact("body", radius=0.05, friction=friction, law=law, name="hull")
     return Mechanism(
         bodies,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import LINK_BYTES
 from sim.mechanism.body import Body
 from sim.mechanism.joint import Joint
@@ -12,6 +13,7 @@ from sim.mechanism.memory_limit import room_for
 from sim.mechanism.shapes import Box
 
 
+@checked_numbers("models")
 def npendulum(
     n: int = 5,
     *,

@@ -6,6 +6,7 @@ from math import pi
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import Link, Mount, bodies, joints
 from sim.mechanism.mechanism import Mechanism
 
@@ -45,6 +46,7 @@ HINGES = (
 READY = (0.0, -pi / 4, 0.0, -3 * pi / 4, 0.0, pi / 2, pi / 4)
 
 
+@checked_numbers("models")
 def panda(
     *,
     spring: float = 0.0,

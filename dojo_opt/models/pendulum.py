@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.npendulum import npendulum
 from sim.mechanism.mechanism import Mechanism
 
 
+@checked_numbers("models")
 def pendulum(
     *,
     mass: float = 1.0,

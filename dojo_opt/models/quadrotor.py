@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import Link, bodies, grounded, touch
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
@@ -18,6 +19,7 @@ ROTOR = Link(0.01, (0.0, 0.0, 0.0), (1.94999922e-06, 0.00013660827869, 0.0001384
 FRAME = Link(1.0, (0.0, 0.0, 0.0), (0.01, 0.01, 0.02), Box(0.1, 0.1, 0.2))
 
 
+@checked_numbers("models")
 def quadrotor(
     *,
     torque_per_thrust: float = 0.1,

@@ -7,6 +7,7 @@ from math import cos, pi, sin
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism import checks
 from sim.mechanism.body import Body
 from sim.mechanism.contact import Contact
@@ -36,6 +37,7 @@ LIMITS = {"hip": (-0.5, 0.5), "thigh": (-0.5, 1.5), "calf": (-2.5, -1.0)}
 REST = {"hip": 0.0, "thigh": 0.9, "calf": -1.425}
 
 
+@checked_numbers("models")
 def quadruped(
     *,
     damper: float = 0.05,
@@ -148,9 +150,11 @@ def _leg_joints(leg: str, x: int, y: int, spring: float, damper: float, limits: 
 def _leg_contacts(leg: str, y: int, friction: float, law: str) -> list[Contact]:
     """Balls at the foot, the knee and the hip."""
     return [
-        Contact(f"{leg}_calf", FOOT, FOOT_RADIUS, friction, law, name=f"{leg}_foot"),
-        Contact(f"{leg}_thigh", THIGH_PAD * (1, y, 1), THIGH_PAD_RADIUS, friction, law, name=f"{leg}_knee"),
-        Contact(f"{leg}_hip", HIP_PAD * (1, y, 1), HIP_PAD_RADIUS, friction, law, name=f"{leg}_shoulder"),
+        Contact(f"{leg}_calf", FOOT, FOOT_RADIUS, friction=friction, law=law, name=f"{leg}_foot"),
+        Contact(
+            f"{leg}_thigh", THIGH_PAD * (1, y, 1), THIGH_PAD_RADIUS, friction=friction, law=law, name=f"{leg}_knee"
+        ),
+        Contact(f"{leg}_hip", HIP_PAD * (1, y, 1), HIP_PAD_RADIUS, friction=friction, law=law, name=f"{leg}_shoulder"),
     ]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism.body import Body
 from sim.mechanism.contact import Contact
 from sim.mechanism.input import Input
@@ -14,6 +15,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Sphere
 
 
+@checked_numbers("models")
 def raiberthopper(
     *,
     body_mass: float = 4.18,

@@ -7,6 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import Link, Mount, bodies, grounded, joints, touch
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
@@ -63,6 +64,7 @@ WHEEL_MOUNTS = (
 )
 
 
+@checked_numbers("models")
 def rexhopper(
     *,
     damper: float = 0.1,

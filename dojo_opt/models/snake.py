@@ -5,10 +5,12 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.box_chain import box_chain
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism.contact import Contact
 from sim.mechanism.mechanism import Mechanism
 
 
+@checked_numbers("models")
 def snake(
     n: int = 2,
     *,
@@ -53,7 +55,7 @@ def snake(
         "snake", n, joint, ((1.0, 0.0, 0.0),), mass, (length, width, height), spring, damper
     )
     contacts = [
-        Contact(f"link_{i}", point, radius, friction, law, name=f"link_{i}_{end}")
+        Contact(f"link_{i}", point, radius, friction=friction, law=law, name=f"link_{i}_{end}")
         for i in range(n)
         for end, point in (("front", front), ("rear", rear))
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism.body import Body
 from sim.mechanism.contact import Contact
 from sim.mechanism.input import Input
@@ -12,6 +13,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Sphere
 
 
+@checked_numbers("models")
 def sphere(
     *,
     radius: float = 0.5,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import from_z
 from sim.mechanism.body import Body
 from sim.mechanism.input import Input
@@ -17,6 +18,7 @@ from sim.mechanism.shapes import Cylinder
 Floats = NDArray[np.float64]
 
 
+@checked_numbers("models")
 def stewart(
     *,
     base_radius: float = 0.5,

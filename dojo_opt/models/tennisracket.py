@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism.body import Body
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Box
 
 
+@checked_numbers("models")
 def tennisracket(
     *,
     mass: float = 1.0,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism.body import Body
 from sim.mechanism.contact import Contact
 from sim.mechanism.joint import Joint
@@ -12,6 +13,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Sphere
 
 
+@checked_numbers("models")
 def tippetop(
     *,
     mass: float = 1.0,
@@ -55,8 +57,8 @@ def tippetop(
     pole = np.array([0.0, 0.0, radius + offset])
     joints = [Joint("floating", None, "ball"), Joint("fixed", "ball", "knob", parent_point=pole)]
     contacts = [
-        Contact("ball", (0.0, 0.0, offset), radius, friction, law),
-        Contact("knob", (0.0, 0.0, 0.0), knob, friction, law),
+        Contact("ball", (0.0, 0.0, offset), radius, friction=friction, law=law),
+        Contact("knob", (0.0, 0.0, 0.0), knob, friction=friction, law=law),
     ]
     neutral = {"ball": (0.0, 0.0, radius - offset, 1.0, 0.0, 0.0, 0.0)}
     return Mechanism(bodies, joints, contacts, gravity=gravity, name="tippetop", neutral=neutral)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.box_chain import box_chain
+from dojo_opt.models.checked_numbers import checked_numbers
 from sim.mechanism.contact import Contact
 from sim.mechanism.mechanism import Mechanism
 
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
+@checked_numbers("models")
 def twister(
     n: int = 5,
     *,
@@ -54,7 +56,9 @@ def twister(
         ValueError: for an argument out of range; the message names the part.
     """
     links, joints, front, rear = box_chain("twister", n, joint, AXES, mass, (length, width, height), spring, damper)
-    contacts = [Contact("link_0", front, radius, friction, law, name="link_0_front")]
-    contacts += [Contact(f"link_{i}", rear, radius, friction, law, name=f"link_{i}_rear") for i in range(n)]
+    contacts = [Contact("link_0", front, radius, friction=friction, law=law, name="link_0_front")]
+    contacts += [
+        Contact(f"link_{i}", rear, radius, friction=friction, law=law, name=f"link_{i}_rear") for i in range(n)
+    ]
     neutral = {"base": (0.0, 0.0, radius, 1.0, 0.0, 0.0, 0.0)}
     return Mechanism(links, joints, contacts, gravity=gravity, name="twister", neutral=neutral)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import Link, bodies, touch
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
@@ -25,6 +26,7 @@ THRUSTERS = (
 )
 
 
+@checked_numbers("models")
 def uuv(
     *,
     damper: float = 10.0,

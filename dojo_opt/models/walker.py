@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.hopper import DOWN, FORWARD
 from dojo_opt.models.links import Mount, degrees, rod
 from dojo_opt.models.planar import Ball, planar_robot
 from sim.mechanism.mechanism import Mechanism
 
 
+@checked_numbers("models")
 def walker(
     *,
     spring: float = 0.0,

@@ -7,6 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import Link, Mount, bodies, joints
 from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
@@ -49,6 +50,7 @@ HINGES = (
 )
 
 
+@checked_numbers("models")
 def youbot(
     *,
     spring: float = 0.0,

@@ -23,7 +23,7 @@ Matrix = NDArray[np.float64]
 __all__ = ["Problem"]
 
 
-def _limits(limits: tuple[ArrayLike, ArrayLike] | None, sim: Simulator) -> tuple[Vector, Vector] | None:
+def control_limits_of(limits: tuple[ArrayLike, ArrayLike] | None, sim: Simulator) -> tuple[Vector, Vector] | None:
     """Control limits as two (nu,) arrays, infinite where free; those of the inputs where none are given."""
     nu = sim.nu
     if limits is None:
@@ -120,7 +120,7 @@ class Problem:
                     found = f"a {type(spec).__name__}, not a term of dojo.{argument.removesuffix('s')}"
                     raise TypeError(f"Problem({argument}=...): entry {i} is {found}")
         self.bind()
-        self.control_limits = _limits(control_limits, sim)
+        self.control_limits = control_limits_of(control_limits, sim)
         self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)
         self.states0 = None if states0 is None else self.check_states("Problem(states0=...)", states0)
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from dojo_opt import models
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
@@ -19,6 +20,7 @@ from sim.simulator.simulator import Simulator
 __all__ = ["block", "hop", "swingup"]
 
 
+@checked_numbers("problems")
 def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.5, **model: Any) -> Problem:
     """Raibert's hopper jumps from rest to rest in one second, 20 knots of 50 ms.
 
@@ -66,6 +68,7 @@ def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.
     )
 
 
+@checked_numbers("problems")
 def block(goal: str = "right", *, friction: float = 0.5, **model: Any) -> Problem:
     """A half-metre cube of 1 kg moves from rest on the ground to rest one metre to the right, or one metre up.
 
@@ -86,8 +89,7 @@ def block(goal: str = "right", *, friction: float = 0.5, **model: Any) -> Proble
         ValueError: for another goal, or a parameter out of range.
     """
     shifts = {"right": (1.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0)}
-    if goal not in shifts:
-        raise ValueError(f'problems.block(goal=...): expected "right" or "up", got {goal!r}')
+    checks.one_of("problems.block(goal=...)", goal, shifts)
     sim = Simulator(models.block(friction=friction, **model), time_step=0.1, kappa=PLANNED)
     start = sim.neutral()
     target = start.copy()
@@ -97,6 +99,7 @@ def block(goal: str = "right", *, friction: float = 0.5, **model: Any) -> Proble
     return Problem(sim, start, 10, cost=terms, constraints=[Goal(target)])
 
 
+@checked_numbers("problems")
 def swingup(name: str = "cartpole") -> Problem:
     """A pendulum, cart-pole or acrobot swings from hanging at rest to upright at rest, which is a constraint.
 
@@ -114,17 +117,16 @@ def swingup(name: str = "cartpole") -> Problem:
         ValueError: for another name.
     """
     weight: ArrayLike
+    checks.one_of("problems.swingup(name)", name, ("pendulum", "cartpole", "acrobot"))
     if name == "pendulum":
         sim, horizon, upright = Simulator(models.pendulum(damper=1.0), time_step=0.05), 50, [np.pi]
         weight, effort, limits = 0.1, 0.01, (-200.0, 200.0)
     elif name == "cartpole":
         sim, horizon, upright = Simulator(models.cartpole(), time_step=0.1), 25, [0.0, np.pi]
         weight, effort, limits = 0.1, 1e-3, None
-    elif name == "acrobot":
+    else:
         sim, horizon, upright = Simulator(models.acrobot(), time_step=0.1), 50, [np.pi, 0.0]
         weight, effort, limits = np.array([0.0, 0.0, 0.1, 0.1]), 0.1, None
-    else:
-        raise ValueError(f'problems.swingup(name): expected "pendulum", "cartpole" or "acrobot", got {name!r}')
     target = np.concatenate([upright, np.zeros(sim.nv)])
     ramp = np.linspace(1.0, 0.0, horizon)[:, None] * 1e-2  # hanging still is a stationary point: leave it
     return Problem(

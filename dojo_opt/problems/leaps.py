@@ -11,11 +11,13 @@ from dojo_opt import models
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.gaits.equilibrium import equilibrium
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from dojo_opt.problems.locomotion import EFFORT, TORQUE_LIMIT, standing, weights
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
+from sim.mechanism.memory_limit import check_room
 from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -23,6 +25,7 @@ Array = NDArray[np.float64]
 __all__ = ["leap"]
 
 
+@checked_numbers("problems")
 def leap(
     *,
     distance: float = 0.3,
@@ -77,7 +80,8 @@ def leap(
     start, _ = equilibrium(sim)
     still, torques = standing(sim)
     low, apex, goal = (_moved(start, *by) for by in ((0.0, -crouch), (0.5 * distance, height), (distance, 0.0)))
-    horizon = max(5, round(duration / step))
+    horizon = max(5, round(min(duration / step, 1e300)))
+    check_room(f"{call}(duration=...): knots", horizon, 8.0 * sim.nx, "leap in less time, or with longer knots")
     down, up = round(0.2 * horizon), round(0.4 * horizon)
     poses = np.array([low] * down + [apex] * up + [goal] * (horizon + 1 - down - up))
     problem = Problem(

@@ -13,12 +13,14 @@ from dojo_opt.gaits.biped import balanced
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.gait import Gait, assemble
 from dojo_opt.gaits.legs import Legs
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from dojo_opt.problems import locomotion
 from dojo_opt.problems.locomotion import EFFORT, PLACE, follow
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
+from sim.mechanism.memory_limit import check_room
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
@@ -39,6 +41,7 @@ _CROUCH = 0.8  # of the way down that the legs allow, at most, before a jump
 _LEAST = 1e-3  # [s] time steps are multiples of this
 
 
+@checked_numbers("problems")
 def trot(
     robot: Any = None,
     *,
@@ -80,6 +83,7 @@ def trot(
     return _periodic(legs, "trot", _PERIOD, _SPEED, settings)
 
 
+@checked_numbers("problems")
 def walk(
     robot: Any = None,
     *,
@@ -127,6 +131,7 @@ def _periodic(legs: Legs, name: str, period: float, speed: float, settings: dict
     return _scaled(legs, made, follows)
 
 
+@checked_numbers("problems")
 def jump(
     robot: Any = None,
     *,
@@ -202,6 +207,7 @@ def _of_the_quadruped(call: str, feet: Any, stance: Any, settings: dict[str, Any
     return settings
 
 
+@checked_numbers("problems")
 def stand_up(
     robot: Any,
     *,
@@ -243,7 +249,9 @@ def stand_up(
     substeps = whole_number("problems.stand_up(substeps=...)", follows.get("substeps", 1))
     step = _rounded(_STEP * slow) / substeps
     sim = legs.simulator(step, PLANNED)
-    count = substeps * max(2, round(length / (step * substeps)))
+    knots = max(2, round(min(length / (step * substeps), 1e300)))
+    check_room("problems.stand_up(duration=...): knots", knots, 8.0 * substeps * sim.nx, "stand up in less time")
+    count = substeps * knots
     drop = _deepest(sim, legs.height) if low is None else (1.0 - low) * legs.height
     return _scaled(legs, _rise(sim, count, drop), follows)
 

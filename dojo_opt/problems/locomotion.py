@@ -14,8 +14,9 @@ from dojo_opt.cost import Effort, Tracking
 from dojo_opt.gaits.equilibrium import equilibrium
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.gait import Gait
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import CONTINUATION, PLANNED
-from dojo_opt.planning.problem import Problem
+from dojo_opt.planning.problem import Problem, control_limits_of
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.simulator.simulator import Simulator
@@ -32,6 +33,7 @@ EFFORT = 2.5e-5  # per second and (N m)^2
 TROT_FOOTHOLDS = ((0.19, -0.13205), (0.19, 0.13205), (-0.27, -0.13205), (-0.27, 0.13205))
 
 
+@checked_numbers("problems")
 def follow(
     gait: Gait,
     *,
@@ -69,9 +71,14 @@ def follow(
         ValueError: for an argument out of range, a gait that cannot be followed or, with `periodic`, one that does not
             end as it began.
     """
+    if not isinstance(gait, Gait):
+        raise TypeError(f"problems.follow(gait): expected a Gait, got {checks.shown(gait)}")
     sim = gait.simulator
     checks.one_of("problems.follow(guess=...)", guess, ("reference", "standing"))
     substeps = whole_number("problems.follow(substeps=...)", substeps)
+    place = checks.spread("problems.follow(place=...)", place, 3)
+    checks.number("problems.follow(attitude=...)", attitude, at_least=0.0)
+    checks.number("problems.follow(effort=...)", effort, at_least=0.0)
     if (len(gait.x) - 1) % substeps:
         raise ValueError(
             f"problems.follow(substeps=...): {len(gait.x) - 1} time steps are not a multiple of {substeps}"
@@ -84,8 +91,8 @@ def follow(
     else:
         still, torques = standing(sim, gait.foot_names)
         states, controls = np.tile(still, (horizon + 1, 1)), np.tile(torques, (horizon, 1))
-    if control_limits is not None:
-        controls = np.clip(controls, *control_limits)
+    if control_limits is not None and (limits := control_limits_of(control_limits, sim)) is not None:
+        controls = np.clip(controls, *limits)
     constraint: Any = Goal(reference[-1], components=np.arange(6))
     if periodic:
         constraint = Periodic(_stride(sim, reference))
@@ -128,6 +135,7 @@ def _stride(sim: Simulator, reference: Array) -> Array:
     return np.asarray(stride)
 
 
+@checked_numbers("problems")
 def trot(
     *,
     speed: float = 0.2,
@@ -175,6 +183,7 @@ def trot(
     )
 
 
+@checked_numbers("problems")
 def turn(*, heading_rate: float = 0.5, damping: float = 0.5, time_step: float = 0.02, **settings: Any) -> Problem:
     """The quadruped turns on the spot, trotting.
 
@@ -194,6 +203,7 @@ def turn(*, heading_rate: float = 0.5, damping: float = 0.5, time_step: float = 
     return _quadruped(gaits.turn, time_step, damping, settings, heading_rate=heading_rate)
 
 
+@checked_numbers("problems")
 def pace(*, speed: float = 0.2, damping: float = 0.5, time_step: float = 0.02, **settings: Any) -> Problem:
     """The quadruped paces, both feet of a side together.
 
@@ -213,6 +223,7 @@ def pace(*, speed: float = 0.2, damping: float = 0.5, time_step: float = 0.02, *
     return _quadruped(gaits.pace, time_step, damping, settings, speed=speed)
 
 
+@checked_numbers("problems")
 def walk(*, speed: float = 0.1, damping: float = 0.5, time_step: float = 0.05, **settings: Any) -> Problem:
     """The quadruped walks, one foot after the other.
 
@@ -232,6 +243,7 @@ def walk(*, speed: float = 0.1, damping: float = 0.5, time_step: float = 0.05, *
     return _quadruped(gaits.walk, time_step, damping, settings, speed=speed)
 
 
+@checked_numbers("problems")
 def bound(
     *, speed: float = 0.5, damping: float = 0.5, step_height: float = 0.08, time_step: float = 0.02, **settings: Any
 ) -> Problem:
@@ -255,6 +267,7 @@ def bound(
     return _quadruped(gaits.bound, time_step, damping, settings, speed=speed, step_height=step_height)
 
 
+@checked_numbers("problems")
 def jump(
     *,
     distance: float = 0.3,

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.gaits.equilibrium import input_map, potential_gradient
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
@@ -17,6 +18,7 @@ from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.memory_limit import check_room
 from sim.mechanism.shape_contacts import shape_contacts
 from sim.mechanism.shapes import Solid, Sphere
 from sim.simulator.inverse_kinematics import ik
@@ -38,6 +40,7 @@ _ROUGH = 0.5  # friction of an object whose shapes have none
 _TIP = "the ball that pushes"
 
 
+@checked_numbers("problems")
 def push(
     arm: Mechanism | Simulator,
     object: Body,
@@ -94,7 +97,8 @@ def push(
     below = np.append(kin.pose(_TIP, q)[0][:2], 0.0) if at is None else checks.array(f"{_CALL}(at=...)", at, (3,))
     up = (0.0, 0.0, _half(object, np.array([0.0, 0.0, -1.0])))
     forward = way / far
-    horizon = max(5, round(duration / time_step))
+    horizon = max(5, round(min(duration / time_step, 1e300)))
+    check_room(f"{_CALL}(duration=...): knots", horizon, 8.0 * alone.nx, "push in less time, or with longer steps")
     share = np.clip(np.arange(-1.0, horizon + 1.0) / ((1.0 - _REST) * horizon), 0.0, 1.0)
     moved = -_GAP + (far + _GAP) * _smooth(share)
     hand = up - (_half(object, np.array([-1.0, 0.0, 0.0])) + radius) * forward + moved[:, None] * forward

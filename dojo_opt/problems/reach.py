@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.constraint import Frame, Goal, SpeedLimits
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.gaits.equilibrium import input_map, potential_gradient
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.memory_limit import check_room
 from sim.simulator.inverse_kinematics import ik
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
@@ -25,6 +27,7 @@ __all__ = ["reach"]
 _EFFORT = 0.01  # weight of squares of a torque, in units of the largest that holds the arm, beside rates in rad/s
 
 
+@checked_numbers("problems")
 def reach(
     arm: Mechanism | Simulator,
     frame: str,
@@ -75,7 +78,8 @@ def reach(
         raise ValueError(f"problems.reach({frame!r}, target): {found.message}")
     substeps = whole_number("problems.reach(substeps=...)", substeps)
     checks.number("problems.reach(duration=...)", duration, above=0.0)
-    horizon = max(2, round(duration / (time_step * substeps)))
+    horizon = max(2, round(min(duration / (time_step * substeps), 1e300)))
+    check_room("problems.reach(duration=...): knots", horizon, 8.0 * sim.nx, "reach in less time, or with longer steps")
     states = _path(sim, first, found.q, horizon, substeps)
     B = input_map(sim)
     held = np.linalg.lstsq(B, potential_gradient(sim, states[:-1]).T, rcond=None)[0].T
@@ -128,7 +132,7 @@ def _start(sim: Simulator, given: ArrayLike | None) -> Array:
     """The first state."""
     if given is None:
         return sim.neutral()
-    array = np.asarray(given, dtype=np.float64)
+    array = np.asarray(checks.floats("problems.reach(start=...)", given))
     if array.shape == (sim.nq,):
         array = np.concatenate([array, np.zeros(sim.nv)])
     x = np.array(checks.array("problems.reach(start=...)", array, (sim.nx,)))

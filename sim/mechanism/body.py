@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.composite_inertia import composite
+from sim.mechanism.positional import few_positional
 from sim.mechanism.shapes import Solid
 from sim.mechanism.visual import Visual
 
 
+@few_positional
 @dataclass(frozen=True)
 class Body:
     """A rigid body. Its frame has its origin at the centre of mass.
@@ -42,6 +44,7 @@ class Body:
     mass: float = 1.0  # [kg]
     inertia: ArrayLike | None = None
     shape: Solid | Sequence[Solid] | None = None
+    _: KW_ONLY
     visuals: Sequence[Visual] = ()
     gravity_compensation: float = 0.0
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -11,9 +11,11 @@ from sim.mechanism import checks
 from sim.mechanism.body import Body
 from sim.mechanism.contact import LAWS
 from sim.mechanism.joint import WORLD
+from sim.mechanism.positional import few_positional
 from sim.mechanism.shapes import Solid, String
 
 
+@few_positional
 @dataclass(frozen=True)
 class Collision:
     """A collision of bodies a and b: their shapes touch with friction, and do not overlap.
@@ -51,6 +53,7 @@ class Collision:
     b: str | None = None
     shape_a: Solid | None = None
     shape_b: Solid | None = None
+    _: KW_ONLY
     friction: float | None = None
     law: str = "nonlinear"
     name: str = ""  # default: a-b

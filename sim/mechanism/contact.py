@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
+from sim.mechanism.positional import few_positional
 from sim.mechanism.terrain import Terrain
 
 LAWS = ("impact", "linear", "nonlinear")
 
 
+@few_positional
 @dataclass(frozen=True)
 class Contact:
     """A ball on a body that cannot enter the ground, the half-space normal . x < height.
@@ -39,6 +41,7 @@ class Contact:
     body: str
     point: ArrayLike = (0.0, 0.0, 0.0)  # from the centre of mass, body axes [m]
     radius: float = 0.0  # [m]
+    _: KW_ONLY
     friction: float = 0.5
     law: str = "nonlinear"
     normal: ArrayLike = (0.0, 0.0, 1.0)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
 from sim.mechanism import checks
 from sim.mechanism.joint import Joint
+from sim.mechanism.positional import few_positional
 
 
+@few_positional
 @dataclass(frozen=True)
 class Gear:
     """q[joint] = ratio q[other] + offset: toothed wheels, belts, a rack, a mimic joint.
@@ -35,6 +37,7 @@ class Gear:
     other: str
     ratio: float = 1.0
     offset: float = 0.0
+    _: KW_ONLY
     dof: int = 0
     other_dof: int = 0
     name: str = ""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
+from sim.mechanism.positional import few_positional
 
 
+@few_positional
 @dataclass(frozen=True)
 class Input:
     """One entry of u: a force or torque on a joint coordinate, or a wrench on a body at its centre of mass.
@@ -48,6 +50,7 @@ class Input:
 
     joint: str | None = None
     dof: int = 0
+    _: KW_ONLY
     body: str | None = None
     force: ArrayLike = (0.0, 0.0, 0.0)
     torque: ArrayLike = (0.0, 0.0, 0.0)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
+from sim.mechanism.positional import few_positional
 
 WORLD = "world"
 # free translations and free rotations of each kind of joint
@@ -34,6 +35,7 @@ KINDS: dict[str, tuple[int, int]] = {
 }
 
 
+@few_positional
 @dataclass(frozen=True)
 class Joint:
     """A joint: the relative motion of `child` and `parent`.
@@ -89,6 +91,7 @@ class Joint:
     name: str = ""  # default: that of the child
     parent_point: ArrayLike = (0.0, 0.0, 0.0)
     child_point: ArrayLike = (0.0, 0.0, 0.0)
+    _: KW_ONLY
     axis: ArrayLike = (0.0, 0.0, 1.0)
     orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0)
     spring: ArrayLike = 0.0
@@ -102,6 +105,9 @@ class Joint:
     pitch: float = 0.0  # [m/rev]
 
     def __post_init__(self) -> None:
+        swapped = [kind for kind in KINDS if any(isinstance(n, str) and n == kind for n in (self.parent, self.child))]
+        if swapped and self.kind not in list(KINDS):
+            raise ValueError(f"Joint: expected Joint({swapped[0]!r}, parent, child, name), got the kind {self.kind!r}")
         checks.name("Joint(child=...)", self.child)
         object.__setattr__(self, "name", checks.name("Joint(name=...)", self.name or self.child))
         call = f"Joint({self.name!r}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.mechanism import checks
 from sim.mechanism.distances import distances_to_level, distances_to_mesh
 from sim.mechanism.level_set import LevelSet, level_set
+from sim.mechanism.positional import few_positional
 from sim.mechanism.shapes import Primitive, Solid, Stance, rotation_matrix
 from sim.mechanism.short_repr import short_repr
 from sim.model import shape_kinds
@@ -29,6 +30,7 @@ _STAND = 32  # points on which it stands
 _APART = 0.05  # of a cell, within which the balls around two of them are one
 
 
+@few_positional
 @dataclass(frozen=True, eq=False)
 class SignedDistance(Solid):
     """The solid inside of the level set phi = 0 of a field on a grid: phi < 0 inside, phi > 0 outside.
@@ -58,6 +60,7 @@ class SignedDistance(Solid):
     values: ArrayLike
     origin: ArrayLike
     spacing: float
+    _: KW_ONLY
     offset: float = 0.0
 
     __repr__ = short_repr
@@ -202,7 +205,9 @@ class SignedDistance(Solid):
             The shape; its values are the same.
         """
         place = {f: getattr(self, f) for f in ("center", "orientation", "friction", "restitution", "name")}
-        return SignedDistance(self.values, np.asarray(self.origin) - self.centroid, self.spacing, self.offset, **place)
+        return SignedDistance(
+            self.values, np.asarray(self.origin) - self.centroid, self.spacing, offset=self.offset, **place
+        )
 
     @cached_property
     def _moments(self) -> tuple[float, Floats, Floats]:

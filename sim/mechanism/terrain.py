@@ -11,7 +11,7 @@ and is computed once for every radius (ball_surface.py): kernels then know point
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.ball_surface import raised
+from sim.mechanism.positional import few_positional
 from sim.mechanism.short_repr import short_repr
 from sim.mechanism.spline import spline, spline_coefficients, spline_gradient, spline_shares
 
@@ -28,6 +29,7 @@ _EDGE = 16  # grid lines across an edge of a step
 _MARGIN = 8  # level grid lines around kinks: the waves of a spline fade by .27 per line
 
 
+@few_positional
 @dataclass(frozen=True, eq=False)
 class Terrain:
     """Ground for contacts: `mechanism.on(terrain)` for all, or Contact(..., terrain=...) for one.
@@ -56,6 +58,7 @@ class Terrain:
     heights: ArrayLike = ((0.0,),)
     origin: ArrayLike = (0.0, 0.0)
     spacing: ArrayLike = (1.0, 1.0)
+    _: KW_ONLY
     direction: ArrayLike = (1.0, 0.0)
     plane: tuple[Any, float] | None = None
     name: str = "ground"
@@ -172,7 +175,7 @@ class Terrain:
         heights = (t**3 * (10.0 - 15.0 * t + 6.0 * t**2)) @ jumps
         u, w = _heading(f"{call}(direction=...)", direction)
         place = start + s[0]
-        return Terrain(heights[:, None], (place * u, place * w), (dx, 1.0), (u, w))
+        return Terrain(heights[:, None], (place * u, place * w), (dx, 1.0), direction=(u, w))
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Floats:
         """Height of the ground.
@@ -298,7 +301,7 @@ class Terrain:
         heights, arm = raised(self.coefficients, spacing, here, radius)
         x, y = (-p * d for p, d in zip(pads, spacing, strict=True))
         start = np.asarray(self.origin) + x * direction + y * np.array([-direction[1], direction[0]])
-        return Terrain(heights, start, spacing, direction, name=self.name), (here + arm) / spacing
+        return Terrain(heights, start, spacing, direction=direction, name=self.name), (here + arm) / spacing
 
     @property
     def bounds(self) -> tuple[float, float]:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
+from sim.mechanism.positional import few_positional
 from sim.mechanism.shapes import Solid
 from sim.mechanism.short_repr import short_repr
 
 STEEL = (0.56, 0.64, 0.72)  # colour of parts without one
 
 
+@few_positional
 @dataclass(frozen=True)
 class Visual:
     """A shape, the mesh of a file, or triangles, placed in a body.
@@ -33,6 +35,7 @@ class Visual:
     """
 
     shape: Solid | None = None
+    _: KW_ONLY
     mesh: str = ""
     triangles: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None
     scale: ArrayLike = (1.0, 1.0, 1.0)

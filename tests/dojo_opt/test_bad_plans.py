@@ -28,6 +28,10 @@ def study(**settings):
     return dojo.monte_carlo(**{**given, "duration": 0.1, "runs": 1, **settings})
 
 
+def reach(frame, **settings):
+    return dojo.problems.reach(dojo.models.panda(), frame, (0.4, 0.0, 0.4), **settings)
+
+
 def goal(x):
     return problem(constraints=dojo.constraint.Goal(x))
 
@@ -54,21 +58,34 @@ CALLS = {
     "warm start from a file name": (lambda: dojo.ilqr(HOP, warm_start="plan.npz"), "ilqr(warm_start=...)", "plan.npz"),
     "options of mpc": (lambda: dojo.MPC(HOP, options=3), "MPC(options=...)", "3"),
     "target in space": (lambda: dojo.problems.hop(target=(0.5, 0.5, 0.5)), "problems.hop(target=...)", "(2,)", "(3,)"),
+    "start as a word": (lambda: reach("link7", start="up"), "start=...", "up"),
+    "foot of a number": (lambda: dojo.problems.trot(dojo.models.quadruped(), feet=3.0), "Legs(feet=...)", "3.0"),
+    "goal of a block": (lambda: dojo.problems.block([1.0]), "problems.block(goal=...)", "[1.0]"),
+    "edge without a length": (lambda: dojo.problems.block(edge=None), "models.block(edge=...)", "None"),
+    "edge beyond floats": (lambda: dojo.problems.block(edge=1e300), "edge=1e+300): numbers", "overflow"),
+    "swing of a number": (lambda: dojo.problems.swingup(np.zeros(3)), "problems.swingup(name)", "cartpole"),
+    "leap of years": (lambda: dojo.problems.leap(duration=1e9), "problems.leap(duration=...)", "GiB"),
+    "rest of years": (lambda: dojo.problems.jump(after=1e9), "gaits.jump: time steps", "GiB"),
+    "gait of a number": (lambda: dojo.problems.follow(3.0), "problems.follow(gait)", "3.0"),
+    "weight as a word": (lambda: dojo.problems.trot(place="near"), "problems.follow(place=...)", "near"),
+    "effort below zero": (lambda: dojo.problems.trot(effort=-1.0), "problems.follow(effort=...)", "-1"),
+    "limits of a number": (lambda: dojo.problems.trot(control_limits=3.0), "control_limits=...", "3.0"),
+    "periodic as a table": (lambda: dojo.problems.trot(periodic={"a": 1}), "problems.follow(periodic=...)", "'a'"),
     "no substeps": (lambda: dojo.problems.hop(substeps=0), "problems.hop(substeps=...)", "0"),
     "trot of a block": (lambda: dojo.gaits.trot(dojo.problems.block().sim), "gaits.trot(sim)", "legs", "block"),
     "trot of a model": (lambda: dojo.gaits.trot("quadruped"), "gaits.trot(sim)", "'quadruped'"),
-    "speed as a word": (lambda: dojo.problems.trot(speed="fast"), "gaits.trot(speed=...)", "fast"),
-    "speed nan": (lambda: dojo.problems.trot(speed=np.nan), "gaits.trot(speed=...)", "nan"),
+    "speed as a word": (lambda: dojo.problems.trot(speed="fast"), "problems.trot(speed=...)", "fast"),
+    "speed nan": (lambda: dojo.problems.trot(speed=np.nan), "problems.trot(speed=...)", "nan"),
     "unknown keyword": (lambda: dojo.problems.trot(sped=0.1), "gaits.trot(...)", "'sped'", "'speed'"),
     "duty as a word": (lambda: dojo.problems.walk(duty="half"), "gaits.walk(duty=...)", "half"),
     "tilt nan": (lambda: dojo.problems.bound(tilt=np.nan), "gaits.bound(tilt=...)", "nan"),
-    "height as a word": (lambda: dojo.problems.trot(height="high"), "gaits.trot(height=...)", "high"),
+    "height as a word": (lambda: dojo.problems.trot(height="high"), "problems.trot(height=...)", "high"),
     "stand at a word": (lambda: dojo.gaits.stand(QUADRUPED, height="low"), "gaits.stand(height=...)", "low"),
-    "half a link": (lambda: dojo.models.npendulum(2.5), "npendulum(n)", "whole number >= 1", "2.5"),
+    "half a link": (lambda: dojo.models.npendulum(2.5), "npendulum(n", "whole number", "2.5"),
     "half a cycle": (lambda: dojo.problems.walk(cycles=0.5), "gaits.walk(cycles=...)", "0.5"),
     "leap of a word": (lambda: dojo.problems.leap(distance="far"), "problems.leap(distance=...)", "far"),
     "height nan": (lambda: dojo.problems.leap(height=np.nan), "problems.leap(height=...)", "nan"),
-    "distance as a word": (lambda: dojo.problems.jump(distance="far"), "gaits.jump(distance=...)", "far"),
+    "distance as a word": (lambda: dojo.problems.jump(distance="far"), "problems.jump(distance=...)", "far"),
     "refinement of a jump": (lambda: dojo.problems.jump(refinement=0), "problems.jump(refinement=...)", ">= 1", "0"),
     "no substeps of a gait": (lambda: dojo.problems.trot(substeps=0), "problems.follow(substeps=...)", ">= 1", "0"),
     **{f"leap with {name}": (lambda name=name, bad=bad: dojo.problems.leap(**{name: bad}),

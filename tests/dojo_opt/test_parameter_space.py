@@ -20,7 +20,7 @@ def matrix(entries: np.ndarray) -> np.ndarray:
 
 def block(friction: float = 0.5, inertia: np.ndarray = INERTIA, mass: float = 2.0) -> dojo.Simulator:
     """A block that is thrown about by a force and a torque, on four feet."""
-    feet = [dojo.Contact("block", (x, y, -0.1), 0.02, friction) for x in (-0.2, 0.2) for y in (-0.1, 0.1)]
+    feet = [dojo.Contact("block", (x, y, -0.1), 0.02, friction=friction) for x in (-0.2, 0.2) for y in (-0.1, 0.1)]
     inputs = [dojo.Input(body="block", force=e) for e in np.eye(3)]
     inputs += [dojo.Input(body="block", torque=e) for e in np.eye(3)]
     body = dojo.Body("block", mass, matrix(inertia))

@@ -116,7 +116,7 @@ def arm_by_hand(kind: str, damper: float) -> dojo.Mechanism:
         dojo.Joint("spherical", "a", "b", parent_point=x, child_point=-y),
         dojo.Joint("spherical", "b", "c", parent_point=y, child_point=z),
         dojo.Joint(
-            kind, None, "c", "end", (0.5, 0.5, -0.5), -z, roll_pitch_yaw((0.3, -0.4, 0.5)) @ (0.6, 0, 0.8),
+            kind, None, "c", "end", (0.5, 0.5, -0.5), -z, axis=roll_pitch_yaw((0.3, -0.4, 0.5)) @ (0.6, 0, 0.8),
             damper=damper, close=True,
         ),
     ]  # fmt: skip

@@ -80,7 +80,7 @@ def ring(kind: str, **action: Any) -> Mechanism:
         at = np.array(corners[k])
         joints.append(Joint("spherical", f"b{k - 1}", f"b{k}", "", at - centres[k - 1], at - centres[k]))
     at = np.array(corners[0])
-    last = Joint(kind, "b3", "b0", "last", at - centres[3], at - centres[0], (0.6, 0.0, 0.8), close=True, **action)
+    last = Joint(kind, "b3", "b0", "last", at - centres[3], at - centres[0], axis=(0.6, 0.0, 0.8), close=True, **action)
     return Mechanism(bodies, [*joints, last], gravity=(0, 0, 0))
 
 

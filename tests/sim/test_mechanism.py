@@ -103,7 +103,7 @@ def test_packed_numbers() -> None:
             hip(limits=(-1.0, INF), spring=3.0, damper=0.2, rest=0.1, axis=(0, 2, 0), parent_point=(0, 0, -1)),
         ],
         contacts=[
-            Contact("leg", (0, 0, -0.5), 0.05, 0.7, height=0.1),
+            Contact("leg", (0, 0, -0.5), 0.05, friction=0.7, height=0.1),
             Contact("leg", friction=0.0),
             Contact("torso", law="linear"),
         ],

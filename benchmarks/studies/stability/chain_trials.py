@@ -32,7 +32,7 @@ def rods(
             continue
         above = (0.0, 0.0, -lengths[i - 1] / 2.0) if i else (0.0, 0.0, 0.0)
         parent, below = f"rod_{i - 1}" if i else None, (0.0, 0.0, length / 2.0)
-        hinge = Joint("revolute", parent, f"rod_{i}", "", above, below, (0.0, 1.0, 0.0), damper=damper)
+        hinge = Joint("revolute", parent, f"rod_{i}", "", above, below, axis=(0.0, 1.0, 0.0), damper=damper)
         joints.append(hinge)
     touching = [Contact(f"rod_{i}", radius=length / 4.0) for i, length in enumerate(lengths)] if floating else []
     return Mechanism(bodies, joints, touching, inputs=[])

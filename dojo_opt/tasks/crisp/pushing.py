@@ -68,7 +68,9 @@ def slider(
                 body=name, force=force, torque=torque, frame="body", limits=(0.0, np.inf), name=f"face {k} {end}"
             )
             inputs.append(push)
-    contacts = [Contact(name, (x, y, 0.0), 0.0, friction, name=f"corner {k}") for k, (x, y) in enumerate(corners)]
+    contacts = [
+        Contact(name, (x, y, 0.0), 0.0, friction=friction, name=f"corner {k}") for k, (x, y) in enumerate(corners)
+    ]
     return Mechanism(
         [Body(name, mass, inertia * np.diag([0.6, 0.6, 1.0]))],
         [Joint("floating", None, name)],

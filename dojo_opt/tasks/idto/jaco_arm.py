@@ -112,7 +112,7 @@ class Arms(NamedTuple):
             The contacts, in the order of `spheres`.
         """
         return [
-            Contact(link, point, size, friction, name=f"{link}:{k} on ground")
+            Contact(link, point, size, friction=friction, name=f"{link}:{k} on ground")
             for k, (link, point, size) in enumerate(self.spheres)
         ]
 

@@ -90,7 +90,7 @@ def mechanism(friction: float, terrain: Terrain | None = None) -> Mechanism:
             f"{leg}_shank",
             from_com(links, f"{leg}_shank", (0.0, 0.0, -0.19)),
             0.0175,
-            friction,
+            friction=friction,
             name=f"{leg}_foot",
             terrain=terrain,
         )

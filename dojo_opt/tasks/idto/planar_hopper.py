@@ -56,8 +56,8 @@ def mechanism(friction: float, servos: bool = False) -> Mechanism:
         Joint("revolute", "leg", "foot", parent_point=(0.0, 0.0, -0.2), child_point=(-0.05, 0.0, 0.0), **hinge),
     ]
     balls = [
-        Contact("foot", (0.1, 0.0, 0.0), _RADIUS, friction, name="toe"),
-        Contact("foot", (-0.1, 0.0, 0.0), _RADIUS, friction, name="heel"),
+        Contact("foot", (0.1, 0.0, 0.0), _RADIUS, friction=friction, name="toe"),
+        Contact("foot", (-0.1, 0.0, 0.0), _RADIUS, friction=friction, name="heel"),
     ]
     neutral: dict[str, Any] = {"torso": (0.0, 0.61, 0.3), "leg": -0.5, "foot": 0.2}
     inputs = [Input("leg", name="knee"), Input("foot", name="ankle")]
