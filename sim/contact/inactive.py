@@ -115,7 +115,7 @@ def choose_active(model: Model, data: Data, options: StepOptions) -> None:
         _enlist(model, data, c)
         c = model.cluster_end[c]
     data.active_count[0] = data.active_ground_count[0]
-    data.inactive_share[0] = options.tolerance / max(1, data.inactive_count[0])
+    data.inactive_tolerance[0] = options.tolerance / max(1, data.inactive_count[0])
 
 
 @kernel

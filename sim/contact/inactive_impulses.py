@@ -51,7 +51,7 @@ def changes(model: Model, data: Data, h: float, c: int) -> tuple[float, float]:
 @kernel
 def update_inactive(model: Model, data: Data, h: float) -> None:
     """Impulses of the inactive clusters at configuration 3, to a share of the tolerance: turned or evaluated again."""
-    fraction = data.inactive_share[0]
+    fraction = data.inactive_tolerance[0]
     for m in range(data.inactive_count[0]):
         c = data.inactive_first[m]
         law, arms = changes(model, data, h, c)

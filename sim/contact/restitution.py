@@ -118,7 +118,7 @@ def find_impacts(model: Model, data: Data, h: float) -> None:
     for c in range(data.bounce.shape[0]):
         data.bounce[c, Bounce.FLOOR] = 0.0
         data.bounce[c, Bounce.RESTITUTION] = 0.0
-    data.bounce_share[0] = 1.0
+    data.rebound_part[0] = 1.0
     look_back(model, data, h, 1)
     look_back(model, data, h, 2)
     raise_floors(model, data, h, 1.0)
@@ -189,11 +189,11 @@ def impacts_gained(model: Model, data: Data, h: float) -> bool:
         rebound += 0.5 * fn * b[Bounce.RESTITUTION] * abs(b[Bounce.GAP2] - b[Bounce.GAP1]) / h
     if not rebound > 0.0 or not gain > _NOISE * size:
         return False
-    least = max(gain / rebound, 2.0 * (1.0 - data.bounce_share[0]))
+    least = max(gain / rebound, 2.0 * (1.0 - data.rebound_part[0]))
     lost = _FINEST
     while lost < least:
         lost *= 2.0
     remaining = max(1.0 - lost, 0.0)
-    data.bounce_share[0] = remaining
+    data.rebound_part[0] = remaining
     raise_floors(model, data, h, remaining)
     return True

@@ -6,16 +6,21 @@ from sim.dynamics.elimination import add_children
 from sim.model.data import Data
 from sim.model.model import InputKind, Model
 from solvers.compiler import kernel
-from solvers.dense import copy, dot
+from solvers.dense import clear, copy, dot
 from solvers.rotation import cross, rotate
 from solvers.types import Cube, Matrix, Vector
 
 
 @kernel
 def set_external(data: Data, wrenches: Cube, t: int) -> None:
-    """data.carry.external = wrenches[t], of (T, nbody, 6); without any, (0, nbody, 6), it stays zero."""
+    """data.carry.external = wrenches[t] (nbody, 6), of all steps or nodes; zero of (0, nbody, 6).
+
+    External wrenches enter here and nowhere else, before a step begins or a node is evaluated.
+    """
     if wrenches.shape[0] > 0:
         copy(wrenches[t], data.carry.external)
+    else:
+        clear(data.carry.external)
 
 
 @kernel

@@ -40,7 +40,7 @@ from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.record_columns import Apart, StepReport
 from solvers.compiler import Table, kernel
-from solvers.dense import clear, copy_vector
+from solvers.dense import copy_vector
 from solvers.status import Status
 from solvers.types import Vector
 
@@ -74,7 +74,6 @@ def stand(models: Table, works: Table, line: SubstepState, goal: Vector) -> floa
     model, data = model_view(models[0]), data_view(works[1])
     nq = data.theta1.shape[0]
     if line.clock[Clock.READY] == 0.0:
-        clear(data.carry.external)
         begin_node(model, data, line.x)
         set_external(data, line.wrench, 0)
         line.clock[Clock.READY] = 1.0

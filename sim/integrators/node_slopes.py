@@ -20,8 +20,8 @@ from solvers.types import Cube, Matrix, Vector
 
 
 @kernel
-def _evaluate(model: Model, data: Data, x: Vector, moving: bool) -> None:
-    """Configuration 2 and momenta of the node x = (q, v), or at rest there; wrenches from outside are cleared."""
+def _evaluate(model: Model, data: Data, x: Vector, wrenches: Cube, moving: bool) -> None:
+    """Configuration 2 and momenta of the node x = (q, v), or at rest there, and the wrenches (1 or 0, nbody, 6)."""
     nq = data.theta1.shape[0]
     for k in range(nq):
         data.theta1[k] = x[k]
@@ -30,7 +30,7 @@ def _evaluate(model: Model, data: Data, x: Vector, moving: bool) -> None:
         data.nu_trial[d] = data.nu[d] = x[nq + d] if moving else 0.0
     momenta_of_velocity(model, data, data.nu_trial, data.rhs)
     clear(data.balance)
-    clear(data.carry.external)
+    set_external(data, wrenches, 0)
 
 
 @kernel
@@ -45,20 +45,19 @@ def node_slopes(
     data = data_view(data_at)
     for k in range(3):
         data.origin[k] = 0.0
-    _evaluate(model, data, x, False)
+    _evaluate(model, data, x, wrench[:0], False)
     outer_wrenches(model, data, u[:0], data.balance)
     if not slopes_at(model, data, u[:0], out):
         return False
     for d in range(f_q.shape[0]):
         for k in range(f_q.shape[1]):
             f_q[d, k] = -out.f_q[d, k]
-    _evaluate(model, data, x, False)
-    set_external(data, wrench, 0)
+    _evaluate(model, data, x, wrench, False)
     outer_wrenches(model, data, u, data.balance)
     if not slopes_at(model, data, u, out):
         return False
     for d in range(f_q.shape[0]):
         for k in range(f_q.shape[1]):
             f_q[d, k] += out.f_q[d, k]
-    _evaluate(model, data, x, True)
+    _evaluate(model, data, x, wrench[:0], True)
     return slopes_at(model, data, u, out)

@@ -25,7 +25,7 @@ from sim.model.record_columns import StepReport
 from sim.solve.start_velocity import interval, start_state
 from sim.step import step
 from solvers.compiler import Table, kernel
-from solvers.dense import clear, copy_vector
+from solvers.dense import copy_vector
 from solvers.status import Status
 from solvers.types import Integers, Matrix, Vector
 
@@ -93,7 +93,6 @@ def roll_phases(models: Table, works: Table, settings: Vector, path: Phases, fir
         report, stays, status = path.motion.reports[t], t > 0 and path.near[t - 1] == 1, NEAR
         if path.flies:
             if t == 0 or stays:
-                clear(data.carry.external)
                 runge_kutta.begin(flight, data, path.xs[t])
             status = fly(flight, data, settings, path.motion, path.xs[t], path.xs[t + 1], t)
         if status == NEAR:

@@ -103,7 +103,6 @@ def begin(data: Data) -> None:
     clear(carry.cone_step)
     clear(carry.bound_step)
     clear(carry.dry_step)
-    clear(carry.external)
     for row in range(carry.couple_force.shape[0]):
         carry.couple_force[row] = 0.0
 

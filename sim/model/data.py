@@ -98,6 +98,7 @@ class Data(NamedTuple):
     couple_order: Integers  # (ncouple,) the active ones in the order of their elimination
     couple_count: Integers  # (1,) their number
     couple_degree: Integers  # (ncouple,) scratch, by place in that order
+    couple_dof: Integers  # (nv,) scratch: the coordinates that one of them moves
     couple_linked: IntegerMatrix  # (ncouple, ncouple) 1 where one appears in the equations of another, likewise
     couple_start: Integers  # (ncouple + 1,) first row, likewise
     node_count: Integers  # (1,)
@@ -107,7 +108,7 @@ class Data(NamedTuple):
     strategy_solves: Integers  # (64,) solutions by start strategy (solve/globalization.py) since the Data was made
     overlap_allowed: Integers  # (1,) 1 where a small overlap in other features is accepted
     inactive: Matrix  # (nground, 38) Inactive, see contact/inactive.py
-    inactive_share: Vector  # (1,) change of a cluster's impulses below which they stand [N s]
+    inactive_tolerance: Vector  # (1,) change of a cluster's impulses below which they stand [N s]
     # contacts
     cone: Matrix  # (ncontact, 12) cone variables: Cone or Pyramid
     cone_trial: Matrix  # (ncontact, 12)
@@ -115,7 +116,7 @@ class Data(NamedTuple):
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the ground, world axes
     contact_turn: Matrix  # (nground, 18) on terrain, rotation of the frame by the twist
     bounce: Matrix  # (ncontact, 22) Bounce, see contact/restitution.py
-    bounce_share: Vector  # (1,)
+    rebound_part: Vector  # (1,) of the rebounds that restitution asks for, 1 unless all of them would gain energy
     contact_W: Matrix  # (ncontact, 9) d(impulse)/d(gap, slip), contact frame
     contact_hard: Vector  # (1,) hardest contact of the last derivatives, see contact/softening.py
     contact_w: Matrix  # (ncontact, 3) constant part of the same
@@ -132,7 +133,7 @@ class Data(NamedTuple):
     pair_change: Vector  # (1,) bound of the change of their wrenches per displacement, 0 where there are none
     inactive_pose: Matrix  # (nbody, 7) poses where the inactive collisions were evaluated
     inactive_wrench: Matrix  # (nbody, 6) their wrenches about O
-    pair_share: Matrix  # (npair, 2) PairShare: the part of the impulse that acts
+    pair_fade: Matrix  # (npair, 2) PairFade: the part of the impulse that acts
     pair_clear: Vector  # (npair,) at its first pair: last measured distance of the shapes, plus Way.BEFORE then [m]
     pair_margin: Vector  # (1,) sum of Way of two bodies up to which no other collision comes within its reach [m]
     body_way: Matrix  # (nbody, 9) Way

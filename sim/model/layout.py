@@ -72,7 +72,8 @@ DATA_INTS = _shapes(
     loop_used nrow, reach_of nreach,
     coupling_live ncoupling, near_count 1, near_first npair,
     couple_live nrow 2, couple_seen ncouple, couple_order ncouple, couple_count 1, node_count 1, couple_degree ncouple,
-    couple_linked ncouple ncouple, couple_start ncouple+1, node_row ncouple+1, node_span ncouple ncouple+2
+    couple_dof nv, couple_linked ncouple ncouple, couple_start ncouple+1, node_row ncouple+1,
+    node_span ncouple ncouple+2
     """
 )
 
@@ -87,14 +88,14 @@ DATA_FLOATS = _shapes(
     articulated 6nbody 8, U nv 6, L nv 8, D nbody 37,
     joint_block nbody 36, rotor nv, z nv, twist nbody 6, cone ncontact 12, cone_trial ncontact 12,
     contact_kin ncontact 27, contact_frame nground 9,
-    contact_turn nground 18, bounce ncontact 22, bounce_share 1,
+    contact_turn nground 18, bounce ncontact 22, rebound_part 1,
     contact_W ncontact 9, contact_hard 1, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
      bound_trial nlimit 2, dry ndry 4, dry_trial ndry 4, dry_move ndry 2, dry_w ndry 3, dry_drive ndry 3,
     bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
     shape_pos 2npair 3, shape_rot 2npair 9, pair_relative npair 12, pair_out npair 43,
     pair_frame npair 12, pair_trial 1 43,
     pair_before npair 13, pair_activation npair, pair_travel 1, pair_evaluated 1, pair_change 1,
-    inactive_pose nbody 7, inactive_wrench nbody 6, pair_share npair 2, pair_clear npair, pair_margin 1,
+    inactive_pose nbody 7, inactive_wrench nbody 6, pair_fade npair 2, pair_clear npair, pair_margin 1,
     body_way nbody 9, pair_apart npair 2,
     pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
@@ -108,7 +109,7 @@ DATA_FLOATS = _shapes(
     triangles nv nwide, triangle_across 12 nwide,
     dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel,
     step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 6, loop_clock 2,
-    inactive nground 38, inactive_share 1,
+    inactive nground 38, inactive_tolerance 1,
     reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach,
     held_x 2 high_state, held_u high_nu, held_momenta high_nv, momenta high_nv, stage_shift high_nv,
     stage_momenta high_nv, stage_dr nstage high_nv, stage_dp nstage high_nv, slope_p_q high_nv high_nv,

@@ -187,8 +187,8 @@ class PairBound(Code):
     REACH = 7  # gap from which there is no force, infinite for most
 
 
-class PairShare(Code):
-    """pair_share: the part w of the impulse of a pair that acts within a reach (pairs/limited_reach.py)."""
+class PairFade(Code):
+    """pair_fade: the part w of the impulse of a pair that acts within a reach (pairs/limited_reach.py)."""
 
     PART = 0
     RATE = 1  # d(log w)/d(gap)

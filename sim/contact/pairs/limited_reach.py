@@ -21,7 +21,7 @@ from math import sqrt
 from sim.contact.inactive_bounds import ANGLE
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import PairBound, PairShare, Way, Witness
+from sim.model.record_columns import PairBound, PairFade, Way, Witness
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, rotate
 
@@ -32,25 +32,25 @@ _HALF_ANGLE = 3.2  # an angle is at most so many times the sine of its half
 
 
 @kernel
-def fit_share(model: Model, data: Data, j: int) -> None:
-    """pair_share of pair j at its present gap."""
+def fit_fade(model: Model, data: Data, j: int) -> None:
+    """pair_fade of pair j at its present gap."""
     reach = model.pair_far[j - model.pair_feature[j], PairBound.REACH]
-    fade = data.pair_share[j]
-    fade[PairShare.PART], fade[PairShare.RATE] = 1.0, 0.0
+    fade = data.pair_fade[j]
+    fade[PairFade.PART], fade[PairFade.RATE] = 1.0, 0.0
     t = 2.0 * data.pair_out[j, Witness.GAP] / reach - 1.0
     if t >= 1.0:
-        fade[PairShare.PART] = 0.0
+        fade[PairFade.PART] = 0.0
     elif t > 0.0:
         w = 1.0 - t * t * t * (10.0 + t * (6.0 * t - 15.0))
-        fade[PairShare.PART] = w
+        fade[PairFade.PART] = w
         if w > 1e-12:  # below, it is rounding
-            fade[PairShare.RATE] = -60.0 * t * t * (1.0 - t) * (1.0 - t) / (reach * w)
+            fade[PairFade.RATE] = -60.0 * t * t * (1.0 - t) * (1.0 - t) / (reach * w)
 
 
 @kernel
-def with_share(data: Data, j: int, gap: float, rate: Vec3, p: Vec3) -> Vec3:
+def with_fade(data: Data, j: int, gap: float, rate: Vec3, p: Vec3) -> Vec3:
     """d(w p)/w of the impulse p of pair j: `rate` by its law, and that of the part which acts, as its gap changes."""
-    s = data.pair_share[j, PairShare.RATE] * gap
+    s = data.pair_fade[j, PairFade.RATE] * gap
     return rate[0] + s * p[0], rate[1] + s * p[1], rate[2] + s * p[2]
 
 

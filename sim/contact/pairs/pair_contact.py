@@ -18,13 +18,13 @@ from math import cos, sin
 from sim.contact.collision.collide import collide_chosen
 from sim.contact.pairs.active_features import choose_shapes
 from sim.contact.pairs.cylinder_pairs import collide_cylinders, on_cylinder
-from sim.contact.pairs.limited_reach import fit_share
+from sim.contact.pairs.limited_reach import fit_fade
 from sim.contact.pairs.pair_pose import place_shapes
 from sim.contact.pairs.taut_string import is_taut, pull_from_before, string_arm
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice
-from sim.model.record_columns import Kin, PairFrame, PairShare, Witness
+from sim.model.record_columns import Kin, PairFade, PairFrame, Witness
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, rotate, three, transposed_times
@@ -119,7 +119,7 @@ def point_kinematics(model: Model, data: Data, h: float, j: int) -> None:
     ax, ay, az = point_velocity(data, h, a, *three(F, PairFrame.POINT))
     bx, by, bz = point_velocity(data, h, b, *three(F, PairFrame.POINT))
     x, y, z = ax - bx, ay - by, az - bz
-    fit_share(model, data, j)
+    fit_fade(model, data, j)
     kin = data.contact_kin[model.contact_height.shape[0] + j]
     kin[Kin.GAP] = 1.0 if is_absent(data, j) else g[Witness.GAP]
     kin[Kin.SLIP1] = F[3] * x + F[4] * y + F[5] * z
@@ -181,7 +181,7 @@ def gap_normal(model: Model, data: Data, j: int) -> Vec3:
 @kernel
 def pair_force(data: Data, j: int, fn: float, f1: float, f2: float) -> Vec3:
     """w (n fn + t1 f1 + t2 f2), w the part that acts within the reach of the collision (limited_reach.py)."""
-    w = data.pair_share[j, PairShare.PART]
+    w = data.pair_fade[j, PairFade.PART]
     return transposed_times(data.pair_frame[j], w * fn, w * f1, w * f2)
 
 

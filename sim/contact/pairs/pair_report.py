@@ -7,7 +7,7 @@ from sim.contact.pairs.limited_reach import BEYOND, end_of
 from sim.contact.pairs.pair_contact import is_absent
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import ContactRow, PairShare, Witness
+from sim.model.record_columns import ContactRow, PairFade, Witness
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.dense import is_finite
@@ -46,7 +46,7 @@ def _report(model: Model, data: Data, first: int, end: int, out: Matrix) -> None
     for j in range(first, end):
         c = model.contact_height.shape[0] + j
         report_contact(model, data, c, data.pair_frame[j], out[c])
-        w = data.pair_share[j, PairShare.PART]
+        w = data.pair_fade[j, PairFade.PART]
         for e in range(3):
             out[c, e] *= w
         if is_absent(data, j):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from sim.contact.contact_law import condense_contact, contact_constant, contact_error, contact_impulse
 from sim.contact.pairs.inactive_pairs import add_inactive_pairs
-from sim.contact.pairs.limited_reach import with_share
+from sim.contact.pairs.limited_reach import with_fade
 from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
 from sim.contact.pairs.pair_jacobian import pair_jacobian
 from sim.contact.pairs.taut_string import is_taut
@@ -35,7 +35,7 @@ def impulse_rate(data: Data, c: int, j: int, C: Vector, k: int, p: Vec3) -> Vec3
         W[3] * x + W[4] * y + W[5] * z,
         W[6] * x + W[7] * y + W[8] * z,
     )
-    return with_share(data, j, x, rate, p)
+    return with_fade(data, j, x, rate, p)
 
 
 @kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sim.contact.collision.witness import NOWHERE, dot
 from sim.contact.contact_law import contact_impulse
-from sim.contact.pairs.limited_reach import with_share
+from sim.contact.pairs.limited_reach import with_fade
 from sim.contact.pairs.pair_contact import POLE, is_absent, pair_force, shape_b
 from sim.contact.pairs.taut_string import is_taut
 from sim.contact.pairs.wrench_columns import unit_vector
@@ -94,7 +94,7 @@ def add_moved_shape(
     gap = dot(row(F, 0), z)
     q = contact_impulse(model, data, c)
     g = impulse_change(data, c, gap - floor, dot(row(F, 3), v), dot(row(F, 6), v))
-    g = with_share(data, j, gap, g, q)
+    g = with_fade(data, j, gap, g, q)
     df = pair_force(data, j, g[0], g[1], g[2])
     f = pair_force(data, j, q[0], q[1], q[2])
     x = cross(turn[0], turn[1], turn[2], f[0], f[1], f[2])

@@ -182,17 +182,28 @@ def solve_coupling(model: Model, data: Data, gap_fraction: float, out: Vector) -
 
 
 @kernel
-def _add_answers(model: Model, data: Data, m: int, out: Vector) -> None:
-    """out (nv,) += the answers to the forces of the rows at place m."""
-    k = data.couple_order[m]
-    first, n = data.couple_start[m], data.couple_start[m + 1] - data.couple_start[m]
+def _moved_dofs(model: Model, data: Data, k: int) -> int:
+    """couple_dof: the coordinates that impulses of coupling k move; their number."""
+    n = 0
     for side in range(2):
         tree = moved_tree(model, k, side)
         for i in range(tree.begin, tree.end):
             if in_tree(model, tree, i):
                 for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-                    for e in range(n):
-                        out[d] += data.couple_x[first + e, 0] * data.couple_Y[d, LANES * k + e]
+                    data.couple_dof[n] = d
+                    n += 1
+    return n
+
+
+@kernel
+def _add_answers(model: Model, data: Data, m: int, out: Vector) -> None:
+    """out (nv,) += the answers to the forces of the rows at place m."""
+    k = data.couple_order[m]
+    first, n = data.couple_start[m], data.couple_start[m + 1] - data.couple_start[m]
+    for p in range(_moved_dofs(model, data, k)):
+        d = data.couple_dof[p]
+        for e in range(n):
+            out[d] += data.couple_x[first + e, 0] * data.couple_Y[d, LANES * k + e]
 
 
 @kernel
@@ -224,12 +235,9 @@ def _add_answers_to_columns(model: Model, data: Data, m: int, c: int) -> None:
     """columns[:, c : c + LANES] += the answers to the forces of the rows at place m."""
     k = data.couple_order[m]
     first, n = data.couple_start[m], data.couple_start[m + 1] - data.couple_start[m]
-    for side in range(2):
-        tree = moved_tree(model, k, side)
-        for i in range(tree.begin, tree.end):
-            if in_tree(model, tree, i):
-                for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-                    x = load(data.columns, d, c)
-                    for e in range(n):
-                        x = x + data.couple_Y[d, LANES * k + e] * load(data.couple_x, first + e, 0)
-                    store(data.columns, d, c, x)
+    for p in range(_moved_dofs(model, data, k)):
+        d = data.couple_dof[p]
+        x = load(data.columns, d, c)
+        for e in range(n):
+            x = x + data.couple_Y[d, LANES * k + e] * load(data.couple_x, first + e, 0)
+        store(data.columns, d, c, x)
