@@ -70,7 +70,7 @@ def whole_numbers(call: str, value: Any) -> NDArray[np.int64]:
     return out
 
 
-def finite(values: Floats) -> bool:
+def all_finite(values: Floats) -> bool:
     """Whether all entries are finite numbers."""
     # the sum of squares shows it at a third of the cost, without a warning, unless it overflows itself; of long arrays
     # BLAS takes it with threads, which cost more than they gain, and milliseconds where other processes have the cores
@@ -85,7 +85,7 @@ def array(call: str, value: Any, shape: tuple[int | str | None, ...]) -> Floats:
     fits = out.shape == shape or (
         out.ndim == len(shape) and all(not isinstance(n, int) or n == m for n, m in zip(shape, out.shape, strict=True))
     )
-    if fits and finite(out):
+    if fits and all_finite(out):
         return out
     if not fits:
         wanted = ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "")
@@ -250,6 +250,6 @@ def whole_number(call: str, value: Any, least: int = 1) -> int:
 def within_range(call: str, result: Any) -> Floats:
     """A result of finite arguments, refused where it has overflowed."""
     out = np.asarray(result)
-    if not finite(out):
+    if not all_finite(out):
         raise ValueError(f"{call}: the result is not finite: an argument is too large")
     return out

@@ -15,7 +15,7 @@ from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory_limit import check_room
 from sim.model.state_columns import BodyState
-from sim.simulator.engine import CONTACT, REPORT, Engine
+from sim.simulator.engines.engine import CONTACT, REPORT, Engine
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
@@ -40,7 +40,7 @@ class Arguments:
     def states(self, call: str, xs: ArrayLike) -> Floats:
         """A copy of the states (..., nx), with quaternions of length one."""
         out = np.array(xs, dtype=np.float64, order="C")
-        bad = self._engine.normalise(out.reshape(-1, self.nx), UNIT)
+        bad = self._engine.states.normalise(out.reshape(-1, self.nx), UNIT)
         if bad >= 0:
             row, body = divmod(bad, self.nbody)
             at = f" in row {row}" if out.ndim > 1 else ""
@@ -67,7 +67,7 @@ class Arguments:
         """Two arguments as rows, broadcast to common leading axes: copies."""
         if is_plain(first[1], first[2:]) and is_plain(second[1], second[2:]):
             x, y = np.array(first[1], ndmin=2), np.array(second[1], ndmin=2)
-            if checks.finite(x) and checks.finite(y):
+            if checks.all_finite(x) and checks.all_finite(y):
                 return x, y, ()
         a, b = (shaped(f"Simulator.{method}({n})", v, (size,)) for n, v, size in (first, second))
         try:
@@ -149,9 +149,9 @@ class Arguments:
             raise ValueError(f"{call}(limits=...): expected lower <= upper")
         return lo, hi
 
-    def finite(self, method: str, out: Floats, *given: Floats) -> Floats:
+    def finite_result(self, method: str, out: Floats, *given: Floats) -> Floats:
         """The result of a call for the rows (n, ...) of its arguments; refused if it overflows."""
-        if checks.finite(out):
+        if checks.all_finite(out):
             return out
         row = int(np.argwhere(~np.isfinite(out.reshape(len(given[0]), -1)).all(axis=1))[0, 0])
         size, name = max((self._largest(rows[row]) for rows in given), key=lambda found: abs(found[0]))

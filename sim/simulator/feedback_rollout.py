@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
-from sim.simulator.division import Division
-from sim.simulator.engine import REPORT, Engine, Floats, Rolled, interrupted
+from sim.simulator.engines.division import Division
+from sim.simulator.engines.engine import REPORT, Engine, Floats, Rolled, interrupted
 from sim.simulator.results import Interrupted
 
 Feedback = Callable[[float, Floats], ArrayLike]  # u = policy(time, x)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.integrators.feedback import FeedbackLaw
 from sim.model.record_columns import StepReport
 from sim.simulator.arguments import Arguments
-from sim.simulator.engine import Engine
+from sim.simulator.engines.engine import Engine
 from sim.simulator.results import STATUSES, Linearization
 from solvers.status import Status
 
@@ -130,5 +130,5 @@ class Horizon:
     def gaps(self, linear: Linearization, xs: Floats) -> Floats:
         """(T + 1, ndx) f(x_t, u_t) (-) x_t+1, in the rows of the later knots; zero in the first."""
         gaps = np.zeros_like(self._gaps)
-        gaps[1:] = self._engine.difference(xs[1:], linear.x_next)
+        gaps[1:] = self._engine.states.difference(xs[1:], linear.x_next)
         return gaps

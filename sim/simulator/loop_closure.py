@@ -16,7 +16,7 @@ from sim.mechanism.loop_joints import is_weld
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import rotation_matrices, rotation_matrix
 from sim.model.state_columns import BodyState
-from sim.simulator.engine import Engine
+from sim.simulator.engines.mean_states import MeanStates
 
 Floats = NDArray[np.float64]
 
@@ -44,10 +44,10 @@ class _Frame(NamedTuple):
 class Closure:
     """The loop constraints of a mechanism, as sim/dynamics/loops/closure.py has them, for Python."""
 
-    def __init__(self, mechanism: Mechanism, engine: Engine) -> None:
-        self._mechanism, self._engine = mechanism, engine
+    def __init__(self, mechanism: Mechanism, states: MeanStates) -> None:
+        self._mechanism, self._states = mechanism, states
         self._nq = mechanism.nq
-        self._h = engine.settings.time_step
+        self._h = states.h
         self._frames = {
             j.name: _Frame(rotation_matrix(j.orientation), fixed_axes(j), contact_frame(j.axis))
             for j in mechanism.loops
@@ -63,7 +63,7 @@ class Closure:
     def _gaps(self, xs: Floats, only: str = "") -> dict[str, Floats]:
         """`gaps` of every row, or one of them."""
         mech = self._mechanism
-        z = self._engine.maximal(xs, mech.nbody)
+        z = self._states.maximal(xs)
         out = {joint.name: self._gap(joint, z) for joint in mech.loops if only in ("", joint.name)}
         for gear in mech.gears:
             if only in ("", name := f"gear {gear.name}"):
@@ -100,14 +100,14 @@ class Closure:
         """
         nv = self._mechanism.nv
         x = self._placed(x, search)
-        along = self._engine.along_loops(x)
+        along = self._states.along_loops(x)
         if along is not None:
             x[self._nq :] = along
             return x
 
         def before(dv: Floats) -> Floats:
             back = np.concatenate([-self._h * (x[self._nq :] + dv), np.zeros((len(dv), nv))], axis=1)
-            return self._engine.integrate(np.tile(x, (len(dv), 1)), back)
+            return self._states.integrate(np.tile(x, (len(dv), 1)), back)
 
         x[self._nq :] += self._solve(before)
         return x
@@ -123,11 +123,11 @@ class Closure:
         Closing the interval before the node changes the velocity by O(h), which is made up for by repetition.
         """
         q = self._reachable(q)
-        wanted = self._engine.node_velocities(self._engine.started(q, v)[None])[0]
+        wanted = self._states.node_velocities(self._states.started(q, v)[None])[0]
         given, best, x = wanted.copy(), np.inf, q
         for _ in range(_STARTS):
-            state = self.close(self._engine.started(q, given))
-            off = wanted - self._engine.node_velocities(state[None])[0]
+            state = self.close(self._states.started(q, given))
+            off = wanted - self._states.node_velocities(state[None])[0]
             if not np.abs(off).max() < 0.5 * best:
                 break
             x, best = state, np.abs(off).max()
@@ -150,11 +150,11 @@ class Closure:
         x = x.copy()
         names = self._mechanism.body_names
         for weld in far:
-            z = self._engine.maximal(x[None], self._mechanism.nbody)
+            z = self._states.maximal(x[None])
             z[0, names.index(weld.child)] = z[0, names.index(weld.parent or "")]
             joint = self._mechanism.joints[names.index(weld.child)]
             for at in (self._mechanism.q_slice(joint.name), self._v_slice(joint.name)):
-                x[at] = self._engine.minimal(z)[0][at]
+                x[at] = self._states.minimal(z)[0][at]
         return x
 
     def _v_slice(self, joint: str) -> slice:
@@ -216,7 +216,7 @@ class Closure:
 
     def _around(self, x: Floats) -> Callable[[Floats], Floats]:
         """The states (m, nx) whose configurations are d (m, nv) away from that of x."""
-        return lambda d: self._engine.integrate(np.tile(x, (len(d), 1)), np.concatenate([d, np.zeros_like(d)], axis=1))
+        return lambda d: self._states.integrate(np.tile(x, (len(d), 1)), np.concatenate([d, np.zeros_like(d)], axis=1))
 
     def _error(self, place: Callable[[Floats], Floats], name: str = "") -> Callable[[Floats], Floats]:
         """The gaps (m, n) at the states place(d), of all loops and gears or of one."""

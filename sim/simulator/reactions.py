@@ -31,7 +31,7 @@ from sim.mechanism.short_repr import short_repr
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.record_columns import StepReport
-from sim.simulator.engine import Divided, Engine
+from sim.simulator.engines.engine import Divided, Engine
 from sim.simulator.results import Result
 from solvers.status import MESSAGES, Status
 

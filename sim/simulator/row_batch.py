@@ -21,8 +21,8 @@ from sim.mechanism.memory_limit import room_for
 from sim.mechanism.short_repr import short_repr
 from sim.model.interruptible_loops import pieces
 from sim.model.record_columns import StepReport, StepSetting
-from sim.simulator.division import DIVISIBLE, Division
-from sim.simulator.engine import REPORT, Engine, finite_rows, refuse
+from sim.simulator.engines.division import DIVISIBLE, Division
+from sim.simulator.engines.engine import REPORT, Engine, finite_rows, refuse
 from sim.simulator.results import Contacts, Result, contacts_of, ended, sentence
 from sim.simulator.state_space import StateSpace
 from solvers.status import Status

@@ -18,8 +18,8 @@ from sim.integrators.rollout import MotionBuffers, ParameterColumns, roll
 from sim.mechanism.mechanism import Mechanism
 from sim.model.interruptible_loops import pieces
 from sim.model.record_columns import StepReport
-from sim.simulator.division import DIVISIBLE, Division
-from sim.simulator.engine import CONTACT, REPORT, Divided, Engine, Rolled, refuse
+from sim.simulator.engines.division import DIVISIBLE, Division
+from sim.simulator.engines.engine import CONTACT, REPORT, Divided, Engine, Rolled, refuse
 from sim.simulator.link_kernels import link_heights, link_parameters
 from solvers.status import Status
 from solvers.types import Vector
@@ -138,10 +138,10 @@ def _products(
     level = None if kappa is None else kappa / parts
     rolled, Js = roll_parameters(divided.engine, request.of_parts(parts), path, level)
     ahead, back = engine.conversions(x, divided)
-    A, B, J = ahead, np.zeros((engine.ndx, engine.nu)), request.change(x, engine.interval(x), h)
+    A, B, J = ahead, np.zeros((engine.ndx, engine.nu)), request.change(x, engine.states.interval(x), h)
     for dx, du, dp in zip(rolled.A, rolled.B, Js, strict=True):
         A, B, J = dx @ A, dx @ B + du, dx @ J + dp
-    J = back @ J + request.change(last, h, engine.interval(divided.x))
+    J = back @ J + request.change(last, h, engine.states.interval(divided.x))
     return StepSlopes(back @ A, back @ B, divided.x, divided.report(), J)
 
 

@@ -17,7 +17,7 @@ from sim.mechanism.memory_limit import room_for
 from sim.model.record_columns import StepReport
 from sim.simulator.arguments import is_plain
 from sim.simulator.contact_settings import with_contacts
-from sim.simulator.engine import REPORT, Rolled
+from sim.simulator.engines.engine import REPORT, Rolled
 from sim.simulator.feedback_rollout import Feedback, roll_policy
 from sim.simulator.horizon import Horizon
 from sim.simulator.reactions import Reactions, reactions

@@ -14,12 +14,10 @@ from sim.mechanism import checks
 from sim.mechanism.axes import contact_frame
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes, pack
-from sim.model.model import Model
 from sim.model.record_columns import StepReport
 from sim.simulator.arguments import Arguments, shaped
 from sim.simulator.describe import describe
-from sim.simulator.dividing_engine import DividingEngine
-from sim.simulator.engine import Engine
+from sim.simulator.engines.engine_choice import engine_of
 from sim.simulator.loop_closure import Closure
 from sim.simulator.results import fastest, sentence
 from sim.simulator.settings import Settings
@@ -28,30 +26,9 @@ from solvers.status import Status
 
 if TYPE_CHECKING:
     from sim.derivatives.parameters.parameters import Parameters
-    from sim.simulator.parameter_engine import ParameterEngine
+    from sim.simulator.simulator_parameters import SimulatorParameters
 
 Floats = NDArray[np.float64]
-
-
-def _engine_of(model: Model, mechanism: Mechanism, settings: Settings) -> Engine:
-    """The engine of an order; the modules of higher orders are imported by simulators that have one."""
-    if settings.accuracy > 0.0:
-        from sim.simulator.adaptive_engine import AdaptiveEngine, check_adaptive
-
-        check_adaptive(mechanism, settings.accuracy)
-        return AdaptiveEngine(model, settings)
-    if settings.order == 2:
-        return DividingEngine(model, settings) if settings.divide else Engine(model, settings)
-    from sim.simulator.high_order_engine import HighOrderEngine, check
-
-    check(mechanism, settings)
-    engine = HighOrderEngine(model, settings)
-    stiff = engine.too_stiff(mechanism)
-    if len(model.contact_body) + len(model.limit_dof) or stiff:
-        from sim.simulator.phased_engine import PhasedEngine
-
-        engine = PhasedEngine(model, settings, stiff)
-    return engine
 
 
 class StateSpace:
@@ -65,7 +42,8 @@ class StateSpace:
         sizes = mechanism_sizes(mechanism)
         self.nbody, self.nq, self.nv, self.ncontact, self.nu = sizes[:4] + (sizes.nu,)
         self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
-        self._engine = _engine_of(self.model, mechanism, settings)
+        self._engine = engine_of(self.model, mechanism, settings)
+        self._states = self._engine.states
         self._no_input = np.zeros(self.nu)
         self._arguments = Arguments(mechanism, self._engine)
 
@@ -117,11 +95,11 @@ class StateSpace:
         return text
 
     @cached_property
-    def _by_parameters(self) -> ParameterEngine:
+    def _by_parameters(self) -> SimulatorParameters:
         """Calls by parameters, and sweeps; their modules are imported on first use."""
-        from sim.simulator.parameter_engine import ParameterEngine
+        from sim.simulator.simulator_parameters import SimulatorParameters
 
-        return ParameterEngine(self._engine, self.mechanism, self.time_step)
+        return SimulatorParameters(self._engine, self.mechanism, self.time_step)
 
     def turn_ground(self, normal: ArrayLike) -> None:
         """Turn the half-spaces under all contacts, in place.
@@ -184,13 +162,13 @@ class StateSpace:
             ValueError: no such state is found; the message names the loop joint or gear that stays open, and its gap.
         """
         state = self._placed("close", x)
-        return Closure(self.mechanism, self._engine).close(state) if self._closes else state
+        return Closure(self.mechanism, self._states).close(state) if self._closes else state
 
     def _placed(self, method: str, x: ArrayLike) -> Floats:
         """A state whose bodies have poses and velocities that are finite."""
         state = self._arguments.state(method, x)
         if self._closes:
-            self._arguments.finite(f"{method}(x)", self._engine.maximal(state[None], self.nbody), state[None])
+            self._arguments.finite_result(f"{method}(x)", self._states.maximal(state[None]), state[None])
         return state
 
     @property
@@ -207,7 +185,7 @@ class StateSpace:
         Returns:
             {name: (n,)}, one number per constraint.
         """
-        return Closure(self.mechanism, self._engine).gaps(self._placed("loop_gaps", x))
+        return Closure(self.mechanism, self._states).gaps(self._placed("loop_gaps", x))
 
     def loop_rank(self, x: ArrayLike | None = None) -> LoopRank:
         """The redundant loop constraints at a state.
@@ -226,7 +204,7 @@ class StateSpace:
                 f"Simulator.loop_rank: {self.mechanism.name!r} has no joint that closes a loop, and no gear"
             )
         state = self.neutral() if x is None else self._placed("loop_rank", x)
-        return Closure(self.mechanism, self._engine).rank(state)
+        return Closure(self.mechanism, self._states).rank(state)
 
     def start(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """State with coordinates q (nq,) whose velocity at the node is v (nv,).
@@ -255,8 +233,8 @@ class StateSpace:
         q0 = self._arguments.states("Simulator.start(q)", np.concatenate([q0, v0]))[: self.nq]
         x0 = np.concatenate([q0, v0])
         if self._closes:
-            return Closure(self.mechanism, self._engine).start(self._placed("start", x0)[: self.nq], v0)
-        return self._arguments.finite("start", self._engine.started(q0, v0), x0[None])
+            return Closure(self.mechanism, self._states).start(self._placed("start", x0)[: self.nq], v0)
+        return self._arguments.finite_result("start", self._states.started(q0, v0), x0[None])
 
     def velocity(self, x: ArrayLike) -> Floats:
         """Joint velocities at the node, the v of start(q, v).
@@ -271,7 +249,8 @@ class StateSpace:
             Velocities (..., nv).
         """
         xs, lead = self._arguments.stacked("velocity", "x", x)
-        return self._arguments.finite("velocity(x)", self._engine.node_velocities(xs), xs).reshape(*lead, self.nv)
+        v = self._arguments.finite_result("velocity(x)", self._states.node_velocities(xs), xs)
+        return v.reshape(*lead, self.nv)
 
     def bodies(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Positions and velocities of the bodies for coordinates q and velocities v at one moment.
@@ -287,7 +266,7 @@ class StateSpace:
         """
         qs, vs, lead = self._arguments.paired("bodies", ("q", q, self.nq), ("v", v, self.nv))
         xs = self._arguments.states("Simulator.bodies(q)", np.concatenate([qs, vs], axis=1))
-        return self._arguments.finite("bodies", self._engine.bodies(xs), xs).reshape(*lead, self.nbody, 13)
+        return self._arguments.finite_result("bodies", self._states.bodies(xs), xs).reshape(*lead, self.nbody, 13)
 
     def task_space(self) -> TaskSpace:
         """Frames, momenta, contacts and distances along trajectories, with their derivatives, for planners.
@@ -309,7 +288,8 @@ class StateSpace:
         """
         xs, dxs, lead = self._arguments.paired("integrate", ("x", x, self.nx), ("dx", dx, self.ndx))
         xs = self._arguments.states("Simulator.integrate(x)", xs)
-        return self._arguments.finite("integrate", self._engine.integrate(xs, dxs), xs, dxs).reshape(*lead, self.nx)
+        moved = self._arguments.finite_result("integrate", self._states.integrate(xs, dxs), xs, dxs)
+        return moved.reshape(*lead, self.nx)
 
     def difference(self, x1: ArrayLike, x0: ArrayLike) -> Floats:
         """x1 (-) x0: the dx with integrate(x0, dx) = x1.
@@ -323,9 +303,8 @@ class StateSpace:
         """
         x1s, x0s, lead = self._arguments.paired("difference", ("x1", x1, self.nx), ("x0", x0, self.nx))
         x1s, x0s = (self._arguments.states(f"Simulator.difference({n})", x) for n, x in (("x1", x1s), ("x0", x0s)))
-        return self._arguments.finite("difference", self._engine.difference(x0s, x1s), x1s, x0s).reshape(
-            *lead, self.ndx
-        )
+        dx = self._arguments.finite_result("difference", self._states.difference(x0s, x1s), x1s, x0s)
+        return dx.reshape(*lead, self.ndx)
 
     def maximal(self, x: ArrayLike) -> Floats:
         """The maximal state z of a minimal state x.
@@ -337,7 +316,7 @@ class StateSpace:
             (..., nbody, 13) per body [position, velocity (world), quaternion, omega (body)].
         """
         xs, lead = self._arguments.stacked("maximal", "x", x)
-        zs = self._arguments.finite("maximal(x)", self._engine.maximal(xs, self.nbody), xs)
+        zs = self._arguments.finite_result("maximal(x)", self._states.maximal(xs), xs)
         return zs.reshape(*lead, self.nbody, 13)
 
     def minimal(self, z: ArrayLike, joint_tolerance: float = 1e-6) -> Floats:
@@ -358,9 +337,9 @@ class StateSpace:
         lead = zs.shape[:-2]
         zs = zs.reshape(-1, self.nbody, 13)
         self._arguments.check_maximal("minimal", zs)
-        xs = self._arguments.finite("minimal(z)", self._engine.minimal(zs), zs)
+        xs = self._arguments.finite_result("minimal(z)", self._states.minimal(zs), zs)
         if joint_tolerance < np.inf:
-            self._arguments.check_joints(zs, self._engine.maximal(xs, self.nbody), joint_tolerance)
+            self._arguments.check_joints(zs, self._states.maximal(xs), joint_tolerance)
         return xs.reshape(*lead, self.nx)
 
     def maximal_jacobian(self, x: ArrayLike) -> Floats:
@@ -376,9 +355,8 @@ class StateSpace:
             (12 nbody, ndx).
         """
         state = self._arguments.state("maximal_jacobian", x)
-        return self._arguments.finite(
-            "maximal_jacobian(x)", self._engine.maximal_jacobian(state, self.nbody)[None], state[None]
-        )[0]
+        slopes = self._states.maximal_jacobian(state)[None]
+        return self._arguments.finite_result("maximal_jacobian(x)", slopes, state[None])[0]
 
     def minimal_jacobian(self, z: ArrayLike) -> Floats:
         """dx/dz, the inverse of `maximal_jacobian` along the joints.
@@ -391,7 +369,8 @@ class StateSpace:
         """
         zs = checks.array("Simulator.minimal_jacobian(z)", z, (self.nbody, 13))
         self._arguments.check_maximal("minimal_jacobian", zs[None])
-        return self._arguments.finite("minimal_jacobian(z)", self._engine.minimal_jacobian(zs)[None], zs[None])[0]
+        slopes = self._states.minimal_jacobian(zs)[None]
+        return self._arguments.finite_result("minimal_jacobian(z)", slopes, zs[None])[0]
 
     def energy(self, x: ArrayLike) -> Any:
         """Kinetic and potential energy at the node.
@@ -422,8 +401,8 @@ class StateSpace:
     def _energies(self, method: str, xs: Floats, parts: list[int]) -> Floats:
         """Sum of these of the (kinetic, potential) energy of every row."""
         with np.errstate(all="ignore"):
-            total = self._engine.energies(xs)[:, parts].sum(axis=1)
-        return self._arguments.finite(f"{method}(x)", total, xs)
+            total = self._states.energies(xs)[:, parts].sum(axis=1)
+        return self._arguments.finite_result(f"{method}(x)", total, xs)
 
     def momentum(self, x: ArrayLike) -> tuple[Floats, Floats]:
         """Momentum of all bodies at the node.
@@ -436,8 +415,8 @@ class StateSpace:
         """
         xs, lead = self._arguments.stacked("momentum", "x", x)
         with np.errstate(all="ignore"):
-            momenta = self._engine.momenta(xs)
-        p = self._arguments.finite("momentum(x)", momenta, xs).reshape(*lead, 6)
+            momenta = self._states.momenta(xs)
+        p = self._arguments.finite_result("momentum(x)", momenta, xs).reshape(*lead, 6)
         return p[..., :3].copy(), p[..., 3:].copy()
 
     def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Floats) -> Floats:

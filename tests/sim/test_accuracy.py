@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 import dojo_opt as dojo
 from dojo_opt import models
-from sim.simulator.adaptive_engine import AdaptiveEngine
+from sim.simulator.engines.adaptive_engine import AdaptiveEngine
 from support.scenes import ball, block
 
 Floats = NDArray[np.float64]

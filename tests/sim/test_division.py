@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from dojo_opt import models
-from sim.simulator.dividing_engine import DividingEngine
+from sim.simulator.engines.dividing_engine import DividingEngine
 from support.scenes import KINDS, chain, random_state
 
 Floats = NDArray[np.float64]
@@ -140,7 +140,7 @@ def test_derivatives_of_the_conversions(kind: str) -> None:
     part = change.to_part(x, 0.01)
     assert part is not None and np.abs(part - x).max() > 1e-4
     short = engine(sim).part(3)
-    assert short.energies(part[None])[0] == pytest.approx(engine(sim).energies(x[None])[0], rel=1e-10)
+    assert short.states.energies(part[None])[0] == pytest.approx(engine(sim).states.energies(x[None])[0], rel=1e-10)
     slopes, eps = change.slopes(x, 0.01, part), 1e-5
     for k in range(sim.ndx):
         ends = [change.to_part(sim.integrate(x, s * eps * np.eye(sim.ndx)[k]), 0.01) for s in (1.0, -1.0)]
@@ -215,7 +215,7 @@ def test_reactions_of_a_divided_step_are_means(divided: tuple[dojo.Simulator, do
     force = sim.reactions(motion.x[t], motion.u[t], throw=True).force[0]
     parts = engine(sim).divide(motion.x[t], motion.u[t], engine(sim).no_wrenches)
     assert parts is not None and parts.parts == motion.substeps[t]
-    momentum = parts.engine.momenta(parts.rolled.xs)[:, :3]
+    momentum = parts.engine.states.momenta(parts.rolled.xs)[:, :3]
     weight = 2.0 * np.asarray(sim.mechanism.gravity)
     assert np.allclose(momentum[-1] - momentum[0], sim.time_step * (force + weight), rtol=0.0, atol=1e-9)
 

@@ -171,7 +171,7 @@ def test_methods_of_order_two_alone_and_unknown_orders_are_refused() -> None:
 def test_second_order_does_not_know_of_the_others() -> None:
     program = (
         "import sys, numpy as np, dojo_opt as dojo; sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01); "
-        "sim.rollout(sim.neutral(), np.zeros((2, 1))); print([m for m in sys.modules if m in ('sim.simulator.high_order_engine', 'sim.integrators.runge_kutta', 'sim.integrators.hamilton')])"
+        "sim.rollout(sim.neutral(), np.zeros((2, 1))); print([m for m in sys.modules if m in ('sim.simulator.engines.high_order_engine', 'sim.integrators.runge_kutta', 'sim.integrators.hamilton')])"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

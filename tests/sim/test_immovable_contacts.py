@@ -13,7 +13,7 @@ import dojo_opt as dojo
 from sim.integrators.rollout import is_finite_matrix
 from sim.mechanism.immovable_contacts import IDLE, SUNK
 from sim.mechanism.mechanism import Mechanism
-from sim.simulator.engine import REPORT, refuse
+from sim.simulator.engines.engine import REPORT, refuse
 from solvers.compiler import local_kernel
 from support.scenes import random_state
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.model.interruptible_loops import rows as parts_of
-from sim.simulator.engine import Engine
+from sim.simulator.engines.engine import Engine
 from sim.simulator.link_kernels import link_gradient, link_pairs, link_step
 from sim.simulator.task_space import contact_rows, distances, frames, momenta
 from sim.simulator.task_space.knot_rows import Rows

@@ -8,30 +8,27 @@ with the part of the result that is done.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.dynamics import coordinates, coordinates_jacobian, energy, state_manifold, velocity
 from sim.integrators import parallel_loops, rollout
 from sim.integrators.feedback import FeedbackLaw, Following, Path
 from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
-from sim.model.interruptible_loops import pieces, rows
-from sim.model.layout import data_view, sizes_of, table
+from sim.model.interruptible_loops import pieces
+from sim.model.layout import data_view
 from sim.model.model import Model
 from sim.model.record_columns import ContactRow, Inactive, StepReport
-from sim.model.scratch import Scratch
-from sim.simulator.division import Division
-from sim.simulator.link_kernels import link_gradient, link_nodes, link_planner, link_poses, link_step
-from sim.simulator.results import Interrupted, SimulationError
+from sim.simulator.engines.division import Division
+from sim.simulator.engines.linked_model import LinkedModel
+from sim.simulator.engines.mean_states import MeanStates
+from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings, of_call
-from sim.solve import start_velocity
-from solvers.compiler import Table, link
-from solvers.status import MESSAGES, Status
+from solvers.compiler import Table
+from solvers.status import Status
 from solvers.types import Cube, Integers, Vector
 
 Floats = NDArray[np.float64]
@@ -137,20 +134,18 @@ def chained(A: Floats, rolled: Rolled) -> tuple[Floats, Floats]:
     return A, B
 
 
-class Engine:
-    """The kernels of one packed mechanism, their scratch, and the arrays that cross the border."""
+class Engine(LinkedModel):
+    """Steps of order 2 of one packed mechanism, each a call of one kernel; the arrays that cross the border.
+
+    It refuses steps that it cannot solve. `states` has views of its states; the other engines are in engine_choice.py.
+    """
 
     second_order = ""  # why all steps are of order 2, of an engine of a higher one
     in_one_kernel = True  # whether a step is one call of the kernel `step`, so that compiled loops can make it
 
     def __init__(self, model: Model, settings: Settings) -> None:
-        self.model, self.settings = model, settings
-        self.sizes = sizes_of(model)
-        self.nx, self.ndx, self.nu = self.sizes.nq + self.sizes.nv, 2 * self.sizes.nv, self.sizes.nu
-        link_poses(model)
-        self._linked: set[Callable[[Model], None]] = set()
-        self._model = table(model)
-        self._scratch = Scratch(self.sizes, model.contact_frame)
+        super().__init__(model, settings)
+        self.states = MeanStates(self)
         self._settings = settings.array()  # of calls without a deadline, which write nothing into it
         nothing = [
             np.empty((0, *shape))
@@ -166,57 +161,6 @@ class Engine:
         self.no_wrenches, self._no_contacts = nothing[:2]
         self.unknown = tuple(nothing[2:])  # derivatives and cone variables of steps that a policy does not know
         self.unkept = self._no_contacts, *self.unknown[:2]  # contacts and derivatives of motions without
-
-    def __getstate__(self) -> tuple[Model, Settings]:
-        """Tables and kernels are addresses in this process: another one makes its own."""
-        return self.model._replace(optional=np.zeros_like(self.model.optional)), self.settings
-
-    def __setstate__(self, state: tuple[Model, Settings]) -> None:
-        self.__init__(*state)  # type: ignore[misc]
-
-    def linked(self, *needs: Callable[[Model], None]) -> Table:
-        """Table of the Model, with the optional kernels linked that a call needs."""
-        if not self._linked.issuperset(needs):
-            new = [need for need in needs if need not in self._linked]
-            kernels: Any = []  # of all needs at once, so that two processes can compile them
-            for need in new:
-                need(self.model._replace(optional=kernels))
-            link(self.model.optional, *kernels)
-            self._linked.update(new)
-        return self._model
-
-    def step_table(self) -> Table:
-        """Table of the Model, with the step of its order linked."""
-        return self.linked(link_step)
-
-    def gradient_table(self, *needs: Callable[[Model], None]) -> Table:
-        """Table of the Model, with the step, its derivatives, and further needs of a call linked."""
-        return self.linked(link_step, link_gradient, *needs)
-
-    def prepare(self) -> None:
-        """Link the kernels of rollouts and their derivatives at once: two processes can then compile them."""
-        self.gradient_table(link_planner)
-
-    def tables(self, *needs: Callable[[Model], None]) -> tuple[Table, Table]:
-        """Tables of the Model, linked for derivatives and further needs of a call, and of this thread's first Data."""
-        return self.gradient_table(*needs), self._scratch.table()
-
-    def table(self) -> Table:
-        """Table of this thread's first Data."""
-        return self._scratch.table()
-
-    def chunks(self, count: int) -> Table:
-        """Tables of this thread's Data for a parallel call over `count` items, one per chunk."""
-        return self._scratch.chunks(count)
-
-    def turn_ground(self, frame: Floats) -> None:
-        """Give all contacts with half-spaces the frame (3, 3): rows normal and two tangents."""
-        self.model.contact_frame[self.model.contact_terrain == 0] = frame.ravel()
-        self.renew()
-
-    def renew(self) -> None:
-        """Take anew what Data keeps of the model, after a change in it."""
-        self._scratch.turn()
 
     def _settings_of(self, steps: int, kappa: float | None, max_iterations: int | None = None) -> Vector:
         """Settings of a call with a given number of steps; those of a single step have no deadline, and are shared."""
@@ -313,10 +257,6 @@ class Engine:
     def whole(self) -> Engine:
         """The engine that refuses steps which it cannot solve as a whole."""
         return self
-
-    def interval(self, x: Vector) -> float:
-        """Interval over which the velocity of the state x is the mean [s]: the time step, unless steps are divided."""
-        return self.settings.time_step
 
     def conversions(self, x: Vector, divided: Divided) -> tuple[Floats, Floats]:
         """Derivatives at both ends of a divided step from x; only engines that divide steps make one."""
@@ -469,110 +409,3 @@ class Engine:
         ends = np.concatenate([ends, ends[-1] + 1 + np.arange(self.sizes.ngear)])
         gap = np.abs(self.last().couple_gap)
         return [float(gap[a:b].max()) for a, b in zip(ends[:-1], ends[1:], strict=True)]
-
-    # -- single states ---------------------------------------------------------------------------------------------
-
-    def start(self, q: Vector, v: Vector, h: float | None = None) -> tuple[int, Vector]:
-        """(status, state) with the velocity v at the node q; h: interval of the state, here and below, [s]."""
-        x = np.concatenate([q, v])
-        status = start_velocity.start_at(self._model, self._scratch.table(), h or self.settings.time_step, v, x)
-        return int(status), x
-
-    def started(self, q: Vector, v: Vector, h: float | None = None) -> Vector:
-        """`start`; SimulationError if no such state exists."""
-        status, x = self.start(q, v, h)
-        if status != Status.SOLVED:
-            reason = Status(status)
-            raise SimulationError(f"Simulator.start: {MESSAGES[reason]}", reason)
-        return x
-
-    def along_loops(self, x: Vector) -> Vector | None:
-        """Of states with the velocity of their node, the nearest velocity along closed loops and gears; None of others.
-
-        The velocity of a state of order 2 is closed by its interval.
-        """
-        return None
-
-    def node_velocities(self, xs: Floats, h: float | None = None) -> Floats:
-        """Joint velocities at the node of every row, (n, nv)."""
-        out = np.zeros((len(xs), self.sizes.nv))
-        model, data, h = self.linked(link_nodes), self._scratch.table(), h or self.settings.time_step
-        for part in rows(len(xs)):
-            velocity.node_velocities(model, data, h, xs[part], out[part])
-        return out
-
-    def bodies(self, xs: Floats) -> Floats:
-        """Poses and velocities of the bodies at [q; joint velocities] of every row, (n, nbody, 13)."""
-        nbody = self.sizes.nbody
-        out = np.zeros((len(xs), nbody, 13))
-        for part in rows(len(xs)):
-            velocity.body_states(self._model, self._scratch.table(), xs[part], out[part].reshape(-1, 13))
-        return out
-
-    def integrate(self, xs: Floats, dxs: Floats) -> Floats:
-        """x (+) dx of every row."""
-        out = np.zeros_like(xs)
-        for part in rows(len(xs)):
-            state_manifold.integrate_states(self._model, xs[part], dxs[part], out[part])
-        return out
-
-    def difference(self, x0s: Floats, x1s: Floats) -> Floats:
-        """x1 (-) x0 of every row."""
-        out = np.zeros((len(x0s), self.ndx))
-        for part in rows(len(x0s)):
-            state_manifold.state_differences(self._model, x0s[part], x1s[part], out[part])
-        return out
-
-    def normalise(self, xs: Floats, tolerance: float) -> int:
-        """Normalise quaternions in place; see `normalise_quaternions`."""
-        for part in rows(len(xs)):
-            found = int(state_manifold.normalise_quaternions(self._model, xs[part], tolerance))
-            if found >= 0:
-                return part.start * self.sizes.nbody + found
-        return -1
-
-    def maximal(self, xs: Floats, nbody: int, h: float | None = None) -> Floats:
-        """z of every row, (n, nbody, 13)."""
-        out = np.zeros((len(xs), nbody, 13))
-        data, h = self._scratch.table(), h or self.settings.time_step
-        for part in rows(len(xs)):
-            coordinates.maximal_states(self._model, data, h, xs[part], out[part].reshape(-1, 13))
-        return out
-
-    def minimal(self, zs: Floats, h: float | None = None) -> Floats:
-        """x of every z, (n, nbody, 13)."""
-        out = np.zeros((len(zs), self.nx))
-        data, h = self._scratch.table(), h or self.settings.time_step
-        for part in rows(len(zs)):
-            coordinates.minimal_states(self._model, data, h, zs[part].reshape(-1, 13), out[part])
-        return out
-
-    def maximal_jacobian(self, x: Vector, nbody: int, h: float | None = None) -> Floats:
-        """dz/dx."""
-        out = np.zeros((12 * nbody, self.ndx))
-        step = h or self.settings.time_step
-        coordinates_jacobian.maximal_jacobian_at(self._model, self._scratch.table(), step, x, out)
-        return out
-
-    def minimal_jacobian(self, z: Floats, h: float | None = None) -> Floats:
-        """dx/dz."""
-        out = np.zeros((self.ndx, 12 * len(z)))
-        step = h or self.settings.time_step
-        coordinates_jacobian.minimal_jacobian_at(self._model, self._scratch.table(), step, z, out)
-        return out
-
-    def energies(self, xs: Floats, h: float | None = None) -> Floats:
-        """(kinetic, potential) energy of every row."""
-        out = np.zeros((len(xs), 2))
-        model, data, h = self.linked(link_nodes), self._scratch.table(), h or self.settings.time_step
-        for part in rows(len(xs)):
-            energy.energies(model, data, h, xs[part], out[part])
-        return out
-
-    def momenta(self, xs: Floats, h: float | None = None) -> Floats:
-        """(linear, angular) momentum of every row."""
-        out = np.zeros((len(xs), 6))
-        data, h = self._scratch.table(), h or self.settings.time_step
-        for part in rows(len(xs)):
-            energy.momenta(self._model, data, h, xs[part], out[part])
-        return out

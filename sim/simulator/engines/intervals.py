@@ -13,7 +13,7 @@ import numpy as np
 from sim.derivatives.momentum_gradient import momentum_jacobian
 from sim.dynamics.joints.damper import node_dampings
 from sim.model.interruptible_loops import rows
-from sim.simulator.engine import Engine, Floats
+from sim.simulator.engines.engine import Engine, Floats
 from sim.simulator.link_kernels import link_gradient, link_step
 from sim.solve.start_velocity import SHORTEST, intervals, momenta_of_velocities, momentum_at, state_of_momentum
 from solvers.status import Status

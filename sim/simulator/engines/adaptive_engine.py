@@ -31,10 +31,11 @@ from sim.model.interruptible_loops import pieces
 from sim.model.model import Model
 from sim.model.record_columns import ContactRow, StepReport, StepSetting
 from sim.simulator.central_differences import central_differences
-from sim.simulator.division import Division
-from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted, refuse
+from sim.simulator.engines.division import Division
+from sim.simulator.engines.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted, refuse
+from sim.simulator.engines.node_states import ClosingStates
+from sim.simulator.engines.python_loop_engine import PythonLoopEngine
 from sim.simulator.link_kernels import link_flight
-from sim.simulator.python_loop_engine import PythonLoopEngine
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
 from solvers.compiler import Table
@@ -42,7 +43,6 @@ from solvers.status import Status
 from solvers.types import Cube, Integers, Vector
 
 SHORTEST = 1e-7  # [s]
-_BRIEF = 1e-3  # time steps, an interval in which dampers have next to no inertia
 _IMPACT = 1e-6  # [kg s] shortest length of an impact, times a mass: kappa is the least one there, and not to be felt
 # (h w)^2 of the shortest step h, where w^2 = m g^2 h/kappa is the stiffness over m of a contact that carries m g
 _SETTLED = 10.0
@@ -79,6 +79,7 @@ class AdaptiveEngine(PythonLoopEngine):
             settings = settings._replace(tolerance=min(settings.tolerance, _CONVERGED * settings.accuracy))
         super().__init__(model, settings)
         self._second = Engine(model, settings._replace(order=2))
+        self.states = ClosingStates(self, self._second.states)
         self._is_tree = len(model.loop_ntrans) + len(model.gear_dof) == 0
         g = float(np.linalg.norm(model.gravity)) or 9.81
         self._lightest = _lightest(model)
@@ -282,9 +283,9 @@ class AdaptiveEngine(PythonLoopEngine):
         (u, wrench), end = held, convert(x, held, h)
 
         def moved(change: Floats) -> Floats:
-            start = self.integrate(x[None], change[None, : self.ndx])[0]
+            start = self.states.integrate(x[None], change[None, : self.ndx])[0]
             to = convert(start, (u + change[self.ndx :], wrench), h)
-            return np.asarray(self.difference(end[None], to[None])[0])
+            return np.asarray(self.states.difference(end[None], to[None])[0])
 
         both = central_differences(moved, self.ndx + self.nu, _NUDGE)
         return both[:, : self.ndx], both[:, self.ndx :]
@@ -351,11 +352,6 @@ class AdaptiveEngine(PythonLoopEngine):
             xs[t + 1], contacts[t] = path.x, path.contacts
             division.substeps[t], division.errors[t], knot = len(path.lengths), path.error, t + 1
         return Rolled(knot, xs, reports, contacts, A, B, division)
-
-    def along_loops(self, x: Vector) -> Vector:
-        """The velocity (nv,) nearest to that of x, in the metric of the masses, that keeps loops and gears closed."""
-        nq, h = self.sizes.nq, _BRIEF * self.settings.time_step
-        return np.asarray(self._second.node_velocities(self._second.started(x[:nq], x[nq:], h)[None], h)[0])
 
     def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Vector) -> Floats:
         """(n, nx) nodes of a motion (states, inputs, external wrenches) at times since its beginning, in any order [s].

@@ -1,4 +1,4 @@
-"""ParameterEngine: parameters of a simulator by name, and derivatives by them."""
+"""SimulatorParameters: parameters of a simulator by name, and derivatives by them."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import pack
 from sim.model.model import Model
-from sim.simulator.engine import Engine, Rolled
-from sim.simulator.intervals import Intervals
+from sim.simulator.engines.engine import Engine, Rolled
+from sim.simulator.engines.intervals import Intervals
 from sim.simulator.sensitivity import Request, adjoint_sweep, roll_parameters
 from solvers.types import Vector
 
@@ -31,7 +31,7 @@ _OF_MOMENTUM = frozenset(  # kinds on which the momentum of a state depends
 )
 
 
-class ParameterEngine:
+class SimulatorParameters:
     """Derivatives by the parameters of one simulator; selections of parameters are those of `select`."""
 
     def __init__(self, engine: Engine, mechanism: Mechanism, time_step: float) -> None:
@@ -130,7 +130,7 @@ class ParameterEngine:
                 ends, weights = [at(value - nudge), at(value + nudge)], (-1.0, 1.0)
             except ValueError:  # at the bound of its values: ahead of it
                 ends, weights = [at(value + nudge), at(value + 2.0 * nudge)], (4.0, -1.0)
-            steps = self._engine.difference(np.tile(at(value), (2, 1)), np.array(ends))
+            steps = self._engine.states.difference(np.tile(at(value), (2, 1)), np.array(ends))
             out[:, j] = weights @ steps / (2.0 * nudge)
         return out
 

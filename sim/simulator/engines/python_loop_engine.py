@@ -6,8 +6,8 @@ import numpy as np
 
 from sim.integrators.feedback import FeedbackLaw, Path
 from sim.model.record_columns import StepReport
-from sim.simulator.engine import REPORT, Floats, interrupted, knot_inputs
-from sim.simulator.high_order_engine import HighOrderEngine
+from sim.simulator.engines.engine import REPORT, Floats, interrupted, knot_inputs
+from sim.simulator.engines.high_order_engine import HighOrderEngine
 from sim.simulator.results import Interrupted
 from solvers.status import Status
 from solvers.types import Cube, Integers, Vector
@@ -54,7 +54,7 @@ class PythonLoopEngine(HighOrderEngine):
         path.xs[0], total = x, 0.0
         for t in range(knots):
             try:
-                dx = self.difference(policy.xs[t : t + 1], path.xs[t : t + 1])[0]
+                dx = self.states.difference(policy.xs[t : t + 1], path.xs[t : t + 1])[0]
                 path.us[t] = np.clip(policy.us[t] + alpha * policy.ks[t] + policy.Ks[t] @ dx, *limits)
                 rolled = self.roll(path.xs[t], *knot_inputs(path.us, policy.wrenches, t, substeps), kappa=kappa)
             except KeyboardInterrupt:
@@ -66,7 +66,7 @@ class PythonLoopEngine(HighOrderEngine):
             total += rolled.reports[:, StepReport.ITERATIONS].sum()
             path.xs[t + 1] = rolled.xs[-1]
             if alpha < 1.0:
-                path.xs[t + 1] = self.integrate(rolled.xs[-1:], (alpha - 1.0) * policy.gaps[t + 1 : t + 2])[0]
+                path.xs[t + 1] = self.states.integrate(rolled.xs[-1:], (alpha - 1.0) * policy.gaps[t + 1 : t + 2])[0]
         path.report[StepReport.ITERATIONS] = total
         return knots, path
 

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NoReturn
 
 import numpy as np
 
-from sim.dynamics import coordinates, maximal_energy
 from sim.integrators.runge_kutta import gradient_by_stages, step_by_stages
 from sim.integrators.tableau import stable, tableau
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.servos import limited_servos
 from sim.model.model import InputKind, Model
-from sim.model.state_columns import BodyState
-from sim.simulator.engine import Engine, Floats
+from sim.simulator.engines.engine import Engine
+from sim.simulator.engines.node_states import NodeStates
 from sim.simulator.link_kernels import link_curvature, link_planner
 from sim.simulator.settings import Settings
 from solvers.compiler import Table, link
-from solvers.status import Status
-from solvers.types import Integers, Vector
+from solvers.types import Integers
 
 
 def free_roots(model: Model) -> Integers:
@@ -50,6 +47,7 @@ class HighOrderEngine(Engine):
         slots = np.zeros_like(model.optional)  # its own, for the steps of order 2 beside it have others
         own = model._replace(stage_a=a, stage_b=b, root_free=free_roots(model), optional=slots)
         super().__init__(own, settings)
+        self.states: NodeStates = NodeStates(self)
 
     def step_table(self) -> Table:
         """As Engine.step_table."""
@@ -69,67 +67,6 @@ class HighOrderEngine(Engine):
             )
         return self.linked(link_stages, link_tangents, *needs)
 
-    def start(self, q: Vector, v: Vector, h: float | None = None) -> tuple[int, Vector]:
-        """The state is that of the node."""
-        return int(Status.SOLVED), np.concatenate([q, v])
-
-    def node_velocities(self, xs: Floats, h: float | None = None) -> Floats:
-        """The velocities of the states."""
-        return np.array(xs[:, self.sizes.nq :])
-
-    def energies(self, xs: Floats, h: float | None = None) -> Floats:
-        """(kinetic, potential) energy of every row."""
-        potential = super().energies(xs)[:, 1]
-        rotors = 0.5 * xs[:, self.sizes.nq :] ** 2 @ self.model.dof_armature
-        return np.stack([maximal_energy.kinetic_energy(self.model, self.bodies(xs)) + rotors, potential], axis=1)
-
-    def momenta(self, xs: Floats, h: float | None = None) -> Floats:
-        """(linear, angular) momentum of every row."""
-        return maximal_energy.momentum(self.model, self.bodies(xs))
-
-    def maximal(self, xs: Floats, nbody: int, h: float | None = None) -> Floats:
-        """z of every row, with velocities at the node."""
-        return self.bodies(xs)
-
-    def minimal(self, zs: Floats, h: float | None = None) -> Floats:
-        """x of every z; of velocities that violate a joint, the part of least kinetic energy off them is dropped."""
-        still = zs.copy()
-        still[..., BodyState.VELOCITY] = still[..., BodyState.SPIN] = 0.0
-        xs = np.zeros((len(zs), self.nx))
-        coordinates.minimal_states(self._model, self._scratch.table(), 1.0, still.reshape(-1, 13), xs)
-        for x, z in zip(xs, zs, strict=True):
-            columns, weighted = self._columns(x)
-            rates = np.concatenate([z[:, BodyState.VELOCITY], z[:, BodyState.SPIN]], axis=1).ravel()
-            x[self.sizes.nq :] = np.linalg.solve(weighted @ columns.T, weighted @ rates)
-        return xs
-
-    def mass_matrix(self, x: Vector) -> Floats:
-        """M(q), (nv, nv)."""
-        columns, weighted = self._columns(x)
-        return np.asarray(weighted @ columns.T + np.diag(self.model.dof_armature))
-
-    def _columns(self, x: Vector) -> tuple[Floats, Floats]:
-        """d(velocities of the bodies)/d(joint velocities), (nv, 6 nbody), and the same times their inertias."""
-        xs = np.tile(x, (self.sizes.nv, 1))
-        xs[:, self.sizes.nq :] = np.eye(self.sizes.nv)
-        z = self.bodies(xs)
-        inertia = self.model.body_inertia.reshape(-1, 3, 3)
-        linear = self.model.body_mass[:, None] * z[..., BodyState.VELOCITY]
-        angular = np.einsum("bij,nbj->nbi", inertia, z[..., BodyState.SPIN])
-        columns = np.concatenate([z[..., BodyState.VELOCITY], z[..., BodyState.SPIN]], axis=2)
-        return columns.reshape(len(z), -1), np.concatenate([linear, angular], axis=2).reshape(len(z), -1)
-
-    def maximal_jacobian(self, x: Vector, nbody: int, h: float | None = None) -> Floats:
-        """Refused."""
-        self._refuse("Jacobians are")
-
-    def minimal_jacobian(self, z: Floats, h: float | None = None) -> Floats:
-        """Refused."""
-        self._refuse("Jacobians are")
-
-    def _refuse(self, feature: str) -> NoReturn:
-        raise ValueError(f"Simulator of order {self.settings.order}: {feature} those of order 2; use replace(order=2)")
-
     def too_stiff(self, mechanism: Mechanism) -> str:
         """Which spring or damper is too fast for an explicit method; "" if none is.
 
@@ -139,7 +76,7 @@ class HighOrderEngine(Engine):
         if not np.any(stiff):
             return ""
         q = np.asarray(mechanism.neutral, dtype=np.float64)
-        M = self.mass_matrix(np.concatenate([q, np.zeros(self.sizes.nv)]))
+        M = self.states.mass_matrix(np.concatenate([q, np.zeros(self.sizes.nv)]))
         for feature, values, power in (("spring", stiff[0], 0.5), ("damper", stiff[1], 1.0)):
             rates, modes = np.linalg.eig(np.linalg.solve(M, np.diag(values)))
             worst = int(np.argmax(rates.real))

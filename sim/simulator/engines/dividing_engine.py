@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable
 
 import numpy as np
 
@@ -21,14 +20,13 @@ from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.record_columns import StepReport
-from sim.model.state_columns import BodyState
-from sim.simulator.division import DIVISIBLE, Division
-from sim.simulator.engine import REPORT, Divided, Engine, Floats, chained, knot_inputs, refuse
-from sim.simulator.intervals import Intervals
+from sim.simulator.engines.division import DIVISIBLE, Division
+from sim.simulator.engines.engine import REPORT, Divided, Engine, Floats, chained, knot_inputs, refuse
+from sim.simulator.engines.interval_states import IntervalStates
+from sim.simulator.engines.intervals import Intervals
 from sim.simulator.link_kernels import link_step
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
-from sim.solve.start_velocity import SHORTEST
 from solvers.compiler import Table
 from solvers.status import Status
 from solvers.types import Cube, Integers, Vector
@@ -68,6 +66,7 @@ class DividingEngine(Engine):
     def __init__(self, model: Model, settings: Settings) -> None:
         super().__init__(model, settings._replace(loss=_LOSS))
         self.intervals = Intervals(self)
+        self.states = IntervalStates(self, self.intervals)
         self._engines: dict[int, Engine] = {}  # by the number of parts of a step
         self._ended = threading.local()  # `parts`: the engine of the last step of this thread, if that was divided
 
@@ -135,10 +134,6 @@ class DividingEngine(Engine):
             return Divided(engine, rolled, end, 1.0)
         slowed = self.intervals.slowed(last, part)
         return None if slowed is None else Divided(engine, rolled, *slowed)
-
-    def interval(self, x: Vector) -> float:
-        """Interval over which the velocity of the state x is the mean [s]."""
-        return self.intervals.of_one(x)
 
     def conversions(self, x: Vector, divided: Divided) -> tuple[Floats, Floats]:
         """Derivatives of the conversions at both ends of a divided step from x, (ndx, ndx)."""
@@ -247,7 +242,9 @@ class DividingEngine(Engine):
             if len(following.cones):
                 following.cones[t], following.bounds[t] = parts.cone, parts.bound
             if alpha < 1.0:
-                motion.xs[t + 1] = self.integrate(motion.xs[t + 1 : t + 2], (alpha - 1.0) * law.gaps[t + 1 : t + 2])[0]
+                motion.xs[t + 1] = self.states.integrate(
+                    motion.xs[t + 1 : t + 2], (alpha - 1.0) * law.gaps[t + 1 : t + 2]
+                )[0]
         return True
 
     def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
@@ -283,58 +280,3 @@ class DividingEngine(Engine):
                 xs[t], knot_inputs(us, external, t, substeps), kappa
             )
         return A, B, x_next, reports
-
-    # -- single states -------------------------------------------------------------------------------------------------
-
-    def start(self, q: Vector, v: Vector, h: float | None = None) -> tuple[int, Vector]:
-        """As Engine.start; where a body turns by half a turn in a step, v is the velocity of the state."""
-        x = np.concatenate([q, v])
-        if h is None and self.intervals.of_one(x) < self.settings.time_step:
-            return int(Status.SOLVED), x
-        return super().start(q, v, h)
-
-    def _at_intervals(self, xs: Floats, call: Callable[..., Floats], *sizes: int) -> Floats:
-        """A call for every row at its own interval."""
-        out = call(xs, *sizes)
-        taus = self.intervals.of(xs)
-        for t in np.flatnonzero(taus < self.settings.time_step):
-            out[t] = call(xs[t : t + 1], *sizes, taus[t])[0]
-        return out
-
-    def node_velocities(self, xs: Floats, h: float | None = None) -> Floats:
-        """As Engine.node_velocities, rows at their own intervals."""
-        call = super().node_velocities
-        return call(xs, h) if h else self._at_intervals(xs, call)
-
-    def energies(self, xs: Floats, h: float | None = None) -> Floats:
-        """As Engine.energies, rows at their own intervals."""
-        call = super().energies
-        return call(xs, h) if h else self._at_intervals(xs, call)
-
-    def momenta(self, xs: Floats, h: float | None = None) -> Floats:
-        """As Engine.momenta, rows at their own intervals."""
-        call = super().momenta
-        return call(xs, h) if h else self._at_intervals(xs, call)
-
-    def maximal(self, xs: Floats, nbody: int, h: float | None = None) -> Floats:
-        """As Engine.maximal, rows at their own intervals."""
-        call = super().maximal
-        return call(xs, nbody, h) if h else self._at_intervals(xs, call, nbody)
-
-    def minimal(self, zs: Floats, h: float | None = None) -> Floats:
-        """As Engine.minimal, rows at their own intervals."""
-        if h:
-            return super().minimal(zs, h)
-        out, step = super().minimal(zs), self.settings.time_step
-        spins = np.linalg.norm(zs[..., BodyState.SPIN], axis=-1).max(axis=1)
-        for t in np.flatnonzero(step * spins >= math.pi):
-            out[t] = super().minimal(zs[t : t + 1], SHORTEST * step)[0]
-        return out
-
-    def maximal_jacobian(self, x: Vector, nbody: int, h: float | None = None) -> Floats:
-        """As Engine.maximal_jacobian, at the interval of the state."""
-        return super().maximal_jacobian(x, nbody, h or self.intervals.of_one(x))
-
-    def minimal_jacobian(self, z: Floats, h: float | None = None) -> Floats:
-        """As Engine.minimal_jacobian, at the interval of the state."""
-        return super().minimal_jacobian(z, h or self.intervals.of_one(self.minimal(z[None])[0]))

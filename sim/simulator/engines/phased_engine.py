@@ -26,11 +26,11 @@ from sim.integrators.rollout import MotionBuffers
 from sim.model.interruptible_loops import pieces
 from sim.model.model import Model
 from sim.model.record_columns import StepReport
-from sim.simulator.dividing_engine import DividingEngine
-from sim.simulator.division import DIVISIBLE, Division
-from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted
+from sim.simulator.engines.dividing_engine import DividingEngine
+from sim.simulator.engines.division import DIVISIBLE, Division
+from sim.simulator.engines.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted
+from sim.simulator.engines.python_loop_engine import PythonLoopEngine
 from sim.simulator.link_kernels import link_flight
-from sim.simulator.python_loop_engine import PythonLoopEngine
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
 from solvers.compiler import Table
@@ -110,7 +110,7 @@ class PhasedEngine(PythonLoopEngine):
         if self._second.take_steps(self._second.step_table(), one, kappa, Division.none(1)) == 0:
             return False
         path.xs[t + 1] = motion.xs[t + 1]
-        path.xs[t + 1, self.sizes.nq :] = self._second.node_velocities(motion.xs[t + 1 : t + 2])[0]
+        path.xs[t + 1, self.sizes.nq :] = self._second.states.node_velocities(motion.xs[t + 1 : t + 2])[0]
         return True
 
     def roll(
@@ -172,7 +172,7 @@ class PhasedEngine(PythonLoopEngine):
         slopes = Slopes(*(np.zeros((nv, k)) for k in (nv, nv, nv, nv, self.nu, 42)))
         by_q, by_mean = np.zeros((nv, nv)), np.zeros((nv, nv))
         out, model = np.eye(self.ndx), self._second.gradient_table()
-        h, damping = self._second.interval(mean), np.zeros(nv)
+        h, damping = self._second.states.interval(mean), np.zeros(nv)
         legendre.legendre_slopes(model, self._scratch.table(), h, mean, slopes, by_q, by_mean)
         node_dampings(model, h, damping)
         out[nv:] = np.linalg.solve(slopes.p_v + np.diag(damping), np.hstack([by_q - slopes.p_q, by_mean]))
