@@ -53,7 +53,7 @@ def _mechanism() -> Mechanism:
             wheel = f"{name}_{side}"
             bodies.append(Body(wheel, 0.5, shape=ball))
             joints.append(Joint("revolute", name, wheel, parent_point=(0.0, y, 0.0), axis=(0.0, 1.0, 0.0), name=wheel))
-            contacts.append(Contact(wheel, (0.0, 0.0, 0.0), _WHEEL, _FRICTION, name=wheel))
+            contacts.append(Contact(wheel, (0.0, 0.0, 0.0), _WHEEL, friction=_FRICTION, name=wheel))
     neutral = {"base": (0.0, 0.0, _WHEEL, 1.0, 0.0, 0.0, 0.0)}
     inputs = [Input("bend_1"), Input("bend_2")]
     return Mechanism(bodies, joints, contacts, inputs, name="swimmer", neutral=neutral)
