@@ -11,8 +11,10 @@ from benchmarks.engines.mujoco_scene import mjcf
 from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
 from sim.mechanism.collision import Collision
+from sim.mechanism.contact import Contact
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere
+from sim.mechanism.terrain import Terrain
 from sim.simulator.results import StepResult
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
@@ -22,6 +24,8 @@ __all__ = ["MujocoPlant"]
 
 _ROW = 11  # numbers of a contact of a step: impulse 3, point 3, gap, slip speed, normal 3
 _GAP = 6
+_ACROSS = 0.5 * np.arange(-20.0, 21.0)  # [m] grid lines across a height field that is the same for all y
+_BASE = 0.1  # [m] of a height field below its lowest point
 
 
 class MujocoPlant(Plant):
@@ -89,7 +93,7 @@ def _scene(sim: Simulator) -> tuple[Any, dict[frozenset[int], int]]:
     """(MjModel, number of our contact by the numbers of its two geoms)."""
     import mujoco
 
-    mechanism: Mechanism = replace(sim.mechanism, collisions=())
+    mechanism: Mechanism = replace(sim.mechanism, collisions=(), contacts=_on_planes(sim.mechanism))
     bare = Simulator(mechanism, time_step=sim.time_step)
     spec = mujoco.MjSpec.from_string(mjcf(bare.model, sim.time_step, cone="pyramidal"))
     names = sim.mechanism.body_names
@@ -107,15 +111,85 @@ def _scene(sim: Simulator) -> tuple[Any, dict[frozenset[int], int]]:
         friction = [mu, mu, 0.005, 1e-4, 1e-4]
         spec.add_pair(geomname1=geoms[0], geomname2=geoms[1], condim=3 if mu else 1, friction=friction)
         pairs[k] = geoms
+    hills = _height_fields(spec, sim.mechanism)
     model = spec.compile()
     number = {name: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name) for name in _geom_names(mujoco, model)}
     index: dict[frozenset[int], int] = {}
     for name, geom in number.items():
         if name.startswith("contact"):
             index |= {frozenset((geom, number[p])): int(name[7:]) for p in number if p.startswith("plane")}
+    index |= {frozenset((number[f"contact{k}"], number[geom])): k for k, geom in hills.items()}
     for k, geoms in pairs.items():
         index[frozenset(number[g] for g in geoms)] = first[sim.mechanism.collisions[k].name]
     return model, index
+
+
+def _on_planes(mechanism: Mechanism) -> list[Contact]:
+    """The contacts, on a plane at the lowest height of their terrain."""
+    return [
+        contact
+        if contact.terrain is None
+        else replace(contact, terrain=None, height=float(np.min(np.asarray(contact.terrain.heights))))
+        for contact in mechanism.contacts
+    ]
+
+
+def _height_fields(spec: Any, mechanism: Mechanism) -> dict[int, str]:
+    """Add a height field per terrain, paired with the contacts on it: the name of its geom by number of the contact."""
+    import mujoco
+
+    terrains: list[Terrain] = []
+    geoms: dict[int, str] = {}
+    for k, contact in enumerate(mechanism.contacts):
+        if contact.terrain is None:
+            continue
+        if contact.terrain not in terrains:
+            terrains.append(contact.terrain)
+        name = f"terrain{terrains.index(contact.terrain)}"
+        if name not in geoms.values():
+            spec.add_hfield(name=name, **_grid(contact.terrain))
+            geom = spec.worldbody.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname=name)
+            geom.pos, geom.quat = _middle(contact.terrain)
+            geom.contype = geom.conaffinity = 0
+        mu = float(contact.friction)
+        spec.add_pair(geomname1=name, geomname2=f"contact{k}", condim=3, friction=[mu, mu, 0.005, 1e-4, 1e-4])
+        geoms[k] = name
+    return geoms
+
+
+def _across(terrain: Terrain) -> tuple[Vector, Vector]:
+    """Heights (nx, ny) [m] and places (ny,) of the grid lines across [m]."""
+    heights = np.asarray(terrain.heights)
+    if heights.shape[1] == 1:
+        return np.repeat(heights, len(_ACROSS), axis=1), _ACROSS
+    return heights, np.asarray(terrain.spacing)[1] * np.arange(heights.shape[1])
+
+
+def _grid(terrain: Terrain) -> dict[str, Any]:
+    """Size and data of MuJoCo's height field, which has rows along y.
+
+    ValueError: the ground beyond it is not level at its lowest height.
+    """
+    heights, y = _across(terrain)
+    low, high = float(heights.min()), float(heights.max())
+    edges = [heights[0], heights[-1]] + (
+        [heights[:, 0], heights[:, -1]] if np.asarray(terrain.heights).shape[1] > 1 else []
+    )
+    if terrain.plane is not None or high <= low or not np.allclose(np.concatenate(edges), low):
+        raise ValueError(f"MujocoPlant: expected a terrain that rises from level ground, got {terrain!r}")
+    half = 0.5 * np.asarray(terrain.spacing)[0] * (len(heights) - 1), 0.5 * np.ptp(y)
+    nx, ny = heights.shape
+    return {"nrow": ny, "ncol": nx, "size": [*half, high - low, _BASE], "userdata": heights.T.ravel()}
+
+
+def _middle(terrain: Terrain) -> tuple[Vector, Vector]:
+    """Place of the middle of the height field at its lowest height [m], and its quaternion."""
+    heights, y = _across(terrain)
+    c, s = np.asarray(terrain.direction)
+    along, across = 0.5 * np.asarray(terrain.spacing)[0] * (len(heights) - 1), 0.5 * (y[0] + y[-1])
+    place = np.asarray(terrain.origin) + along * np.array([c, s]) + across * np.array([-s, c])
+    half = 0.5 * np.arctan2(s, c)
+    return np.array([*place, heights.min()]), np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
 
 
 def _geom_names(mujoco: Any, model: Any) -> list[str]:

@@ -244,12 +244,12 @@ class MPC:
             self._record(now, begin, Status.SIMULATION_FAILED, True, 0, self.log[-1].cost, 1.0, shifted.x[0])
             return
         result = solver.iterate(guess, shifted.K, began=begin[0])
-        after = result.now if self._usable(result) else None
+        after = result.now if self._usable(result, guess) else None
         if after is not None and after.gaps is None:  # the violations of an inconsistent trajectory say little
             solver.update_multipliers(after)
         taken = after is not None
         if after is None and result.status in (Status.SOLVED, Status.LINE_SEARCH):
-            after = self._rolled(result)
+            after = self._rolled(guess, result.K)
         if after is not None:
             made = self._policy(now, after.x, after.u, result.K.copy())
             if self.settings.computation:
@@ -260,20 +260,25 @@ class MPC:
         iterations = len(result.history)
         self._record(now, begin, result.status, not taken, iterations, cost, result.alpha, shifted.x[0])
 
-    def _rolled(self, result: Iteration) -> Iterate | None:
+    def _rolled(self, guess: Iterate, K: Stack) -> Iterate | None:
         """After a rejected step: the rollout of the shifted plan under its gains, None when it is nowhere near it."""
-        there = self._solver.rollout(result.now, result.K)
-        return there if there is not None and there.merit <= _LOST * result.now.merit else None
+        there = self._solver.rollout(guess, K)
+        return there if there is not None and there.merit <= _LOST * guess.merit else None
 
     def _policy(self, now: float, x: Matrix, u: Matrix, K: Stack) -> Policy:
         """A plan made at `now`, which starts when its first input can act."""
         lead = (now, self._measured.state()) if self.settings.delay else None
         return Policy(self.sim, now + self._later, x, u, K, self.problem.substeps, lead)
 
-    def _usable(self, result: Iteration) -> bool:
-        """Whether the result is a trajectory of the model, up to the gaps that a short step leaves open."""
+    def _usable(self, result: Iteration, guess: Iterate) -> bool:
+        """Whether the result is a trajectory of the model, up to the gaps that a short step leaves open.
+
+        Without an accepted step it is a rollout of the guess, which may have fallen.
+        """
         ended = result.status in (Status.SOLVED, Status.LINE_SEARCH, Status.TIME_LIMIT)
-        return ended and bool(np.isfinite(result.now.merit)) and result.consistent
+        stepped = any(record["alpha"] > 0.0 for record in result.history)
+        near = stepped or result.now.merit <= _LOST * guess.merit
+        return ended and bool(np.isfinite(result.now.merit)) and result.consistent and near
 
     def _guess(self, shifted: Policy) -> Iterate | None:
         """First trajectory of a tick: the shifted plan, or the best rollout under its gains or a share of them."""

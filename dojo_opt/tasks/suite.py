@@ -17,6 +17,7 @@ from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import milliseconds
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.overlaps import overlaps
 from sim.mechanism.short_repr import short_repr
 from sim.mechanism.stance import gaps
 from sim.simulator.simulator import Simulator
@@ -26,6 +27,7 @@ Vector = NDArray[np.float64]
 __all__ = ["TaskOutcome", "SuiteTask", "held", "lifted", "quadratic", "servo_effort", "timed"]
 
 _CLEAR = 1e-6  # [m] between a lifted start and the obstacle around it
+_DRAWS = 1000  # of a perturbed start
 _RAISED = 3  # times that a start is lifted: the coordinate may raise the deepest contact by less than its own change
 
 
@@ -89,12 +91,24 @@ class SuiteTask:
             seed: seed of a random change within `spread` (default None: no change).
 
         Returns:
-            (nx,) state, lifted out of the ground by the coordinate `rise`.
+            (nx,) state, lifted out of the ground by the coordinate `rise`. A random change is drawn again while shapes
+            overlap: hard contact has no such state, and throws its bodies apart.
+
+        Raises:
+            ValueError: for a seed out of range, or a spread within which shapes overlap almost everywhere.
         """
-        x = self.start
-        if seed is not None:
-            seed = whole_number("SuiteTask.begin(seed)", seed, 0)
-            x = self.model.integrate(x, self.spread * np.random.default_rng(seed).uniform(-1.0, 1.0, self.spread.size))
+        if seed is None:
+            return self._raised(self.start)
+        generator = np.random.default_rng(whole_number("SuiteTask.begin(seed)", seed, 0))
+        for _ in range(_DRAWS):
+            dx = self.spread * generator.uniform(-1.0, 1.0, self.spread.size)
+            x = self._raised(self.model.integrate(self.start, dx))
+            if not overlaps(self.model.mechanism, x[: self.model.nq]):
+                return x
+        raise ValueError(f"{self.name}: shapes overlap in each of {_DRAWS} starts within the spread")
+
+    def _raised(self, x: Vector) -> Vector:
+        """The state x (nx,) out of the ground."""
         return x if self.rise is None else lifted(self.model, x, self.rise)
 
     def plant(self, seed: int | None = None, **perturbation: Any) -> Plant:

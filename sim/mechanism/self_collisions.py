@@ -17,7 +17,7 @@ from sim.mechanism.shapes import HalfSpace, Solid, String
 
 Floats = NDArray[np.float64]
 
-__all__ = ["self_collisions"]
+__all__ = ["self_collisions", "separation"]
 
 _ONE = 1e3  # weight of "the shares of the points of a shape add up to one" beside distances in units of the shapes
 _REACH = 0.01  # of the extent of a robot: its links act on one another from this gap on
@@ -48,7 +48,7 @@ def self_collisions(
             continue
         for (one, label_a), (other, label_b) in product(_labelled(a), _labelled(b)):
             name = f"{label_a}-{label_b}"
-            if _gap(at[a.name], one, at[b.name], other) > 0.0:
+            if separation(at[a.name], one, at[b.name], other) > 0.0:
                 shapes = (None if len(a.shapes) == 1 else one), (None if len(b.shapes) == 1 else other)
                 found.append(Collision(a.name, b.name, *shapes, name=name, reach=reach))
             else:
@@ -97,8 +97,21 @@ def _neighbours(bodies: Sequence[Body], joints: Sequence[Joint], loops: Sequence
     }
 
 
-def _gap(at_a: Pose, a: Solid, at_b: Pose, b: Solid) -> float:
-    """Distance of two shapes [m], less a hundred thousandth of their size; below zero where they overlap."""
+def separation(at_a: Pose, a: Solid, at_b: Pose, b: Solid) -> float:
+    """Distance of two shapes [m], less a hundred thousandth of their size; below zero where they overlap.
+
+    Args:
+        at_a: pose of the first body.
+        a: its shape.
+        at_b: pose of the second body.
+        b: its shape.
+
+    Returns:
+        The distance, not the depth of an overlap.
+
+    Raises:
+        NotImplementedError: a shape has no outline.
+    """
     (first, ra), (second, rb) = _points(at_a, a), _points(at_b, b)
     middle = first.mean(axis=0) - second.mean(axis=0)
     size = sum(float(np.linalg.norm(p - p.mean(axis=0), axis=1).max()) for p in (first, second))

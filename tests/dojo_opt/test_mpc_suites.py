@@ -1,6 +1,7 @@
 """Tasks of published suites, and the features of MPC that they use: servos, targets that go along, plans that come late."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +11,11 @@ from dojo_opt.__main__ import main
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.mpc.moving_reference import Onward
 from dojo_opt.mpc.servo import ModelServo
+from dojo_opt.planning.ilqr import Iteration
 from dojo_opt.tasks.free_gait import Lead
 from dojo_opt.tasks.suite import servo_effort
+from sim.mechanism.overlaps import overlaps
+from solvers.status import Status
 
 
 def arm(spring=0.0, damper=0.1):
@@ -126,6 +130,81 @@ def test_a_start_is_perturbed_and_lifted_out_of_the_ground():
     for x in (given, other):
         gaps = [c.gap(sim.maximal(x)[2, :3] + turned(sim.maximal(x)[2, 6:10], c.point)) for c in sim.mechanism.contacts]
         assert 0.0 <= min(gaps) < 1e-5
+
+
+def test_a_perturbed_start_does_not_overlap():
+    """The hand holds its ball within millimetres: a change drawn without regard to it would throw the ball away."""
+    task = dojo.tasks.idto.allegro()
+    sim = task.model
+    inside = 0
+    for seed in range(5):
+        dx = task.spread * np.random.default_rng(seed).uniform(-1.0, 1.0, task.spread.size)
+        inside += bool(overlaps(sim.mechanism, sim.integrate(task.start, dx)[: sim.nq]))
+        assert overlaps(sim.mechanism, task.begin(seed)[: sim.nq]) == ()
+    assert inside == 5
+    with pytest.raises(ValueError, match="shapes overlap in each"):
+        replace(task, start=task.start - 0.02 * np.eye(sim.nx)[18], spread=1e-9 * task.spread).begin(0)
+
+
+def test_overlaps_are_those_of_the_shapes():
+    """Ball on box, ball on a half-space, and a string, beside distances by hand."""
+    ball = dojo.Body("ball", 1.0, 0.1 * np.eye(3), shape=dojo.Sphere(0.5))
+    walls = {
+        "box": dojo.Box(2.0, 2.0, 1.0, center=(0.0, 0.0, -0.5)),
+        "floor": dojo.HalfSpace(center=(0.0, 0.0, -0.1)),
+    }
+    collisions = [dojo.Collision("ball", None, shape_b=shape, name=name) for name, shape in walls.items()]
+    ends = {"shape_a": dojo.String(0.55), "shape_b": dojo.String(0.55)}
+    collisions.append(dojo.Collision("ball", None, name="string", **ends))
+    mechanism = dojo.Mechanism([ball], [dojo.Joint("floating", None, "ball")], [], [], collisions=collisions)
+    for height, wanted in ((0.53, ()), (0.49, ("box",)), (0.39, ("box", "floor")), (0.6, ("string",))):
+        assert overlaps(mechanism, [0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0]) == wanted
+
+
+def test_a_rejected_step_does_not_make_a_plan_that_has_fallen(monkeypatch):
+    """When no step is accepted, the solver hands back a rollout: far worse than the shifted plan, it is not taken."""
+    sim = dojo.Simulator(arm(), time_step=0.05, kappa=1e-4)
+    for factor, taken in ((100.0, False), (2.0, True)):
+        mpc = reaching(sim)
+        mpc(0.0, [0.0, 0.0])
+        solver, first = mpc._solver, mpc.policy
+
+        def iterate(guess, K, factor=factor, solver=solver, **_):
+            far = solver.rollout(guess, K)._replace(merit=factor * guess.merit)
+            return Iteration(Status.SOLVED, "", far, K, np.zeros((20, 1)), [{"alpha": 0.0}])
+
+        monkeypatch.setattr(solver, "iterate", iterate)
+        monkeypatch.setattr(mpc, "_rolled", lambda guess, K: None)
+        mpc(0.05, mpc.policy.state(0.05))
+        assert (mpc.policy is not first) == taken
+        assert mpc.log[-1].fallback != taken
+
+
+def test_mujoco_has_the_same_hills():
+    """A ray from above meets MuJoCo's height field where the terrain is; a foot that falls on a hill rests there."""
+    mujoco = pytest.importorskip("mujoco")
+    from benchmarks.engines.mujoco_plant import MujocoPlant
+
+    task = dojo.tasks.idto.mini_cheetah_hills(count=2)
+    terrain = task.model.mechanism.contacts[0].terrain
+    plant = MujocoPlant(task.model, task.begin())
+    hit = np.zeros(1, np.int32)
+    for x in (1.0, 1.7, 2.0, 2.25, 2.5, 3.1, 3.6):
+        far = mujoco.mj_ray(plant._model, plant._data, np.array([x, 0.3, 1.0]), -np.eye(3)[2], None, 1, -1, hit)
+        assert 1.0 - far == pytest.approx(float(terrain.height(x, 0.3)), abs=1e-6)
+    ball = dojo.Body("ball", 1.0, 0.01 * np.eye(3))
+    contacts = [dojo.Contact("ball", radius=0.1, terrain=terrain)]
+    falling = dojo.Mechanism([ball], [dojo.Joint("floating", None, "ball")], contacts, [])
+    sim = dojo.Simulator(falling, time_step=1e-3, kappa=1e-8)
+    start = sim.neutral()
+    start[:3] = 2.0, 0.0, 0.2
+    plant = MujocoPlant(sim, start)
+    for _ in range(500):
+        _, result = plant.step(np.zeros(0))
+    assert plant.x[2] == pytest.approx(0.15, abs=5e-3)
+    assert -5e-3 < result.contacts.gap[0] < 0.0
+    with pytest.raises(ValueError, match="rises from level ground"):
+        MujocoPlant(dojo.Simulator(falling.on(dojo.Terrain.steps([0.1], 0.3)), time_step=1e-3), start)
 
 
 def turned(quaternion, vector):

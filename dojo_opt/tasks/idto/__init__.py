@@ -19,12 +19,23 @@ from dojo_opt.tasks.idto.allegro import allegro
 from dojo_opt.tasks.idto.dual_jaco import dual_jaco
 from dojo_opt.tasks.idto.jaco import jaco
 from dojo_opt.tasks.idto.jaco_ball import jaco_ball
-from dojo_opt.tasks.idto.mini_cheetah import mini_cheetah
+from dojo_opt.tasks.idto.mini_cheetah import mini_cheetah, mini_cheetah_hills
 from dojo_opt.tasks.idto.planar_hopper import hopper
 from dojo_opt.tasks.idto.spinner import spinner
 from sim.mechanism.checks import nearest
 
-__all__ = ["acrobot", "air_hockey", "allegro", "dual_jaco", "hopper", "jaco", "jaco_ball", "mini_cheetah", "spinner"]
+__all__ = [
+    "acrobot",
+    "air_hockey",
+    "allegro",
+    "dual_jaco",
+    "hopper",
+    "jaco",
+    "jaco_ball",
+    "mini_cheetah",
+    "mini_cheetah_hills",
+    "spinner",
+]
 
 
 if not TYPE_CHECKING:

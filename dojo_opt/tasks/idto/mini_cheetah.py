@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.tasks.free_gait import free_gait_mpc
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
 from dojo_opt.tasks.suite import SuiteTask
+from sim.mechanism.checks import whole_number
 from sim.mechanism.contact import Contact
 from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
@@ -17,7 +19,7 @@ from sim.mechanism.terrain import Terrain
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
-__all__ = ["mini_cheetah"]
+__all__ = ["mini_cheetah", "mini_cheetah_hills"]
 
 _RATE = 60.0  # [Hz]
 _WAY, _LOW, _TILT = 3.2, 0.15, 0.5  # [m] in 10 s, [m] and [rad] of the trunk
@@ -26,6 +28,8 @@ _EFFORT = (18.0, 18.0, 26.0)  # [N m]
 _FRICTION = 0.3  # assumed by plans, against slip on the .67 of the plant
 _TORQUE = 5e-4  # [1/(N m)^2]
 _SERVO = 50.0, 2.0  # [N m/rad], [N m s/rad]
+_HILL, _FIRST, _APART, _ROUND = 0.05, 2.0, 1.0, 1.0  # [m] height, place, distance and radius of hills
+_GRID = 0.01  # [m]
 _LEGS = {"fl": (1.0, 1.0), "fr": (1.0, -1.0), "hl": (-1.0, 1.0), "hr": (-1.0, -1.0)}
 
 
@@ -138,6 +142,51 @@ def mini_cheetah(*, speed: float = 0.4, terrain: Terrain | None = None, **settin
     spread = np.array([0.05, 0.05, 0.01, 0.05, 0.05, 0.05] + [0.1] * 12 + [0.1] * 18)
     judge = _Walked(_WAY * speed / 0.4)
     return SuiteTask("idto.mini_cheetah", mpc, model, mpc.start, 10.0, spread, judge, _RATE, rise=2)
+
+
+def hills(count: int) -> Terrain:
+    """Cylinders of 1 m radius that lie across the way, 50 mm above the ground, .62 m wide there, 1 m apart.
+
+    Args:
+        count: number of hills.
+
+    Returns:
+        The ground.
+    """
+    end = _FIRST + _APART * count
+    lines = np.linspace(0.0, end, round(end / _GRID) + 1)
+
+    def height(x: Any, y: Any) -> Any:
+        del y
+        off = np.abs(x[..., None] - _FIRST - _APART * np.arange(count)).min(axis=-1)
+        return np.sqrt(np.maximum(_ROUND**2 - off**2, (_ROUND - _HILL) ** 2)) - (_ROUND - _HILL)
+
+    return Terrain.from_function(height, lines, [0.0])
+
+
+def mini_cheetah_hills(*, count: int = 5, speed: float = 0.4, **settings: Any) -> SuiteTask:
+    """Walk over five hills of 50 mm, 1 m apart, at .4 m/s: `mini_cheetah` on that ground, which plans know.
+
+    A run of 20 s is a success if the trunk passes the last hill, at x = 6.5 m (in proportion at other speeds), and
+    stays above .15 m, with roll and pitch below .5 rad.
+
+    Args:
+        count: number of hills.
+        speed: speed of the nominal motion [m/s].
+        **settings: settings of `dojo.MPC`, instead of the ones of the task.
+
+    Returns:
+        The task.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range.
+    """
+    count = whole_number("idto.mini_cheetah_hills(count=...)", count)
+    way = _FIRST + _APART * count - 0.5
+    task = mini_cheetah(speed=speed, terrain=hills(count), **settings)
+    judge, duration = _Walked(way), 8.0 / speed * way / 6.5
+    return replace(task, name="idto.mini_cheetah_hills", duration=duration, judge=judge)
 
 
 class _Walked:
