@@ -1,6 +1,6 @@
 """Contact-implicit MPC on published task suites: successes, tick times and penetration, beside the published rates.
 
-    NUMBA_NUM_THREADS=1 python benchmarks/mpc_suites.py [TASK ...] [--runs N] [--first SEED]
+    NUMBA_NUM_THREADS=1 python benchmarks/mpc_suites.py [TASK ...] [--runs N] [--first SEED] [--plant PLANT]
 
 Tasks are those of IDTO (arXiv 2309.01813): costs, horizons, rates and the delay of one tick are theirs, contact is
 ours. `free_gait` is the quadruped of `tasks.free_gait_mpc` at .3 m/s, with the horizon and rate of arXiv 2312.08961;
@@ -36,6 +36,7 @@ DISTURBED = tuple(SPEEDS)[1:]
 DISTURBANCES: dict[str, Any] = {"push": (8.0, 8.0), "push_time": (3.0, 6.0), "payload": (0.0, 1.0)}
 DISTURBANCES |= {"friction": (0.4, 0.8), "slope": (0.0, 0.1)}
 OURS, MUJOCO = "ours, 1 ms, kappa 1e-8", "MuJoCo, default contacts"
+PLANTS = {"ours": OURS, "mujoco": MUJOCO}
 HEADER = (
     *("task", "succeed", "of", "replans at [Hz]", "allowed [ms]", "tick [ms]", "99 % [ms]", "fell back", "of ticks"),
     *("penetration [mm]", "measured in the first run", "other ends"),
@@ -92,7 +93,7 @@ def line(task: Any, kind: str, perturbed: range, seconds: float | None) -> tuple
 def run(args: argparse.Namespace) -> Report:
     """The requested tasks."""
     report = Report("MPC on published suites", "")
-    kinds = [OURS] + ([MUJOCO] if find_spec("mujoco") is not None else [])
+    kinds = [PLANTS[args.plant]] if args.plant else [OURS] + ([MUJOCO] if find_spec("mujoco") is not None else [])
     runs, seconds = (1, QUICK) if args.quick else (args.runs, None)
     perturbed = range(args.first, args.first + runs)
     tasks = {name: made(name) for name in args.tasks}
@@ -129,6 +130,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments.add_argument("tasks", nargs="*", default=list(TASKS), metavar="TASK", help=", ".join(TASKS))
     arguments.add_argument("--runs", type=int, default=10, help="perturbed starts per task")
     arguments.add_argument("--first", type=int, default=0, help="seed of the first perturbed start")
+    arguments.add_argument("--plant", choices=PLANTS, help="one plant only (default: both)")
     return deliver("mpc_suites", run, arguments, argv)
 
 

@@ -36,7 +36,7 @@ Stack = NDArray[np.float64]
 
 _SCALES = (1.0, 0.5, 0.0)  # of the gains of the rollouts that guess="feedback" chooses from
 _ROUNDING = 1e-9  # [s] times are sums of floating-point steps
-_LOST = 10.0  # times the merit of the shifted plan: a rollout worse than that has left it
+_LOST = 10.0  # times the merit of the guess of a tick: a rollout worse than that has left it
 
 __all__ = ["MPC"]
 
@@ -263,7 +263,7 @@ class MPC:
     def _rolled(self, guess: Iterate, K: Stack) -> Iterate | None:
         """After a rejected step: the rollout of the shifted plan under its gains, None when it is nowhere near it."""
         there = self._solver.rollout(guess, K)
-        return there if there is not None and there.merit <= _LOST * guess.merit else None
+        return there if there is not None and _near(there, guess) else None
 
     def _policy(self, now: float, x: Matrix, u: Matrix, K: Stack) -> Policy:
         """A plan made at `now`, which starts when its first input can act."""
@@ -277,7 +277,7 @@ class MPC:
         """
         ended = result.status in (Status.SOLVED, Status.LINE_SEARCH, Status.TIME_LIMIT)
         stepped = any(record["alpha"] > 0.0 for record in result.history)
-        near = stepped or result.now.merit <= _LOST * guess.merit
+        near = stepped or _near(result.now, guess)
         return ended and bool(np.isfinite(result.now.merit)) and result.consistent and near
 
     def _guess(self, shifted: Policy) -> Iterate | None:
@@ -315,3 +315,8 @@ class MPC:
         )
         if self.settings.log is not None:
             del self.log[: -self.settings.log]
+
+
+def _near(there: Iterate, guess: Iterate) -> bool:
+    """Whether a rollout is still near the guess that it began from."""
+    return there.merit - guess.merit <= (_LOST - 1.0) * abs(guess.merit)

@@ -57,8 +57,9 @@ class Direction(NamedTuple):
 
 
 class Search:
-    """Step sizes 1, 1/2, 1/4, ... along a direction; trials that the simulator cannot step do not count.
+    """Step sizes 1, 1/2, 1/4, ... along a direction, or powers of another `backtracking`.
 
+    Trials that the simulator cannot step do not count.
     `rollouts` is single shooting, the usual line search of iLQR. `states` is multiple shooting, for unstable robots
     whose rollouts fall before the horizon ends. The derivation is in docs/theory/ilqr.md.
     """
@@ -137,7 +138,7 @@ class Search:
                 if good:
                     self._first = min(1.0, _LENGTHEN * alpha)
                     return alpha, there
-            alpha *= 0.5
+            alpha *= options.backtracking
         self.restart()
         return 0.0, now
 
@@ -168,7 +169,7 @@ class Search:
                 change = there.merit - now.merit + float(np.abs(left).sum(axis=0) @ self._price) - owed
                 if change <= options.armijo * alpha * (promise.d0 + 0.5 * alpha * promise.d1 - owed):
                     return alpha, there, linear
-            alpha *= 0.5
+            alpha *= options.backtracking
         return 0.0, now, None
 
     def _costates(self, linear: Any, dx: Matrix, du: Matrix) -> Matrix:

@@ -74,7 +74,8 @@ class Options:
         value_regularization: multiple of the regularisation that is added to the Hessian V_xx of the value (default 0).
         armijo: share of the predicted decrease that a step must achieve (default 0.01).
         ascent: allowed multiple of a predicted increase, which only open gaps cause (default 2).
-        halvings: number of times that the line search halves the step size (default 6).
+        halvings: number of times that the line search may halve the step size (default 6).
+        backtracking: factor from one step size of the line search to the next (default 0.5); 0.25 tries half as many.
         rejections: failed line searches in a row before gaps are closed by a rollout, or kappa_grad is reduced (default
             2).
         shooting: with open gaps, a step shorter than this is compared with one of multiple shooting; 0 for single
@@ -104,6 +105,7 @@ class Options:
     armijo: float = 1e-2
     ascent: float = 2.0
     halvings: int = 6
+    backtracking: float = 0.5
     rejections: int = 2
     shooting: float = 1.0
     time_limit: float = float("inf")
@@ -118,6 +120,8 @@ class Options:
             value = getattr(self, field.name)
             if isinstance(field.default, int | float) and not isinstance(field.default, bool):
                 self._check_number(field.name, value, whole=isinstance(field.default, int))
+        if not 0.0 < self.backtracking < 1.0:
+            raise ValueError(f"ilqr(backtracking=...): expected a number between 0 and 1, got {self.backtracking}")
         if self.callback is not None and not callable(self.callback):
             raise TypeError(f"ilqr(callback=...): expected a function of a record, got {self.callback!r}")
         stages = self._stages()

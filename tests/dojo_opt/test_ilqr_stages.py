@@ -78,6 +78,23 @@ def test_the_first_trials_of_a_search_give_wild_steps_up_early():
     assert limits[0] == limits[1] < 100 and limits[2:] == [None] * 3
 
 
+def test_step_sizes_go_down_by_the_factor_of_the_options():
+    """1, 1/4, 1/16 instead of 1, 1/2, 1/4, 1/8, 1/16: three rollouts for five."""
+    problem = swingup(Stuck())
+    solver = Solver(problem, Options(halvings=4, backtracking=0.25))
+    horizon = problem.sim.horizon(problem.horizon, problem.substeps, problem.control_limits)
+    sizes, roll = [], horizon.roll
+    horizon.roll = lambda *given, **named: sizes.append(named["alpha"]) or roll(*given, **named)
+    search = Search(problem, horizon, solver.objective, solver.options)
+    now = solver.guess(np.zeros((31, 2)), problem.controls0)
+    k, K = np.ones((30, 1)), np.zeros((30, 1, 2))
+    search.rollouts(now, Direction(k, K, None, None, Promise(Status.SOLVED, 0, -1.0, 0.0, 0.0)), 1e-4)
+    assert sizes == [1.0, 0.25, 0.0625]
+    for factor in (0.0, 1.0, 2.0):
+        with pytest.raises(ValueError, match="backtracking"):
+            Options(backtracking=factor)
+
+
 def test_iterations_one_by_one_agree_with_a_solve():
     """Gains and regularisation carry over from one call to the next."""
     problem, (stage,) = swingup(), ONE_STAGE

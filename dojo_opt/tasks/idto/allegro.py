@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.mpc.controller import MPC
+from dojo_opt.mpc.settings import OPTIONS
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.closed_loop import ClosedLoop
@@ -33,6 +34,8 @@ _JOINTS, _HEIGHT, _QUATERNION = 16, 18, slice(19, 23)  # of the fingers; of the 
 _EFFORT = 0.7  # [N m]
 _REACH = 0.02  # [m] of contacts in plans, of which those further away would cost most of the time
 _KAPPA = 1e-5  # [N s m]
+_GRIP = 0.7  # friction of the fingers that plans assume, 1 in the plant: plans with all of it squeeze the ball out
+_BACKTRACKING = 0.25  # of the line search, whose rollouts take most of a tick
 _PALM = 0.18  # friction of palm and ball; plans that assume 1, as the publication's do, let the ball slide off
 _UP = np.array([0.5**0.5, 0.0, -(0.5**0.5), 0.0])  # the palm, whose fingers point along -x
 _BALL = 0.05, 0.06, (-0.06, 0.0, 0.0712)  # [kg], [m], place [m]
@@ -164,7 +167,8 @@ def allegro(**settings: Any) -> SuiteTask:
     A run of 10 s is a success when the ball ends within 15 degrees of its goal and stays above z = 50 mm throughout.
     The fingers start opened, without contact; those of the publication start up to 7.2 mm inside the ball. The limit of
     the thumb is moved to fit its start. Plans know the friction of the palm, .18, where those of the publication count
-    on 1, and contacts beyond 20 mm do not act on them.
+    on 1, and assume .7 of the fingers' 1: plans that count on all of it squeeze the ball until it slips out. Contacts
+    beyond 20 mm do not act on them.
 
     Args:
         **settings: settings of `dojo.MPC`, instead of the ones of the task.
@@ -176,7 +180,7 @@ def allegro(**settings: Any) -> SuiteTask:
         TypeError: for an unknown setting.
         ValueError: for an argument out of range.
     """
-    sim = Simulator(mechanism(1.0, _PALM, servos=True), time_step=_KNOT, kappa=_KAPPA)
+    sim = Simulator(mechanism(_GRIP, _PALM, servos=True), time_step=_KNOT, kappa=_KAPPA)
     own = mechanism(1.0, _PALM)
     start = sim.neutral()
     goal = start.copy()
@@ -193,6 +197,7 @@ def allegro(**settings: Any) -> SuiteTask:
     ]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=_SERVO[0] * start[:_JOINTS])
     given = timed(_RATE) | {"servo": own, "gain_scale": 0.0}
+    given |= {"options": replace(OPTIONS, backtracking=_BACKTRACKING)}
     given |= {"kappa": _KAPPA, "first": Options(stages=(Stage(1e-4, 1e-4), Stage(_KAPPA, _KAPPA)))}
     mpc = MPC(problem, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)
