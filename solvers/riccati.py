@@ -47,7 +47,7 @@ class Regularization(NamedTuple):
     damping: Vector  # (m,) unit of `control`
 
 
-class Promise(NamedTuple):
+class PredictedChange(NamedTuple):
     """Result of the backward pass."""
 
     status: Status  # SOLVED, SINGULAR (Q_uu not positive definite) or NOT_FINITE
@@ -193,18 +193,20 @@ def _predict(quad: Quadratic, K: Stack, k: Matrix, z: Vector, y: Vector, dx: Vec
     return d0, d1
 
 
-def backward(quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: Integers, buffer: Vector) -> Promise:
+def backward(
+    quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: Integers, buffer: Vector
+) -> PredictedChange:
     """Gains K (T, m, n), k (T, m) of the regularised model, and the change predicted for the full step.
 
     k on entry is the guess of the box QPs. free: (m,) integer scratch; buffer: (work_size(n, m),). The horizon is
-    done in pieces that return to Python, which hears Ctrl-C between them.
+    processed in pieces, so that Python can handle Ctrl-C between them.
     """
     left, gradient = len(K), 0.0
     while True:
         until = (left, gradient, seconds() + PAUSE)
         status, left, d0, d1, gradient = backward_knots(quad, reg, K, k, free, buffer, until)
         if left == 0 or status != _SOLVED:
-            return Promise(Status(status), max(left - 1, 0), d0, d1, gradient)
+            return PredictedChange(Status(status), max(left - 1, 0), d0, d1, gradient)
 
 
 @kernel
@@ -216,7 +218,7 @@ def backward_knots(
 
     until: the number of these knots, the gradient so far, and the moment to pause [s].
 
-    Returns the fields of the Promise, with the number of knots that are left in the place of the knot.
+    Returns the fields of the PredictedChange, with the number of knots that are left in the place of the knot.
     """
     T, m, n = K.shape
     p = n + m

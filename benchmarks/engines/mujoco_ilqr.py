@@ -97,8 +97,8 @@ class MujocoIlqr:
                 message = "the backward pass fails at any regularisation"
                 break
             K, k, mu = gains
-            promise = self._promise(A, B, gaps, K, k)
-            alpha, merit, xs, us = self._search(merit, xs, us, gaps, K, k, promise)
+            predicted = self._predicted(A, B, gaps, K, k)
+            alpha, merit, xs, us = self._search(merit, xs, us, gaps, K, k, predicted)
             mu = max(10.0 * mu, MU_FIRST) if alpha < 0.1 else (0.1 * mu if mu > MU_FIRST else 0.0)
             seconds.append(time.process_time() - start)
             gap = float(np.abs(gaps).max()) * (1.0 - alpha)
@@ -133,7 +133,7 @@ class MujocoIlqr:
         return xs, us
 
     def _search(
-        self, merit: float, xs: Matrix, us: Matrix, gaps: Matrix, K: Any, k: Matrix, promise: tuple[float, float]
+        self, merit: float, xs: Matrix, us: Matrix, gaps: Matrix, K: Any, k: Matrix, predicted: tuple[float, float]
     ) -> tuple[float, float, Matrix, Matrix]:
         """(step size, merit, xs, us) of the first of 1, 1/2, 1/4, ... with enough decrease; 0 and the old ones if none.
 
@@ -142,8 +142,8 @@ class MujocoIlqr:
         for alpha in 0.5 ** np.arange(HALVINGS):
             x_new, u_new = self._rollout(xs, us, gaps, K, k, alpha)
             new = self._objective.evaluate(x_new, u_new)[1]
-            promised = alpha * (promise[0] + 0.5 * alpha * promise[1])
-            if new - merit <= (ARMIJO if promised < 0.0 else ASCENT) * promised:  # false for NaN
+            change = alpha * (predicted[0] + 0.5 * alpha * predicted[1])
+            if new - merit <= (ARMIJO if change < 0.0 else ASCENT) * change:  # false for NaN
                 return float(alpha), new, x_new, u_new
         return 0.0, merit, xs, us
 
@@ -219,7 +219,7 @@ class MujocoIlqr:
                     return None
                 mu = max(10.0 * mu, MU_FIRST)
 
-    def _promise(self, A: Any, B: Any, gaps: Matrix, K: Any, k: Matrix) -> tuple[float, float]:
+    def _predicted(self, A: Any, B: Any, gaps: Matrix, K: Any, k: Matrix) -> tuple[float, float]:
         """(d0, d1): the linear model of the full step changes the merit by  a d0 + a^2/2 d1."""
         g, H, n = self._objective.g, self._objective.H, A.shape[1]
         z, d0, d1 = np.zeros(n + B.shape[2]), 0.0, 0.0

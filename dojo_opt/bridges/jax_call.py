@@ -1,8 +1,8 @@
 """A callback from JAX to Python with NumPy arrays.
 
-`jax.pure_callback` turns its arguments into arrays of JAX, whose copies are made by the threads that computations, and
-so callbacks, run on. Where there is one such thread, as on one core, the callback waits for ever for its own arguments
-as soon as they are large (jax 0.10). This is the same without arrays of JAX.
+`jax.pure_callback` turns its arguments into arrays of JAX, which copies them on its computation threads, where
+callbacks run, too. With a single thread, as on one core, a callback with large arguments deadlocks (jax 0.10). This is
+the same without arrays of JAX.
 """
 
 from __future__ import annotations

@@ -108,8 +108,8 @@ def _held(sim: Simulator, state: Array, left: Array, by: str) -> Array:
     if np.abs(left[free]).max(initial=0.0) > 1e-3 * np.abs(potential_gradient(sim, state)).max(initial=0.0):
         k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
         raise ValueError(
-            f"equilibrium({sim.mechanism.name}): no {by} balance the weight: {left[k]:.3g} N or N m remains at "
-            f"{sim.mechanism.dof_names[k]!r}"
+            f"equilibrium({sim.mechanism.name}): the {by} cannot balance the weight: {left[k]:.3g} N (or N m) is left "
+            f"at {sim.mechanism.dof_names[k]!r}"
         )
     return np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
 

@@ -2,8 +2,8 @@
 
     min over theta and the starts s_k    sum_k sum_t rho(|r_kt|^2) + max(1, rms^2) sum_i ((theta_i - m_i)/s_i)^2
 
-with r of windows.py, and prior knowledge of some parameters, m_i +- s_i. Models err more than the noise says:
-the mean square of the errors, rms^2, is by how much, and the data count that much less.
+with r of windows.py, and prior knowledge of some parameters, m_i +- s_i. Errors of the
+model add to the noise of the measurement; rms^2 measures by how much, and the data are down-weighted by it.
 
 Starts are eliminated window by window (Schur complement), so the work grows with the data and not with its square. rho
 is Huber's, by iteratively reweighted least squares: a state whose scaled error has a root mean square above `outlier`
@@ -41,9 +41,11 @@ Floats = NDArray[np.float64]
 __all__ = ["Identified", "IdentifyOptions", "identify"]
 
 _DAMPING, _LEAST, _LARGEST = 1e-3, 1e-9, 1e8  # share of the diagonal
-_UNSEEN = 1e-8  # of the largest eigenvalue: combinations that the data do not tell
+_UNSEEN = 1e-8  # of the largest eigenvalue: combinations that the data do not determine
+_NEARLY = 10.0  # tolerances: the decrease that a fit may still expect at its end, where no step brings one
 _AWAY = 0.3  # of a value: standard deviation of further starts where no prior tells one
 _EXACT = 1e-10  # square of the errors over their noise: data without noise
+_MESSAGES = {**MESSAGES, Status.LINE_SEARCH: "No damped step decreases the cost as the linear model expects."}
 COLUMNS = ("iteration", "kappa", "cost", "rms", "damping", "step", "outliers", "unsolved", "seconds")
 _HEADER = "{:>9} {:>8} {:>12} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8}".format(*COLUMNS)
 
@@ -54,23 +56,24 @@ class Identified:
 
     Attributes:
         success: whether the last smoothing converged.
-        status: SOLVED, or the reason for an early end.
+        status: SOLVED, or the reason for an early end: MAX_ITERATIONS, LINE_SEARCH if no damped step decreases the
+            cost as the linear model expects, SIMULATION_FAILED.
         message: the same as a sentence.
-        labels: of the values.
-        values: (n,).
-        start: (n,) before.
+        labels: names of the fitted values.
+        values: (n,) fitted values, in the units of their parameters.
+        start: (n,) values before the fit.
         covariance: (n, n); infinite on the diagonal for parameters that the data do not determine.
-        simulator: with the values.
+        simulator: the simulator with the fitted values.
         rms: root mean square of the errors over their noise: 1 if the given noise is right.
         unseen: combinations, by label, that change no prediction and have no prior.
         outliers: share of states with reduced weight.
         cost: cost of the data and the prior, see the module.
-        starts: (nx,) of every window.
+        starts: (nx,) fitted first state of every window.
         windows: the measured windows.
         noise: (ndx,) standard deviations of the measurement.
         solved: whether each window could be predicted at the end.
         history: one record per iteration.
-        seconds: processor time.
+        seconds: processor time [s].
     """
 
     success: bool
@@ -157,7 +160,7 @@ class Identified:
         lines += [f"{name:32} {value:12.6g} {sd:12.3g} {old:12.6g}" for name, value, sd, old in self._rows()]
         for combination in self.unseen:
             terms = " ".join(f"{v:+.2f} {k}" for k, v in combination.items())
-            lines.append(f"not told by the data: {terms}")
+            lines.append(f"not determined by the data: {terms}")
         return "\n".join([*lines, self.closing_line()])
 
 
@@ -251,8 +254,8 @@ class _Fit:
             free &= ~out
         theta = np.clip(self.theta + self.unit * d, self.space.low, self.space.high)
         moves = -(back[:, :, -1] + back[:, :, :-1] @ d)
-        promised = self.pull(self.theta) - self.pull(theta) - equations.change(d, moves)
-        return theta, list(self.base.integrate(np.array(self.starts), moves)), promised
+        decrease = self.pull(self.theta) - self.pull(theta) - equations.change(d, moves)
+        return theta, list(self.base.integrate(np.array(self.starts), moves)), decrease
 
 
 @dataclass(frozen=True)
@@ -262,8 +265,8 @@ class IdentifyOptions:
     Attributes:
         window: steps that are predicted from one start, which is free within the noise (default None: whole motions).
         every: number of steps from one compared state to the next (default 1).
-        kappas: smoothing of contacts, one after the other [N s m]: a smooth one is felt from afar (default None: that
-            of the simulator).
+        kappas: smoothing of contacts, one after the other [N s m]: smooth contacts act at a distance (default None:
+            that of the simulator).
         outlier: number of deviations; states whose errors have a larger root mean square count linearly (default 3).
         tolerance: share of the cost; a smoothing ends when an iteration brings less (default 1e-4).
         max_iterations: limit per smoothing (default 30).
@@ -372,6 +375,8 @@ def _fitted(
     levels, status = o.kappas or (fit.base.kappa,), Status.SOLVED
     for kappa in levels:
         status = _descend(fit, kappa, o, began, history)
+        if status == Status.SIMULATION_FAILED:
+            break
     return _identified(fit, levels[-1], status, history, began)
 
 
@@ -387,17 +392,19 @@ def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history:
         if data <= _EXACT * sum(w.errors.size for w in found):
             return Status.SOLVED
         accepted, gain, equations = False, 0.0, NormalEquations(found, weights, fit.unit)
+        expected = None  # of the least damped step
         while damping < _LARGEST and not accepted:
-            theta, starts, promised = fit.step(equations, damping)
-            if promised <= o.tolerance * cost:  # no step that is short enough brings more
-                return Status.SOLVED
+            theta, starts, decrease = fit.step(equations, damping)
+            expected = decrease if expected is None else expected
+            if decrease <= o.tolerance * cost:  # more damping predicts still less
+                return _stopped(expected, cost, o)
             trial = fit.errors(theta, starts, kappa, slopes=False)
             if trial is not None and all(t.solved or not use for t, use in zip(trial, usable, strict=True)):
                 ahead = fit.weigh(trial, usable)[0] + fit.pull(theta)
                 accepted, gain = ahead < cost, (cost - ahead) / cost
             damping = max(damping / 5.0, _LEAST) if accepted else 4.0 * damping
-        if not accepted:
-            return Status.LINE_SEARCH if not history else Status.SOLVED
+        if expected is None or not accepted:
+            return Status.LINE_SEARCH
         size = float(np.linalg.norm((theta - fit.theta) / fit.unit))
         fit.theta, fit.starts = theta, starts
         again = fit.errors(theta, starts, kappa, slopes=True)
@@ -420,8 +427,16 @@ def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history:
             print("\n".join([*head, line]), file=sys.stdout, flush=True)
         history.append(record)
         if gain < o.tolerance:
-            return Status.SOLVED
+            return _stopped(expected, cost, o)
     return Status.MAX_ITERATIONS
+
+
+def _stopped(expected: float, cost: float, o: IdentifyOptions) -> Status:
+    """How a smoothing ends whose cost falls no further, by the decrease that the least damped step was to bring.
+
+    Where that is large, the motions are not as the linear model has them, as at a change of contacts.
+    """
+    return Status.SOLVED if expected <= _NEARLY * o.tolerance * cost else Status.LINE_SEARCH
 
 
 def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str, Any]], began: float) -> Identified:
@@ -446,7 +461,7 @@ def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str,
         for axis in axes[:, ~seen].T
     ]
     return Identified(
-        status == Status.SOLVED, status, MESSAGES[status], space.labels, fit.theta, space.values, covariance,
+        status == Status.SOLVED, status, _MESSAGES[status], space.labels, fit.theta, space.values, covariance,
         space.simulator(fit.theta), float(np.sqrt(cost / max(count, 1))), unseen, far,
         fit.rest(cost, found, usable), fit.starts, fit.windows, fit.predictor.noise, usable,
         history, time.process_time() - began,

@@ -1,4 +1,4 @@
-"""DiscountedSum: the rewards of rows of a rollout, with the value of their last states, and how a policy changes them.
+"""DiscountedSum: discounted returns of the rows of a rollout with bootstrapped values, and their gradient.
 
     J_t = r_t + gamma s(x_t+1) J_t+1,      J = V of the state where a row is cut off, or the rollout ends,
     dJ_t/dx_t+1 = dr_t/dx_t+1 + gamma s dJ_t+1/dx_t+1 + gamma ds/dx_t+1 J_t+1

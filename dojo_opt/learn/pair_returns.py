@@ -1,4 +1,4 @@
-"""PairReturns: returns of whole episodes under weights ahead and behind of those of a policy, for random search."""
+"""PairReturns: returns of episodes under weights perturbed in both directions (antithetic pairs), for random search."""
 
 from __future__ import annotations
 

@@ -86,8 +86,8 @@ class MPC:
         self.references = References(self.problem, reference)
         if self.settings.computation > self.period + _ROUNDING:
             raise ValueError(
-                f"MPC(computation={self.settings.computation:g}): a plan takes longer than the period of "
-                f"{self.period:g} s of the plans"
+                f"MPC(computation=...): expected at most the period between plans, {self.period:g} s, got "
+                f"{self.settings.computation:g} s"
             )
         self._delay = Delay(self.sim, self.settings.delay)
         self._predict = Prediction(self.sim, self.settings.computation)

@@ -115,7 +115,7 @@ class Sampled:
 
 
 class Onward:
-    """A target that goes along with the robot: the reference of a velocity, or of a ramp that every plan begins anew.
+    """A reference anchored at the measured state: a constant velocity, or a ramp that restarts with every plan.
 
         x(t) = begin + (end - begin) min(s, 1),  s = (t - t0) / duration,  on the manifold
 

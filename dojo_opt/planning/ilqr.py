@@ -31,7 +31,7 @@ from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.subproblem import Subproblem
 from sim.mechanism import checks
 from sim.simulator.results import Interrupted, Linearization
-from solvers.riccati import Promise
+from solvers.riccati import PredictedChange
 from solvers.status import MESSAGES, Status
 
 Matrix = NDArray[np.float64]
@@ -47,9 +47,9 @@ _STALLED = 5  # multiplier updates of the last stage without progress
 _SOFTEN = 3  # times that a stuck last stage may go back to the one before it
 _GOOD_STEP = 0.5  # a step at least this long lowers the regularisation
 _POOR_STEP = 0.1  # one shorter than this raises it
-_LIGHT = 1.0  # regularisation up to the control weight: a small promise then means an optimum
+_LIGHT = 1.0  # regularisation up to the control weight: a small prediction then means an optimum
 _SLOW = 2  # short steps in a row with next to no decrease end a stage
-_SLOW_OPEN = 6  # the same with open gaps and a model that promises more: standing still is a poor guess of a trot
+_SLOW_OPEN = 6  # the same with open gaps and a model that predicts more: standing still is a poor guess of a trot
 _SHARPER = 0.1  # factor of kappa_grad when its derivatives lead nowhere
 _PATIENCE = 3  # times the rejections allowed where only regularisation is left to try
 _CREEPING = 15  # short or rejected steps in a row: of 116 planned gaits and hops, none takes more than 11
@@ -81,7 +81,7 @@ def ilqr(
 
     Args:
         problem: the problem.
-        controls: (T, nu) guess of the inputs [N, N m]; by default that of the problem.
+        controls: (T, nu) guess of the inputs [N, N m], clipped to `control_limits`; by default that of the problem.
         states: (T + 1, nx) guess of the states; by default that of the problem, or the rollout of the inputs.
         warm_start: an earlier plan of the same problem, whose trajectory, multipliers and penalties are taken over. A
             plan of an easier variant, for example with more damping, often helps if a direct solve fails.
@@ -447,23 +447,25 @@ class Solver:
         local, rejections, kappa_grad = self._subproblem, self.options.rejections, stage.kappa_grad
         last = stage is self.options.stages[-1]  # it must not leave gaps; others leave them to the stages to come
         rejected = slow = short = 0
+        assert stage.decrease is not None  # Options fills it in
+        decrease = stage.decrease
         self._search.restart()
         for _ in range(stage.iterations):
             before = self.now
             if not local.is_at(before) and local.linearize(before, kappa_grad, stage.kappa_eval) != Status.SOLVED:
                 return Status.SIMULATION_FAILED
-            promise, mu = local.gains(before), local.damping.mu
-            if promise.status != Status.SOLVED:
-                return local.fault(before, promise)
-            small = stage.decrease * (abs(before.merit) + _SMALL)
-            promised = -(promise.d0 + 0.5 * promise.d1)
-            if before.gaps is None and mu <= _LIGHT and promised <= small:
+            predicted, mu = local.gains(before), local.damping.mu
+            if predicted.status != Status.SOLVED:
+                return local.fault(before, predicted)
+            small = decrease * (abs(before.merit) + _SMALL)
+            expected = -(predicted.d0 + 0.5 * predicted.d1)
+            if before.gaps is None and mu <= _LIGHT and expected <= small:
                 return Status.SOLVED
             status = self._history.budget()
             if status != Status.SOLVED:
                 return status
-            alpha = self._step(promise, stage, kappa_grad)
-            if self._record(promise, stage, kappa_grad, mu, alpha):
+            alpha = self._step(predicted, stage, kappa_grad)
+            if self._record(predicted, stage, kappa_grad, mu, alpha):
                 return Status.STOPPED
             rejected = 0 if alpha > 0.0 else rejected + 1
             short = 0 if alpha >= _POOR_STEP else short + 1
@@ -474,17 +476,17 @@ class Solver:
                 return Status.LINE_SEARCH
             if alpha > 0.0:
                 slow = slow + 1 if abs(before.merit - self.now.merit) <= small else 0
-                if slow >= _slow_steps(alpha, before, promised > small):
+                if slow >= _slow_steps(alpha, before, expected > small):
                     if self.now.gaps is None or not last:
                         return Status.SOLVED
                     self._close_gaps(stage)
                     slow = 0
         return Status.SOLVED
 
-    def _step(self, promise: Promise, stage: Stage, kappa_grad: float) -> float:
+    def _step(self, predicted: PredictedChange, stage: Stage, kappa_grad: float) -> float:
         """Search along the gains, and adapt the regularisation to the step size, which is 0 if none is accepted."""
         before, damping, kappa = self.now, self._subproblem.damping, stage.kappa_eval
-        direction = self._subproblem.direction(promise)
+        direction = self._subproblem.direction(predicted)
         alpha, self.now = self._search.rollouts(before, direction, kappa)
         linear = None
         if alpha < self.options.shooting and before.gaps is not None:
@@ -495,7 +497,7 @@ class Solver:
             damping.decrease()
         elif (
             alpha < _POOR_STEP
-            # while contact is discovered, gaps close only under gains that keep the robot up: at 1e6 none are left
+            # while contacts are discovered, gaps close only if the gains keep the robot upright: at 1e6 none are left
             and (self.now.gaps is None or damping.mu < _FIRM or stage is self.options.stages[-1])
         ):
             damping.increase()
@@ -503,12 +505,12 @@ class Solver:
             self._subproblem.expand(self.now, linear)
         return alpha
 
-    def _record(self, promise: Promise, stage: Stage, kappa_grad: float, mu: float, alpha: float) -> bool:
+    def _record(self, predicted: PredictedChange, stage: Stage, kappa_grad: float, mu: float, alpha: float) -> bool:
         """Put the iteration into the history; True when the callback wants to stop."""
-        now, promised = self.now, alpha * (promise.d0 + 0.5 * alpha * promise.d1)
+        now, change = self.now, alpha * (predicted.d0 + 0.5 * alpha * predicted.d1)
         kappas = {"kappa_eval": stage.kappa_eval, "kappa_grad": kappa_grad}
-        merit = {"cost": now.cost, "merit": now.merit, "gradient": promise.gradient}
-        step = {"mu": mu, "alpha": alpha, "promised": promised, "gap": now.gap}
+        merit = {"cost": now.cost, "merit": now.merit, "gradient": predicted.gradient}
+        step = {"mu": mu, "alpha": alpha, "predicted": change, "gap": now.gap}
         return self._history.add(**merit, **kappas, **step, violation=self.objective.violation(now.x, now.u))
 
     def _recover(self, stage: Stage, kappa_grad: float) -> float | None:
@@ -593,8 +595,8 @@ class Solver:
         return plan
 
 
-def _slow_steps(alpha: float, before: Iterate, promising: bool) -> int:
+def _slow_steps(alpha: float, before: Iterate, expecting: bool) -> int:
     """How many steps in a row with next to no decrease end the stage."""
     if before.gaps is None:
         return 1 if alpha >= _GOOD_STEP else _SLOW
-    return _SLOW_OPEN if promising else _SLOW
+    return _SLOW_OPEN if expecting else _SLOW

@@ -11,7 +11,7 @@ from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import Options
 from dojo_opt.planning.problem import Problem
 from sim.simulator.horizon import Horizon, Known
-from solvers.riccati import Promise
+from solvers.riccati import PredictedChange
 from solvers.status import Status
 
 Matrix = NDArray[np.float64]
@@ -49,11 +49,11 @@ class Direction(NamedTuple):
     K: Stack  # (T, nu, ndx)
     start: Any  # (ndx,) step of a free start, None when the start is given
     linear: Any  # derivatives of the dynamics that the gains belong to
-    promise: Promise
+    change: PredictedChange
 
     def predicted(self, alpha: float) -> float:
-        """Change of merit that the model promises for step size alpha."""
-        return alpha * (self.promise.d0 + 0.5 * alpha * self.promise.d1)
+        """Change of merit that the model predicts for step size alpha."""
+        return alpha * (self.change.d0 + 0.5 * alpha * self.change.d1)
 
 
 class Search:
@@ -121,7 +121,7 @@ class Search:
     def rollouts(self, now: Iterate, direction: Direction, kappa: float) -> tuple[float, Iterate]:
         """(step size, new iterate) of the first rollout that is good enough; (0, now) without one.
 
-        With d the promised change of merit, a step is taken when merit - merit_old <= armijo d for d < 0. With open
+        With d the predicted change of merit, a step is taken when merit - merit_old <= armijo d for d < 0. With open
         gaps, closing them may cost: d > 0 allows an increase up to ascent d.   Mastalli et al. 2020, "Crocoddyl".
         """
         options, alpha = self._options, self._first
@@ -151,7 +151,7 @@ class Search:
 
         judged by merit + sum of price |gap|, an exact penalty with the largest costates so far as prices.
         """
-        problem, options, promise = self._problem, self._options, direction.promise
+        problem, options, predicted = self._problem, self._options, direction.change
         self._objective.at_kappa(kappa)
         dx, du = _full_step(now, direction)
         gaps = 0.0 if now.gaps is None else np.abs(now.gaps).sum(axis=0)
@@ -167,7 +167,7 @@ class Search:
                 left = self._horizon.gaps(linear, x)
                 there = Iterate(x, u, left, *self._objective.evaluate(x, u), kappa)
                 change = there.merit - now.merit + float(np.abs(left).sum(axis=0) @ self._price) - owed
-                if change <= options.armijo * alpha * (promise.d0 + 0.5 * alpha * promise.d1 - owed):
+                if change <= options.armijo * alpha * (predicted.d0 + 0.5 * alpha * predicted.d1 - owed):
                     return alpha, there, linear
             alpha *= options.backtracking
         return 0.0, now, None

@@ -24,7 +24,7 @@ __all__ = ["multi_start"]
 
 _POINTS = 6  # of the splines that are added to a guess
 _SHARE = 0.25  # of the range of a limited input: standard deviation of a point
-_LESS = 0.3  # times the largest input of a guess: of 12 hops planned so, 10 are solved; of 8 at the whole of it, 4
+_LESS = 0.3  # times the largest input of a guess: it solves 10 of 12 hops, the whole of it 4 of 8
 _GRAVITY = 9.81  # [m/s^2]
 
 # controls, states and warm start

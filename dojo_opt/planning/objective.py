@@ -53,9 +53,9 @@ class Objective:
         self._last = []
 
     def _unit(self, term: Term) -> Any:
-        """Unit of a constraint's penalties: the curvature 2 w of costs: a multiple of a problem is solved alike.
+        """Scale of a constraint's penalties, the curvature 2 w of the costs: scaled costs have the same iterations.
 
-        Of a component of x or u, that of its own weight; without one, and of anything else, the largest.
+        A component of x or u has that of its own weight; without one, and for anything else, it is the largest.
         """
         largest = max((2.0 * float(cost.weight.max(initial=0.0)) for cost in self.costs), default=0.0)
         largest = largest if largest > 0.0 else 1.0

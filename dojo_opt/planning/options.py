@@ -21,15 +21,17 @@ class Stage(NamedTuple):
         kappa_eval: smoothing of the contacts in rollouts [N s m].
         kappa_grad: smoothing of the contacts in derivatives [N s m].
         decrease: the stage ends when the predicted or actual decrease of an iteration is less than this share of the
-            merit (default 0.03).
+            merit (default None: `Options.tolerance` for the last stage, 0.03 for others).
         iterations: the stage ends after this many iterations (default 100).
     """
 
     kappa_eval: float
     kappa_grad: float
-    decrease: float = 3e-2
+    decrease: float | None = None
     iterations: int = 100
 
+
+_COARSE = 3e-2  # decrease of a stage that others follow
 
 # Contact is discovered at a large kappa, where it acts at a distance, and made true on the way down to the last stage.
 # Derivatives are those of the rollouts throughout: a smoother kappa_grad costs a linearisation more per iteration.
@@ -57,7 +59,8 @@ class Options:
             1).
         bisections: number of times that a step of kappa is halved, on a logarithmic scale, if its rollout is lost
             (default 3).
-        tolerance: share of the merit; the last stage ends when an iteration lowers the merit by less (default 1e-3).
+        tolerance: share of the merit; the last stage ends when an iteration lowers the merit by less, unless it has a
+            `decrease` of its own (default 1e-3).
         max_iterations: limit of all iterations, rejected ones included (default 300).
         max_updates: multiplier updates before the constraints count as infeasible (default 20).
         violation: largest violation of a constraint in a plan that counts as solved [unit of the residual]
@@ -125,7 +128,9 @@ class Options:
         if self.callback is not None and not callable(self.callback):
             raise TypeError(f"ilqr(callback=...): expected a function of a record, got {self.callback!r}")
         stages = self._stages()
-        object.__setattr__(self, "stages", (*stages[:-1], stages[-1]._replace(decrease=self.tolerance)))
+        *others, last = stages
+        found = [*(_with_decrease(stage, _COARSE) for stage in others), _with_decrease(last, self.tolerance)]
+        object.__setattr__(self, "stages", tuple(found))
         for stage in self.stages:
             kappas = [checks.number("ilqr(stages=...): kappa", k) for k in (stage.kappa_eval, stage.kappa_grad)]
             if not min(kappas) > 0.0:
@@ -160,3 +165,8 @@ class Options:
         """
         if self.verbose:
             print(line, file=self.stream or sys.stdout)
+
+
+def _with_decrease(stage: Stage, decrease: float) -> Stage:
+    """The stage, with this decrease unless it has one of its own."""
+    return stage if stage.decrease is not None else stage._replace(decrease=decrease)

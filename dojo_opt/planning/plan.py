@@ -90,11 +90,12 @@ class Plan:
         k: (T, nu) step that the last backward pass still proposed [N, N m].
         violation: largest violation of a constraint [unit of its residual].
         gap: largest gap of the dynamics [m, rad, m/s, rad/s].
-        seconds: duration of the solve [s].
+        seconds: wall time of the solve [s].
         time_step: time step of the simulator [s].
         substeps: number of time steps per knot.
         stride: (ndx,) displacement over one period of a periodic motion (default None: not periodic).
-        history: one record per iteration, its keys as in the table of iterations.
+        history: one record per iteration: iteration, cost, merit, gradient, kappa_eval, kappa_grad, mu, alpha, gap,
+            violation, milliseconds, predicted (decrease of the merit), and a note where the table has one.
         multipliers: one (m, d) array per constraint.
         penalties: likewise.
         problem: the Problem; not saved.

@@ -73,7 +73,7 @@ class Problem:
         control_limits: (lower, upper), numbers or (nu,) [N, N m], which hold at every iteration (default None:
             those of the inputs of the mechanism, as a file gives them; (-np.inf, np.inf) is none).
         substeps: steps of `sim.time_step` per knot, with the input held (default 1).
-        controls0: (T, nu) guess of the inputs [N, N m] (default zero).
+        controls0: (T, nu) guess of the inputs [N, N m], clipped to `control_limits` (default zero).
         states0: (T + 1, nx) guess of the states, which need not be consistent: the planner closes its gaps (default
             None: the rollout of the inputs).
         free_start: tangent components of the start that the planner may change, by number or name, or True for all;

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dojo_opt.planning.options import Options
 
 _FACTOR = 2.0  # of the schedule, growing geometrically with repeated use: Tassa 2012, section II.F
-_USEFUL = 1.0  # a raise starts here and a lowering below it switches off: less changes next to nothing
+_USEFUL = 1.0  # smallest mu above zero: an increase starts here, and a decrease below it gives zero
 
 
 class Damping:

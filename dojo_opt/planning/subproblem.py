@@ -14,7 +14,7 @@ from dojo_opt.planning.options import Options
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.regularisation import Damping
 from sim.simulator.horizon import Horizon
-from solvers.riccati import Promise, Quadratic, Regularization, backward, value_hessian, work_size
+from solvers.riccati import PredictedChange, Quadratic, Regularization, backward, value_hessian, work_size
 from solvers.status import MESSAGES, Status
 
 Matrix = NDArray[np.float64]
@@ -99,46 +99,48 @@ class Subproblem:
         gaps = self._no_gaps if now.gaps is None else now.gaps
         return Quadratic(self.linear.A, self.linear.B, self._objective.g, self._objective.H, gaps, lo, hi)
 
-    def gains(self, now: Iterate) -> Promise:
+    def gains(self, now: Iterate) -> PredictedChange:
         """K and k at the first regularisation, from the present one upwards, with all Q_uu positive definite."""
         model, damping, options = self.model(now), self.damping, self._options
         while True:
             added = Regularization(damping.mu, damping.mu * options.value_regularization, self._unit)
-            promise = backward(model, added, self.K, self.k, self._free, self._buffer)
-            if promise.status == Status.SOLVED and self.start is not None:
-                promise = self._free_the_start(self.start, now, model, promise)
-            if promise.status == Status.SOLVED or damping.mu >= options.regularization_max:
-                return promise
+            predicted = backward(model, added, self.K, self.k, self._free, self._buffer)
+            if predicted.status == Status.SOLVED and self.start is not None:
+                predicted = self._free_the_start(self.start, now, model, predicted)
+            if predicted.status == Status.SOLVED or damping.mu >= options.regularization_max:
+                return predicted
             damping.increase()
 
-    def _free_the_start(self, start: FreeStart, now: Iterate, model: Quadratic, promise: Promise) -> Promise:
+    def _free_the_start(
+        self, start: FreeStart, now: Iterate, model: Quadratic, predicted: PredictedChange
+    ) -> PredictedChange:
         """Add the step of a free start, once the gaps are closed: before, both together would lead too far."""
         if now.gaps is None:
             k, d0, d1 = start.solve(model, self.K, self.k, self.damping.mu, self._unit, now.x, now.u)
-            if d0 + 0.5 * d1 < promise.d0 + 0.5 * promise.d1:  # rounding: a fixed start may promise more
+            if d0 + 0.5 * d1 < predicted.d0 + 0.5 * predicted.d1:  # rounding: a fixed start may predict more
                 self.k[:] = k
-                return promise._replace(d0=d0, d1=d1)
+                return predicted._replace(d0=d0, d1=d1)
         start.step[:] = 0.0
-        return promise
+        return predicted
 
-    def direction(self, promise: Promise) -> Direction:
-        """The step of the last backward pass, which made that promise."""
-        return Direction(self.k, self.K, None if self.start is None else self.start.step, self.linear, promise)
+    def direction(self, predicted: PredictedChange) -> Direction:
+        """The step of the last backward pass, which made that prediction."""
+        return Direction(self.k, self.K, None if self.start is None else self.start.step, self.linear, predicted)
 
-    def fault(self, now: Iterate, promise: Promise) -> Status:
-        """Why the backward pass at `now` failed with that promise; `detail` has the knot."""
-        model, knot = self.model(now), promise.knot
-        if promise.status == Status.MAX_ITERATIONS:
-            self.detail = f" It is that of the quadratic program of the control limits, at knot {knot}."
-            return promise.status
+    def fault(self, now: Iterate, predicted: PredictedChange) -> Status:
+        """Why the backward pass at `now` failed with that prediction; `detail` has the knot."""
+        model, knot = self.model(now), predicted.knot
+        if predicted.status == Status.MAX_ITERATIONS:
+            self.detail = f" The quadratic program of the control limits did not converge at knot {knot}."
+            return predicted.status
         for name, parts in (("dynamics", (model.A, model.B, model.gaps[1:])), ("costs", (model.g, model.H))):
             knots = [k for part in parts for k in np.flatnonzero(~np.isfinite(part).reshape(len(part), -1).all(axis=1))]
             if knots:
                 self.detail = f" In the derivatives of the {name}, at knot {min(knots)}."
                 return Status.NOT_FINITE
         value = value_hessian(self._buffer, self._problem.sim.ndx)
-        if promise.status == Status.NOT_FINITE or not np.all(np.isfinite(value)):
-            self.detail = f" The cost to go grows beyond all numbers, at knot {knot}."
+        if predicted.status == Status.NOT_FINITE or not np.all(np.isfinite(value)):
+            self.detail = f" The cost-to-go overflows at knot {knot}."
             return Status.NOT_FINITE
         self.detail = f" At knot {knot}."
         return Status.MAX_REGULARIZATION

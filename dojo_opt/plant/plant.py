@@ -23,8 +23,8 @@ Vector = NDArray[np.float64]
 __all__ = ["Plant"]
 
 _SOFTER = (10.0, 100.0, 1000.0)  # times the smoothing of a step that is not solved at its own
-_LOW = 0.5  # fallen: below this share of the first height,
-_TILTED = 0.5  # or with less than this cosine between the base's axis and the normal of the ground
+_LOW = 0.5  # a base below this share of its first height has fallen
+_TILTED = 0.5  # and so has one whose axis has a smaller cosine with the normal of the ground
 _FLOOR = 0.1  # a plane with a normal that points up by more than this can be the floor
 _LEVEL = 1e-6  # vertical part of a level axis
 

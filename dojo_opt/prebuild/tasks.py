@@ -45,7 +45,7 @@ def states(sim: Simulator) -> None:
     sim.difference(np.stack([x, x]), np.stack([x, x]))
     sim.start(x[: sim.nq], x[sim.nq :])
     sim.bodies(x[: sim.nq], x[sim.nq :])
-    sim.energy(x), sim.kinetic_energy(x), sim.momentum(x), sim.left_out(x)
+    sim.energy(x), sim.kinetic_energy(x), sim.momentum(x), sim.inactive_contacts(x)
     sim.loop_gaps(x)
     if sim.mechanism.loops:
         sim.loop_rank()

@@ -1,4 +1,4 @@
-"""Worker processes that compile for a target into one cache, each the next task when it is done with one.
+"""Worker processes that compile for a target into one cache; each takes the next task when it finishes one.
 
 A worker reads names of tasks and answers each with a line. It ends where its input ends, or with the process that
 started it.

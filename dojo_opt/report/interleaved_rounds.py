@@ -1,4 +1,4 @@
-"""Interleaved rounds: every case once per round, so that a busy moment of the machine hits all of them alike."""
+"""Interleaved rounds: every case once per round, so that the load of the machine affects all cases equally."""
 
 from __future__ import annotations
 

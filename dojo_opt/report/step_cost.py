@@ -81,7 +81,7 @@ def costs(scenes: Sequence[CostScene], rounds: int) -> list[Cost]:
 def _sizes(scene: CostScene, solved: bool) -> tuple[int, int, int, int]:
     """(velocities, variables, far, bytes) of the first step; none are inactive if it is not solved."""
     sim = scene.simulator
-    far = sim.left_out(scene.state) if solved else ()
+    far = sim.inactive_contacts(scene.state) if solved else ()
     laws = {name: Law(int(law)) for name, law in zip(sim.mechanism.contact_names, sim.model.contact_law, strict=True)}
     near = sum(_VARIABLES[law] for name, law in laws.items() if name not in far)
     near += 2 * len(sim.model.limit_dof)

@@ -1,6 +1,6 @@
 """Restitution: Moreau's impact law on the velocity of the gap, joined to the condition on the gap itself.
 
-A contact whose gap closes, and would be closed at the next configuration if it went on like that, is an impact:
+A contact that closes, and whose extrapolated gap is negative, is an impact:
 
     phi2 < phi1,   2 phi2 - phi1 < 0        then   phi3 - phi2 >= -e (phi2 - phi1),   complementary to its impulse
 

@@ -1,9 +1,9 @@
 """The hardness of the contacts of a derivative, limited by rounding.
 
-The condensed law df = W d(gap, slip) is added to the inertia of a body, and a hard impact has W/m up to 1e14: only
-two digits of the inertia in the free directions of the contact would remain. A contact that gives a
-little, E = W^-1 - D, has nearly the same derivative: it differs by D/G, G the velocity per impulse that the bodies
-answer with there, and rounding adds 1e-16 M/D, M the same of a body that is free. So
+The condensed law df = W d(gap, slip) is added to the inertia of a body, and a hard impact has W/m up to 1e14: only two
+digits of the inertia in the free directions of the contact would remain. A slightly compliant contact, of compliance
+W^-1 - D, has nearly the same derivative. It differs by D/G, where G is the velocity per unit impulse at the contact;
+rounding adds 1e-16 M/D, where M is that of a free body. So
 
     W' = (W^-1 - D)^-1 = (I - W D)^-1 W,      D = diag(h d, d, d),      d = 3e-8 sqrt(M G)
 

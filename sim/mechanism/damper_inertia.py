@@ -7,7 +7,7 @@ it. These motions are x_d = I_d M^-1 e_d, so a parameter p changes the inertia b
 
     dI_d/dp = d(x_d.M x_d)/dp at constant x_d
 
-At zero, the axes of arms are often in line, and their inertias next to nothing, as nowhere else.
+At zero angles the axes of an arm are often aligned, which makes their inertias unusually small.
 """
 
 from __future__ import annotations

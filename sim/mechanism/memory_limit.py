@@ -50,8 +50,8 @@ def check_room(call: str, number: int, each: float, remedy: str = "take fewer") 
     """
     if number * each > memory():
         raise ValueError(
-            f"{call}: {number:.6g} of them take {number * each / 2**30:.3g} GiB of memory at least, and there are "
-            f"{memory() / 2**30:.3g} GiB; {remedy}"
+            f"{call}: {number:.6g} of them need at least {number * each / 2**30:.3g} GiB of memory; "
+            f"{memory() / 2**30:.3g} GiB are available: {remedy}"
         )
 
 

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 __all__ = ["self_collisions", "separation"]
 
-_ONE = 1e3  # weight of "the shares of the points of a shape add up to one" beside distances in units of the shapes
+_ONE = 1e3  # weight of the convexity constraint against distances in units of the shapes
 _REACH = 0.01  # of the extent of a robot: its links act on one another from this gap on
 _TOUCHING = 1e-5  # of the size of two shapes: nearer ones overlap
 

@@ -12,7 +12,7 @@ import numpy as np
 
 __all__ = ["short_repr", "short_table", "drawn"]
 
-_FEW = 6  # numbers of an array, and entries of a list, that are said one by one
+_FEW = 6  # length of the longest array or list that is printed in full
 _LETTERS = 120  # of a part
 _ROWS = 50  # of a table
 

@@ -21,7 +21,7 @@ from solvers.types import Vector
 
 __all__ = ["is_due", "pieces", "rows", "note_deadline"]
 
-_LOOK = 64.0  # work between two looks at the clock, which cost as much as a tenth of the smallest step
+_LOOK = 64.0  # work between two readings of the clock; one costs about a tenth of the smallest step
 _ROWS = 64  # of the first piece
 _ONE = (None,)
 _DEADLINE = int(StepSetting.DEADLINE)  # NumPy takes three times as long with the member of an enum

@@ -66,7 +66,7 @@ class LawForm(Code):
 
     PLAIN = 0  # as it stands
     STICKING = 1  # linear in the slip of contacts that stick
-    SOFT = 2  # soft enough for its digits: of derivatives
+    SOFT = 2  # softened to limit rounding, for derivatives
 
 
 FAILED = Outcome(int(Status.NO_PROGRESS), 0, 1e300, 1e300)

@@ -48,7 +48,7 @@ class Scratch:
         return first
 
     def turn(self) -> None:
-        """Take the contact frames of the model anew, which were turned; every thread does so before its next call."""
+        """Mark Data as stale after contact frames turned; every thread reloads them at its next call."""
         self._turns += 1
 
     def chunks(self, count: int) -> Table:

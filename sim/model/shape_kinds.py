@@ -23,7 +23,7 @@ class Shape(Code):
     BOX = 2  # half extents along x, y, z
     CYLINDER = 3  # radius, half length
     HALFSPACE = 4  # no sizes: z <= 0 of its frame is solid
-    POLYTOPE = 6  # row of its table (polytope_table.py), radius; as others are against one, and all against a cylinder
+    POLYTOPE = 6  # row of its table (polytope_table.py), radius; boxes and capsules are polytopes in some pairs
     ELLIPSOID = 7  # semi-axes along x, y, z
     FIELD = 8  # row of its table (level_set.py), radius around the level set, least extent
     STRING = 5  # as shape a: greatest length; against a STRING b without sizes: the other end

@@ -24,14 +24,14 @@ __all__ = ["Horizon", "Known", "Rollout", "Steps"]
 
 
 class Steps(NamedTuple):
-    """Cone variables of the steps of a rollout: where those of a rollout nearby start to look for theirs."""
+    """Cone variables of a rollout, which warm-start rollouts nearby."""
 
     cones: Floats  # (T, ncontact, 12)
     bounds: Floats  # (T, nlimit, 2)
 
 
 class Known(NamedTuple):
-    """Derivatives and steps at a trajectory: they tell where the steps of a rollout nearby may look first."""
+    """Derivatives and cone variables at a trajectory, which predict and warm-start rollouts nearby."""
 
     linear: Linearization | None = None
     steps: Steps | None = None

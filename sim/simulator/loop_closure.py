@@ -20,7 +20,7 @@ from sim.simulator.engines.mean_states import MeanStates
 
 Floats = NDArray[np.float64]
 
-_APART = 0.1  # [m], and as much of an angle: a share of a body further from the rest of it is brought there first
+_APART = 0.1  # [m, rad] parts of a cut body that are farther apart are first brought together
 _ASIDE = 0.03  # [m, rad]
 _ALONE = 2  # starts of each distance of one loop alone, which are only to explain why all of them stay open
 _STARTS = 30  # repetitions, each of which halves the error at least

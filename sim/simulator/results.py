@@ -595,6 +595,6 @@ def missed(errors: Floats) -> str:
 
 
 def fastest(mech: Mechanism, z: Floats) -> str:
-    """The body that turns fastest in a maximal state (nbody, 13), as a sentence; for short steps, else turns wrap."""
+    """Name the fastest-turning body of a maximal state (nbody, 13); its step is short, otherwise turns wrap."""
     w = np.linalg.norm(z[:, BodyState.SPIN], axis=1)
     return f"The fastest is {mech.body_names[int(w.argmax())]!r}, with {w.max():.3g} rad/s before the step."

@@ -37,8 +37,9 @@ class Settings(NamedTuple):
     accuracy: float = 0.0  # error of coordinates that steps may make [m/s, rad/s]; 0: steps are not divided for it
 
     def array(self, kappa: float | None = None) -> Vector:
-        """As kernels read it, at another kappa when given, with room for a deadline (interruptible_loops.py); without
-        those that choose an engine.
+        """The settings as an array for kernels, without those that only choose the engine.
+
+        kappa: replaces that of the settings. The deadline (interruptible_loops.py) is infinite.
         """
         level = self.kappa if kappa is None else kappa
         limits = self.max_iterations, inf, self.gain, self.loss

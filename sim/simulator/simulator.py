@@ -72,8 +72,8 @@ class Simulator(RowStepping):
             order 2 near contacts, collisions and limits, and for joints too stiff for an explicit step: see
             `describe()`.
         divide: whether a step that cannot be solved, or turns a body too far, becomes 2, 4, ... up to 1024 steps, as
-            few as it needs: see `substeps` of results. The parts conserve momentum exactly, unless no two poses one
-            step apart have this momentum. Then bodies lose relative momentum: see `shares`.
+            few as it needs: see `substeps` of results. The parts conserve momentum exactly, unless no pair of
+            consecutive poses has this momentum; then part of the relative momentum is lost: see `shares`.
         accuracy: allowed error of the joint coordinates per second of motion [m, rad]. Each step is divided into
             sub-steps of order 8 or 2 accordingly, and impacts happen at their own times. `errors` of results has the
             ratio of estimated to allowed error; see sim/integrators/adaptive.py.
@@ -194,7 +194,8 @@ class Simulator(RowStepping):
             x: (nx,) state.
             us: (T, nu) inputs [N, N m], or a function u = us(time, x), called before each step; zero by default.
             steps: number of steps, if `us` does not determine it.
-            duration: of all steps [s], of a simulator with an accuracy; its time step of each by default.
+            duration: total duration [s], only with `accuracy`: it is divided evenly among the inputs, or `steps`, or is
+                that of a single step. By default each step has the time step.
             throw: raise SimulationError where a step is not solved.
             wrenches: external wrenches, (T, nbody, 6) or by body.
 
@@ -348,7 +349,7 @@ class Simulator(RowStepping):
         found = reactions(self.mechanism, self._engine, (states, us, external), lead, frame, self._sentence)
         return ended(found, throw)
 
-    def left_out(self, x: ArrayLike, u: ArrayLike | None = None) -> tuple[str, ...]:
+    def inactive_contacts(self, x: ArrayLike, u: ArrayLike | None = None) -> tuple[str, ...]:
         """Inactive contacts of a step; the solver has no unknowns for them, but their forces kappa / gap act.
 
         Args:

@@ -73,7 +73,7 @@ _FIRST = (
     Strategy(Start.KNOWN, replace_features=True),
     # the usual start of a step of which nothing is known
     Strategy(Start.INCOMING, replace_features=True),
-    # where friction follows the impulses, the cones of thin contacts jam; from here on it is led down
+    # with friction tied to the impulses thin cones jam; from here on its smoothing is lowered by continuation
     Strategy(Start.FRACTION, continuation=True, features=_EVERY_POSE, replace_features=True),
     # attempts end at folds, where the null vector of the Newton matrix leads to the other side
     Strategy(Start.BEHIND_FOLD, continuation=True, features=_EVERY_POSE),

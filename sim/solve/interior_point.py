@@ -13,7 +13,7 @@ It differs in these points (60,000 random extreme states, `benchmarks/robustness
   `smoothing` that follows down to kappa (contact_law.py); conic scalings jam on thin cones.
 * The boundary of the cones stops no step: pairs that would leave return to the central path.
 * No body turns by more than .7 rad per iteration, beyond which the Jacobian of a gap does not predict it.
-* Where the path has folded, friction bounds and arms of impulses count as constant, half or more.
+* At folds of the path, the terms that can make the matrix indefinite count by 1/2, 1/4, ... (newton_direction.py).
 * An attempt that ends in a fold is given up, and the next strategy starts elsewhere (globalization.py).
 * Equations of a step have several solutions. One in which shapes overlap in features that were not active, or which
   gains energy, is refused (pairs/active_features.py, energy_balance.py).
@@ -123,7 +123,7 @@ def solve_from(
         if s.continuation and smoothing < before:
             patience = max(patience, iterations + _PATIENCE // 2)
         solved = merit.residual < options.tolerance and smoothing <= kappa
-        # a guess within the tolerance gets one step too: the error is squared
+        # a guess within the tolerance gets one step, too: Newton's method squares its error
         if solved and iterations > 0 and on_path(model, data, h, kappa, spread, merit.violation):
             return Outcome(Status.SOLVED.value, iterations, merit.residual, merit.violation)
         if iterations >= options.max_iterations:

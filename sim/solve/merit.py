@@ -60,10 +60,10 @@ def judge(
 def follow(
     model: Model, data: Data, least: float, smoothing: float, ratio: float, slip: float
 ) -> tuple[float, float, float]:
-    """The smoothing brought down to `least` as far as the friction law holds on the way, and its violation there.
+    """Lower the smoothing towards `least` while the friction law holds; returns it, the violation there, and the ratio.
 
     ratio: of one smoothing to the next; it shrinks where Newton's method lands well within the law.
-    slip: the violation at the smoothing it comes with.
+    slip: the violation at the smoothing given.
     """
     if slip < 0.03 * smoothing:
         ratio = max(1e-4, ratio * ratio)

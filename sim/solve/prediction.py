@@ -4,8 +4,8 @@
 
 from the impulses l of the step before: a step of Josephy's method. Newton's method finds out slowly which contacts
 press, stick and slide, one iteration of it costs as much as all of this (sim/solve/delassus.py), and from here it takes
-two or three. The error is of second order in the change of the velocity; the same once more,
-with the residual there and the matrices of before, costs less than an iteration and leaves a tenth of it or less.
+two or three. The error is of second order in the change of the velocity; a second pass,
+with the new residual and the old matrices, costs less than an iteration and reduces the error at least tenfold.
 """
 
 from __future__ import annotations

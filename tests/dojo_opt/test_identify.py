@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
 import dojo_opt as dojo
+from dojo_opt.identification.identify import _Fit
 from dojo_opt.identification.normal_equations import NormalEquations
 from dojo_opt.identification.windows import Predictor, WindowErrors, cut_windows, difference_slopes
+from solvers.status import Status
 
 
 def _arm(damper=0.3, mass=1.0):
@@ -50,13 +53,29 @@ def test_outliers_are_resisted():
     assert errors[0] < 3.0 * robust.deviation[0] and errors[0] < 0.5 * errors[1] and robust.outliers > 0.01
 
 
+def test_a_fit_whose_steps_all_raise_the_cost_is_not_called_solved(monkeypatch):
+    """The linear model predicts a decrease that no step brings, at the second smoothing as at the first."""
+    errors = _Fit.errors
+
+    def worse(fit, theta, starts, kappa, slopes):
+        found = errors(fit, theta, starts, kappa, slopes)
+        late = not slopes and kappa == 1e-6
+        return [replace(w, errors=10.0 * w.errors) for w in found] if late else found
+
+    monkeypatch.setattr(_Fit, "errors", worse)
+    motions = _motions(_arm(), np.random.default_rng(4), np.array([0.01, 0.05]))
+    found = dojo.identify(_arm(0.1), motions, ("damper",), noise=0.01, kappas=(1e-4, 1e-6), max_iterations=1)
+    assert [record["kappa"] for record in found.history] == [1e-4]
+    assert not found.success and found.status == Status.LINE_SEARCH and "cost" in found.message
+
+
 def test_unidentifiable_parameters_are_named():
     """Of a body that hangs still on a hinge without gravity, mass and inertia about the hinge act as one."""
     sim = _arm().replace(gravity=(0.0, 0.0, 0.0))
     motions = _motions(sim, np.random.default_rng(2), np.zeros(2))
     found = dojo.identify(sim, motions, ("mass", "inertia:link[yy]"), noise=0.01)
     assert len(found.unseen) == 1 and set(found.unseen[0]) <= {"mass:link", "inertia:link[yy]"}
-    assert np.isinf(np.diag(found.covariance)).any() and "not told" in found.summary()
+    assert np.isinf(np.diag(found.covariance)).any() and "not determined" in found.summary()
 
 
 def test_a_prior_decides_where_the_data_do_not():

@@ -5,9 +5,9 @@ import numpy as np
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.planning.ilqr import Solver, ilqr
-from dojo_opt.planning.options import Options
+from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
-from solvers.riccati import Promise
+from solvers.riccati import PredictedChange
 from solvers.status import MESSAGES, Status
 from support.doubles import DoubleIntegrator, Pendulum, SmoothedWall
 from support.small_problems import gaps, lqr, swingup
@@ -125,7 +125,7 @@ def test_a_number_that_is_not_finite_is_not_regularized():
     problem.costs[0].weight[3] = np.nan
     assert "In the derivatives of the costs, at knot 3." in ilqr(problem).message
     plan = ilqr(broken(knot=5, factor=1e200))
-    assert plan.status == Status.NOT_FINITE and "The cost to go grows beyond all numbers, at knot 4." in plan.message
+    assert plan.status == Status.NOT_FINITE and "The cost-to-go overflows at knot 4." in plan.message
 
 
 def test_derivatives_that_cannot_be_had_are_said():
@@ -135,11 +135,11 @@ def test_derivatives_that_cannot_be_had_are_said():
 
 
 def test_a_box_qp_that_does_not_end(monkeypatch):
-    unfinished = Promise(Status.MAX_ITERATIONS, 3, 0.0, 0.0, 0.0)
+    unfinished = PredictedChange(Status.MAX_ITERATIONS, 3, 0.0, 0.0, 0.0)
     monkeypatch.setattr("dojo_opt.planning.subproblem.backward", lambda *arguments: unfinished)
     plan = ilqr(lqr())
     assert plan.status == Status.MAX_ITERATIONS
-    assert "quadratic program of the control limits, at knot 3" in plan.message
+    assert "quadratic program of the control limits did not converge at knot 3" in plan.message
 
 
 def test_gains_of_a_plan_have_no_more_regularization_than_they_need():
@@ -164,3 +164,9 @@ def test_infeasible_constraints():
 
 def test_every_status_has_a_sentence():
     assert set(MESSAGES) == set(Status)
+
+
+def test_a_decrease_of_the_last_stage_is_kept():
+    given = Options(stages=(Stage(1e-3, 1e-3), Stage(1e-6, 1e-6, 1e-5)), tolerance=1e-2)
+    assert [stage.decrease for stage in given.stages] == [3e-2, 1e-5]
+    assert Options(stages=((1e-6, 1e-6),), tolerance=1e-2).stages[0].decrease == 1e-2

@@ -9,7 +9,7 @@ from dojo_opt.planning.ilqr import Iterate, Solver, ilqr
 from dojo_opt.planning.ilqr_search import Direction, Search
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
-from solvers.riccati import Promise
+from solvers.riccati import PredictedChange
 from solvers.status import Status
 from support.doubles import DoubleIntegrator, Pendulum, SmoothedWall
 from support.small_problems import ONE_STAGE, gaps, lqr, swingup
@@ -56,7 +56,9 @@ def test_partial_steps_leave_the_rest_of_the_gaps(rng):
     horizon = problem.sim.horizon(problem.horizon, problem.substeps, problem.control_limits)
     search = Search(problem, horizon, solver.objective, solver.options)
     linear = horizon.linearize(now.x, now.u, 1e-4)
-    shot = search.rollout(now, K, 1e-4, Direction(k, K, None, linear, Promise(Status.SOLVED, 0, 0.0, 0.0, 0.0)), 0.25)
+    shot = search.rollout(
+        now, K, 1e-4, Direction(k, K, None, linear, PredictedChange(Status.SOLVED, 0, 0.0, 0.0, 0.0)), 0.25
+    )
     assert now.gap > 1e-2
     for t in range(30):
         following = problem.sim.advance(shot.x[t], shot.u[t], 1, 1e-4)
@@ -73,7 +75,9 @@ def test_the_first_trials_of_a_search_give_wild_steps_up_early():
     search = Search(problem, horizon, solver.objective, solver.options)
     now = solver.guess(np.zeros((31, 2)), problem.controls0)
     k, K = np.ones((30, 1)), np.zeros((30, 1, 2))
-    alpha, _ = search.rollouts(now, Direction(k, K, None, None, Promise(Status.SOLVED, 0, -1.0, 0.0, 0.0)), 1e-4)
+    alpha, _ = search.rollouts(
+        now, Direction(k, K, None, None, PredictedChange(Status.SOLVED, 0, -1.0, 0.0, 0.0)), 1e-4
+    )
     assert alpha == 0.0 and len(limits) == 5
     assert limits[0] == limits[1] < 100 and limits[2:] == [None] * 3
 

@@ -284,7 +284,7 @@ def test_a_plan_that_takes_time_leaves_the_one_before_in_force():
     assert mpc.policy is not first
     assert mpc.policy.time == pytest.approx(0.04)
     assert len(mpc.log) == 3
-    with pytest.raises(ValueError, match="takes longer than the period"):
+    with pytest.raises(ValueError, match="expected at most the period between plans"):
         reaching(sim, period=0.02, computation=0.03)
     with pytest.raises(ValueError, match="give one of them"):
         reaching(sim, delay=0.01, computation=0.01)

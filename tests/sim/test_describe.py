@@ -57,4 +57,4 @@ def test_the_gap_of_inactive_collisions_is_that_of_a_step() -> None:
     for share, omitted in ((1.05, ("a-b",)), (0.95, ())):
         x = sim.neutral()
         x[:3], x[7:10] = (0.2 + share * float(found[1]), 0.0, 0.0), 0.0
-        assert sim.left_out(x) == omitted
+        assert sim.inactive_contacts(x) == omitted

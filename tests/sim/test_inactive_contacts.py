@@ -217,8 +217,8 @@ def test_names_and_distances_of_omitted_contacts():
     )
     sim = dojo.Simulator(mech, time_step=0.02)
     x = np.r_[0.0, 0.0, 0.3, 1.0, np.zeros(9)]
-    assert sim.left_out(x) == ("wall",)
-    assert dojo.Simulator(pendulum()).left_out(np.zeros(2)) == ()
+    assert sim.inactive_contacts(x) == ("wall",)
+    assert dojo.Simulator(pendulum()).inactive_contacts(np.zeros(2)) == ()
     text = sim.describe()
     assert "inactive contacts" in text and "omitted from the solver beyond a gap of" in text
     assert "inactive contacts" not in dojo.Simulator(pendulum()).describe()
@@ -229,4 +229,4 @@ def test_reach_is_where_a_contact_at_rest_becomes_far(kappa):
     sim = dojo.Simulator(ball(gravity=np.zeros(3)), time_step=0.02, kappa=kappa)
     edge = reach(sim.model, 0.02, kappa, sim.tolerance)[0]
     for share, expected in ((0.99, 0), (1.01, 1)):
-        assert len(sim.left_out(np.r_[0.0, 0.0, 0.1 + share * edge, 1.0, np.zeros(9)])) == expected
+        assert len(sim.inactive_contacts(np.r_[0.0, 0.0, 0.1 + share * edge, 1.0, np.zeros(9)])) == expected

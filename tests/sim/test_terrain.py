@@ -144,11 +144,11 @@ def test_far_contacts_are_left_out_and_change_nothing():
     sim = dojo.Simulator(mech, time_step=H, kappa=1e-8, tolerance=1e-8)
     x = sim.neutral()
     x[2] += 1.0
-    assert sim.left_out(x) == ("ball",)
-    assert sim.left_out(sim.neutral()) == ()
+    assert sim.inactive_contacts(x) == ("ball",)
+    assert sim.inactive_contacts(sim.neutral()) == ()
     x[sim.nq : sim.nq + 3] = 1.0, 0.4, 0.0
     exact = dojo.Simulator(mech, time_step=H, kappa=1e-8, tolerance=1e-13)
-    assert exact.left_out(x) == ()
+    assert exact.inactive_contacts(x) == ()
     np.testing.assert_allclose(run(sim, x, 60), run(exact, x, 60), atol=1e-6)
 
 

@@ -57,19 +57,19 @@ def linear_rollout(model, K, k, alpha=1.0):
 @pytest.mark.parametrize("control, value", [(0.0, 0.0), (0.7, 0.0), (0.2, 0.5)])
 def test_gains_of_the_slow_recursion(n, m, control, value):
     model = random_model(8, n, m, seed=n)
-    promise, K, k = run(model, control, value)
+    predicted, K, k = run(model, control, value)
     K_ref, k_ref = numpy_gains(model, control, value)
-    assert promise.status == Status.SOLVED
+    assert predicted.status == Status.SOLVED
     np.testing.assert_allclose(K, K_ref, rtol=1e-8, atol=1e-9)
     np.testing.assert_allclose(k, k_ref, rtol=1e-8, atol=1e-9)
 
 
 @pytest.mark.parametrize("alpha", [1.0, 0.5, 0.1])
-def test_promise_is_the_change_of_the_linear_rollout(alpha):
+def test_the_prediction_is_the_change_of_the_linear_rollout(alpha):
     model = random_model(9, 5, 2, seed=3)
-    promise, K, k = run(model, control=0.3)
+    predicted, K, k = run(model, control=0.3)
     expected = linear_rollout(model, K, k, alpha)
-    np.testing.assert_allclose(alpha * promise.d0 + 0.5 * alpha**2 * promise.d1, expected, rtol=1e-9)
+    np.testing.assert_allclose(alpha * predicted.d0 + 0.5 * alpha**2 * predicted.d1, expected, rtol=1e-9)
 
 
 def test_full_step_solves_the_dense_problem_with_gaps():
@@ -117,8 +117,8 @@ def test_gains_converge_to_the_riccati_solution():
 
 def test_limits_hold_and_held_rows_have_no_feedback():
     model = random_model(10, 6, 3, seed=9, limit=0.2)
-    promise, K, k = run(model)
-    assert promise.status == Status.SOLVED
+    predicted, K, k = run(model)
+    assert predicted.status == Status.SOLVED
     assert np.abs(k).max() <= 0.2
     held = np.all(K == 0.0, axis=2)
     assert held.any() and not held.all()
@@ -129,8 +129,8 @@ def test_limits_hold_and_held_rows_have_no_feedback():
 def test_indefinite_control_hessian_names_the_knot():
     model = random_model(6, 3, 2, seed=11)
     model.H[3, 3:, 3:] = -1e6 * np.eye(2)
-    promise, _, _ = run(model)
-    assert promise.status == Status.SINGULAR and promise.knot == 3
+    predicted, _, _ = run(model)
+    assert predicted.status == Status.SINGULAR and predicted.knot == 3
     assert run(model, control=1e7)[0].status == Status.SOLVED
 
 

@@ -69,7 +69,7 @@ def _far_notes(scene: CostScene, cost: Cost) -> list[str]:
     """The inactive contacts of the neutral state."""
     if not np.isfinite(cost.iterations):
         return ["the first step from the neutral state is not solved: " + cost.message]
-    far = scene.simulator.left_out(scene.state)
+    far = scene.simulator.inactive_contacts(scene.state)
     return [f"far in the neutral state: {', '.join(far) or 'nothing'}"]
 
 

@@ -1,9 +1,9 @@
 """Distance of cylinders from polytopes and cylinders whose closest elements are parallel.
 
-Lines and rims that cross have a normal of their own, across both. Where they run along each other at their closest
-points x and y they have a fan of normals: those of both, n.x >= n.y between them, are that from y to x, where the two
-are apart, and the borders of the fan, where they overlap: the radial directions there, and normals of ends and faces,
-which are looked at anyway. Each gives a lower bound of the distance by the reach of the two shapes.
+Lines and rims that cross have a normal of their own, across both. Elements that are parallel at
+their closest points x and y have a fan of normals. If they are apart, the normal is the direction from y to x. If they
+overlap, n.x >= n.y, the normals are the borders of the fan: the radial directions there, and the normals of ends and
+faces, which are tried anyway. Each gives a lower bound of the distance by the reach of the two shapes.
 """
 
 from __future__ import annotations

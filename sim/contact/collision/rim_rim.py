@@ -1,7 +1,7 @@
 """Rim of a cylinder a against a rim of b: the closest points of two circles, with derivatives.
 
 A point of the rim of a is x = c + ra e, e = cos X + sin Y of its angle in the frame (c, X, Y) of that rim. The point of
-the other rim that is nearest to it has the angle of x itself, so one angle is looked for (rim.py for the rest).
+the other rim that is nearest to it has the same angle as x, so only one angle is unknown (rim.py for the rest).
 """
 
 from __future__ import annotations

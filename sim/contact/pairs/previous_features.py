@@ -1,6 +1,7 @@
-"""State of collisions at the beginning of a step, and the overlap of elements allowed there; and elements that
-pressed, kept beside new ones: where those of one place make the shapes overlap in another, and those of the other in
-the first. Collisions of polytopes and of cylinders have room for them (sim/contact/collision/feature_code.py).
+"""Features at the beginning of a step: their gaps, the overlap allowed, and those that pressed.
+
+The latter stay active beside new ones if a solution with either set overlaps in the other. Collisions of polytopes and
+of cylinders have room for them (sim/contact/collision/feature_code.py).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Distance, normal and point depend on a shape by the surface that is touched, and near it by the corner, edge, face or
 ball that is there. When a size grows by ds, that element moves by e ds, as if the whole shape did: a corner of a box
-away from the middle, an edge with it (along itself it may move as it likes), the surface of a ball along its normal. So
+away from the middle, an edge with it (motion along the edge has no effect), the surface of a ball along its normal. So
 a size costs as much as a shift, with an e of its own for every point, and no pair of shapes needs more derivatives. The
 surface of an ellipsoid also turns where it is touched: to first order that is all that a change of shape does there.
 """

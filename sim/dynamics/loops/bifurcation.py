@@ -6,7 +6,8 @@ no force along them turns it. On the way through w changes its sign, and its dir
     dw = sum of c (G at 3 - G at 1) / 2        modulo the other rows, in joint coordinates
 
 with 3 where the velocity before leads, then where that of the solution does. It takes the place of w where w is small
-against it; of a constraint that says nothing anywhere, dw vanishes too. A force along dw does no work from 1 to 3.
+against it; for a constraint that is redundant everywhere, dw vanishes as well. A force along dw does no work from 1
+to 3.
 """
 
 from __future__ import annotations

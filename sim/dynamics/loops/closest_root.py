@@ -1,9 +1,8 @@
 """The nearest zero of an error: Newton's method of least norm, with random restarts.
 
-Where a linkage lies in one line, its closing joint cannot be moved along that line to first order, and no step of
-Newton's method leads out of there. Other starts, drawn with a fixed seed around the first and further away as long as
-nothing is found, are led towards the zeros by least squares, which do not diverge; and every zero that is found is led
-back along the zeros to the one that is nearest there.
+If a linkage lies in one line, its closing joint cannot be moved along that line to first order, and Newton's method
+cannot leave that configuration. Random restarts, with a fixed seed and growing distances, are refined by least squares,
+which do not diverge. Each root found is moved along the set of roots to the one nearest to the start.
 """
 
 from __future__ import annotations

@@ -49,7 +49,11 @@ def find_inputs(
             continue
         plain = model.actuator_gaintype[a] == _FIXED_GAIN and model.actuator_biastype[a] == _NO_BIAS
         if not plain or model.actuator_dyntype[a] != _NO_DYNAMICS:
-            notes.add("actuators with dynamics or a bias that is no servo's are plain forces here", [name], warn=True)
+            notes.add(
+                "actuators with dynamics, or with a bias that is not that of a servo, are loaded as plain forces",
+                [name],
+                warn=True,
+            )
         ratio = 1.0 if wrench else float(model.actuator_gear[a, 0])
         gear = ratio * (float(model.actuator_gainprm[a, 0]) if plain else 1.0)
         low, high = _bounds(model, a, gear, ratio, bool(plain))

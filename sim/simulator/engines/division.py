@@ -26,7 +26,7 @@ DIVISIBLE = frozenset(
     )
 )
 
-_FEW = 1000  # steps of a motion whose division is a copy: np.ones takes ten times as long for a single one
+_FEW = 1000  # steps: shorter motions copy a template, as np.ones takes ten times as long for a single step
 _PARTS, _WHOLE = np.ones(_FEW, dtype=np.int64), np.ones(_FEW)
 
 

@@ -2,8 +2,9 @@
 
 P(q, v'; h') = P(q, v; tau),      tau: interval of the state (start_velocity.py),  h': time step of the parts
 
-P = M (M + C)^-1 p is the momentum of the node: that which arrives, p, after half the impulse of the dampers, C
-(dynamics/joints/damper.py). Both states have the same velocity at the node, so the energy carries over as well.
+P = M (M + C)^-1 p is the momentum at the node: the incoming momentum p less half the impulse of the dampers, whose
+matrix is C (dynamics/joints/damper.py). Both states have the same velocity at the node, so the energy
+carries over as well.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from sim.solve.start_velocity import SHORTEST, intervals, momenta_of_velocities,
 from solvers.status import Status
 from solvers.types import Vector
 
-_FINEST = 1e-3  # how well the share of a momentum is found
+_FINEST = 1e-3  # tolerance of the share of a relative momentum
 _BRIEF = 3e-4  # of a step: its cube is small, and the rounding of displacements over it too
 _ANGLE = 1e-3  # [m, rad] by which no joint moves further in such an interval
 
