@@ -447,8 +447,6 @@ class Solver:
         local, rejections, kappa_grad = self._subproblem, self.options.rejections, stage.kappa_grad
         last = stage is self.options.stages[-1]  # it must not leave gaps; others leave them to the stages to come
         rejected = slow = short = 0
-        assert stage.decrease is not None  # Options fills it in
-        decrease = stage.decrease
         self._search.restart()
         for _ in range(stage.iterations):
             before = self.now
@@ -457,7 +455,7 @@ class Solver:
             predicted, mu = local.gains(before), local.damping.mu
             if predicted.status != Status.SOLVED:
                 return local.fault(before, predicted)
-            small = decrease * (abs(before.merit) + _SMALL)
+            small = (stage.decrease or 0.0) * (abs(before.merit) + _SMALL)  # Options fills it in
             expected = -(predicted.d0 + 0.5 * predicted.d1)
             if before.gaps is None and mu <= _LIGHT and expected <= small:
                 return Status.SOLVED
