@@ -92,7 +92,7 @@ def test_step_sizes_go_down_by_the_factor_of_the_options():
     search = Search(problem, horizon, solver.objective, solver.options)
     now = solver.guess(np.zeros((31, 2)), problem.controls0)
     k, K = np.ones((30, 1)), np.zeros((30, 1, 2))
-    search.rollouts(now, Direction(k, K, None, None, Promise(Status.SOLVED, 0, -1.0, 0.0, 0.0)), 1e-4)
+    search.rollouts(now, Direction(k, K, None, None, PredictedChange(Status.SOLVED, 0, -1.0, 0.0, 0.0)), 1e-4)
     assert sizes == [1.0, 0.25, 0.0625]
     for factor in (0.0, 1.0, 2.0):
         with pytest.raises(ValueError, match="backtracking"):

@@ -136,7 +136,7 @@ def mechanism(item: str, damped: bool = False) -> Mechanism:
     stance = shape.stance()
     assert stance is not None
     feet = shape.place(stance.points - rounded * np.sign(stance.points))
-    contacts = [Contact(item, point, stance.radius + rounded, friction) for point in feet]
+    contacts = [Contact(item, point, stance.radius + rounded, friction=friction) for point in feet]
     contacts += [Contact(tip, radius=_TIP, friction=_TABLE) for tip in tips]
     pairs = [(item, tip) for tip in tips]
     if not damped:

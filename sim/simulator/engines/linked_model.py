@@ -78,5 +78,5 @@ class LinkedModel:
         self.renew()
 
     def renew(self) -> None:
-        """Take anew what Data keeps of the model, after a change in it."""
+        """Reload the copies of model arrays in Data after the model changed."""
         self._scratch.turn()
