@@ -51,7 +51,7 @@ DIGITS = 6  # significant ones that are kept of what is taken
 WIDTH = 120  # of a line of JSON
 
 _HOLE = re.compile(r"\{(\S+?)(?:\*(\S+))? ([^{}]+)\}")
-_NUMBER = r"([-+]?\.?\d[\d,]*(?:\.\d+)?(?:e-?\d+)?|inf|nan)"
+_NUMBER = r"([-+]?\.?\d[\d,]*(?:\.\d+)?(?:e-?\d+)?|\binf\b|\bnan\b)"
 _TEXT = r"(\d+(?:\.\d+)*(?: of \d+)?)"  # versions, and shares
 _UNMEASURED = (r"```.*?```", r"\$\$.*?\$\$", r"`[^`]*`", r"\]\([^)]*\)", r"^#.*?$")  # code, formulas, links, titles
 
