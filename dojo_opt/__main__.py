@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import ast
 import os
+import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -27,6 +28,7 @@ from dojo_opt.report import STUDIES
 from dojo_opt.report.command import CHECKOUT, MOVED, add_arguments, report
 from dojo_opt.tasks.plan_task import PlanTask
 from dojo_opt.viewer.show import add_show, show
+from dojo_opt.viewer.whole_file import whole_file
 from sim.io.json_text import json_text
 from sim.mechanism.checks import nearest, one_of
 
@@ -35,6 +37,7 @@ PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", 
 GAITS = ("trot", "bound", "pace", "walk", "turn", "jump", "leap")
 LOOPS = ("free_gait_mpc", "hopper_mpc", "quadruped_mpc")  # run in closed loop with a plant
 SUITES = ("crisp", "idto")  # of tasks that are run by SUITE.TASK, such as idto.spinner
+_ENDED_BY_SIGINT = 128 + 2  # as shells say it
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -97,6 +100,12 @@ def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
     return arguments
 
 
+def _save(figure: Any, path: Path, dpi: int = 150) -> None:
+    """Write a figure of Matplotlib as a whole."""
+    with whole_file(path) as file:
+        figure.savefig(file, dpi=dpi)
+
+
 def _run(args: argparse.Namespace) -> int:
     if args.name in LOOPS:
         return _run_loop(args)
@@ -114,7 +123,7 @@ def _run(args: argparse.Namespace) -> int:
     seconds = time.perf_counter() - start
     if args.out:
         figure = dojo.plots.gait(plan) if name in GAITS else dojo.plots.trajectory(plan)
-        figure.savefig(args.out, dpi=150)
+        _save(figure, args.out)
     if args.html:
         dojo.viewer.save_html(plan, args.html)
     if args.json:
@@ -134,7 +143,7 @@ def _run_loop(args: argparse.Namespace) -> int:
     plant = dojo.tasks.plant(mpc, **_arguments(args.perturb))
     loop = dojo.closed_loop(mpc, plant, 4.0 if args.seconds is None else args.seconds)
     if args.out:
-        dojo.plots.closed_loop(loop).savefig(args.out, dpi=150)
+        _save(dojo.plots.closed_loop(loop), args.out)
     if args.html:
         dojo.viewer.save_html(loop, args.html)
     ms, fallbacks = milliseconds(loop.log), sum(tick.fallback for tick in loop.log)
@@ -166,7 +175,7 @@ def _run_suite(args: argparse.Namespace) -> int:
     loop = task.run(seed, task.plant(seed, **_arguments(args.perturb)), args.seconds)
     outcome = task.outcome(loop)
     if args.out:
-        dojo.plots.closed_loop(loop).savefig(args.out, dpi=150)
+        _save(dojo.plots.closed_loop(loop), args.out)
     if args.html:
         dojo.viewer.save_html(loop, args.html)
     numbers = {"task": args.name, "success": outcome.success, "survived": loop.survived, "message": loop.message}
@@ -192,7 +201,7 @@ def _plan_task(args: argparse.Namespace, task: PlanTask) -> int:
     seconds = time.process_time() - begin
     outcome = task.outcome(plan)
     if args.out:
-        dojo.plots.trajectory(plan).savefig(args.out, dpi=150)
+        _save(dojo.plots.trajectory(plan), args.out)
     if args.html:
         dojo.viewer.save_html(plan, args.html)
     numbers = {"task": args.name, "message": plan.message, "seconds": seconds, **outcome._asdict()}
@@ -210,7 +219,7 @@ def _models(args: argparse.Namespace) -> int:
     if args.thumbnails:
         args.thumbnails.mkdir(parents=True, exist_ok=True)
         for entry in entries:
-            dojo.plots.thumbnail(entry.build()).savefig(args.thumbnails / f"{entry.name}.png", dpi=100)
+            _save(dojo.plots.thumbnail(entry.build()), args.thumbnails / f"{entry.name}.png", dpi=100)
     if args.json:
         rows = [asdict(entry) for entry in entries]
         print(json_text([{name: row[name] for name in row if name != "builder"} for row in rows]))
@@ -295,9 +304,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (dojo.SimulationError, MemoryError) as error:
         print(f"dojo-opt {args.command}: {str(error) or 'out of memory'}", file=sys.stderr)
         return 1
+
+
+def program() -> int:
+    """`main` as a program: Ctrl-C ends it without a traceback, with the status 130 of a shell.
+
+    It ends by the signal itself, which stops a script around it, too.
+    """
+    try:
+        return main()
     except KeyboardInterrupt:
-        raise KeyboardInterrupt from None  # as such it ends the process by SIGINT, which stops a script around it, too
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        with suppress(OSError, ValueError):
+            sys.stdout.flush()
+        if sys.platform != "win32":
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+            os.kill(os.getpid(), signal.SIGINT)
+        return _ENDED_BY_SIGINT
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(program())

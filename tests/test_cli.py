@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -18,6 +19,7 @@ from benchmarks import compare
 from dojo_opt import __main__ as cli
 from dojo_opt.report.command import MOVED
 from dojo_opt.report.result import Report, Row
+from dojo_opt.viewer.whole_file import whole_file
 from sim.io.json_text import json_text
 from support.programs import HOME
 from support.urdf_files import branched, collision, inertial, joint, link, write
@@ -243,6 +245,41 @@ def test_numbers_that_json_has_not_are_strings(
     monkeypatch.setattr("dojo_opt.viewer.show._numbers", lambda sim, motion: value)
     assert cli.main(["show", "pendulum", "--seconds", "0.05", "--json"]) == 0
     assert json.loads(capsys.readouterr().out, parse_constant=_refuse) == expected
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a single process")
+@pytest.mark.parametrize("command", ["run hop", "report timing", "models", "show pendulum", "warmup"])
+def test_ctrl_c_ends_a_command_by_its_signal_and_in_silence(command: str) -> None:
+    """A shell says 130, and a script around the command stops, too."""
+    program = (
+        "import os, signal, sys; from dojo_opt import __main__ as cli\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # ignored in a shell's background jobs
+        f"sys.argv = ['dojo-opt', *{command.split()}]\n"
+        "cli._COMMANDS[sys.argv[1]] = lambda args: os.kill(os.getpid(), signal.SIGINT)\n"
+        "print('begun'); sys.exit(cli.program())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(HOME)}
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "begun\n", "")
+
+
+def test_files_are_written_as_a_whole_or_not_at_all(tmp_path: Path) -> None:
+    path = tmp_path / "plan.html"
+    for before in (None, "old"):
+        with pytest.raises(KeyboardInterrupt), whole_file(path) as file:
+            file.write_text("half")
+            raise KeyboardInterrupt
+        assert [p.read_text() for p in tmp_path.iterdir()] == ([] if before is None else [before])
+        path.write_text("old")
+    path.chmod(0o640)
+    link = tmp_path / "link.html"
+    link.symlink_to(path)
+    with whole_file(link) as file:
+        file.write_text("new")
+    assert link.is_symlink() and path.read_text() == "new" and path.stat().st_mode & 0o777 == 0o640
+    with whole_file(Path(os.devnull)) as file:
+        assert file == Path(os.devnull)
 
 
 def test_show_prints_one_json_object(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

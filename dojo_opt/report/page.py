@@ -10,6 +10,7 @@ from html import escape
 from pathlib import Path
 
 from dojo_opt.report.result import Cell, Report, Table, shown, verdict
+from dojo_opt.viewer.whole_file import whole_file
 from sim.io.json_text import json_text
 
 _STYLE = """
@@ -49,7 +50,8 @@ def write_page(reports: Mapping[str, Report], folder: Path, command: str) -> lis
     files = []
     for name, picture in pictures.items():
         files.append(folder / f"{name}.png")
-        files[-1].write_bytes(picture)
+        with whole_file(files[-1]) as file:
+            file.write_bytes(picture)
     machine = next(iter(reports.values())).machine
     numbers = {"command": command, "machine": machine, "studies": {k: r.as_dict() for k, r in reports.items()}}
     texts = {
@@ -59,7 +61,8 @@ def write_page(reports: Mapping[str, Report], folder: Path, command: str) -> lis
     }
     for name, text in texts.items():
         files.append(folder / name)
-        files[-1].write_text(text, encoding="utf-8")
+        with whole_file(files[-1]) as file:
+            file.write_text(text, encoding="utf-8")
     return files
 
 

@@ -16,6 +16,7 @@ from dojo_opt.viewer import drawing, overlays
 from dojo_opt.viewer.key_frames import FRAMES, sparse
 from dojo_opt.viewer.motion import Motion, motion
 from dojo_opt.viewer.page import group_of, label, page, spacing
+from dojo_opt.viewer.whole_file import whole_file
 from sim.mechanism import checks, shapes
 from sim.mechanism.body import Body
 from sim.mechanism.contact import Contact
@@ -71,7 +72,8 @@ def save_html(
         raise ValueError("save_html(result): expected one result or more, got an empty list")
     shown = {"forces": forces, "paths": traces, "ghost": goal}
     motions = [motion(one, simulator) for one in results]
-    target.write_text(html_of(*motions, shown=shown), encoding="utf-8")
+    with whole_file(target) as file:
+        file.write_text(html_of(*motions, shown=shown), encoding="utf-8")
     return target
 
 

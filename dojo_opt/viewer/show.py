@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
+from dojo_opt.viewer.whole_file import whole_file
 from sim.io.json_text import json_text
 from sim.mechanism import checks
 from sim.mechanism.checks import nearest
@@ -140,7 +141,8 @@ def show(args: argparse.Namespace) -> int:
         x[2] += args.drop
     motion = sim.rollout(x, np.zeros((steps, sim.nu)))
     if args.out:
-        dojo.plots.trajectory(motion).savefig(args.out, dpi=150)
+        with whole_file(args.out) as file:
+            dojo.plots.trajectory(motion).savefig(file, dpi=150)
     if args.html:
         dojo.viewer.save_html(motion, args.html)
     if args.json:
