@@ -77,12 +77,12 @@ def evaluate(
     rngs = [np.random.default_rng((seed, i)) for i in range(count)]
     xs = task.starts(rngs)
     returns, lengths, unsolved = np.zeros(count), np.zeros(count, dtype=np.int64), 0
-    alive, path = np.arange(count), [xs[0].copy()]
+    alive, path, impulses = np.arange(count), [xs[0].copy()], model.sim.row_impulses(count)
     for age in range(task.steps):
         task.redraw(xs, np.full(count, age), rngs)
         x = xs[alive]
         actions, _ = delays.apply(age, policy.actions(task.observe(x)[0]), delay, alive)
-        found = model.step(x, task.inputs(actions), kappa=kappa)
+        found = model.step(x, task.inputs(actions), kappa=kappa, impulses=impulses)
         bad = found.status != Status.SOLVED
         over = task.ends(found.x)
         returns[alive] += np.where(bad, 0.0, task.rewards(x, actions, found.x)[0] + task.survival * ~over)
@@ -90,7 +90,8 @@ def evaluate(
         xs[alive], unsolved = found.x, unsolved + int(bad.sum())
         if alive[0] == 0:
             path.append(xs[0].copy())
-        alive = alive[~(bad | over)]
+        if (bad | over).any():
+            alive, impulses = alive[~(bad | over)], impulses.of_rows(~(bad | over))
         if not len(alive):
             break
     return Evaluation(returns, lengths, unsolved, np.array(path))

@@ -63,19 +63,20 @@ def pair_returns(shared: Shared, given: PairInputs, horizon: int, shift: float) 
     drawn = models.drawn(given.substeps, given.kappa, given.parameters, given.delay).rows(rows)
     out, alive, x = np.zeros(2 * n), np.arange(2 * n), given.x[rows]
     seen, steps, unsolved = ObservationStatistics.empty(task.observations), 0, 0
-    delays = ActionDelay(given.delay, 2 * n, task.sim.nu)
+    delays, impulses = ActionDelay(given.delay, 2 * n, task.sim.nu), drawn.sim.row_impulses(2 * n)
     for t in range(horizon):
         here, own = x[alive], drawn.rows(alive)
         observed = task.observe(here)[0]
         seen.add(observed)
         actions, _ = delays.apply(t, policy.actions(observed, weights[alive]), given.delay, alive)
-        found = own.step(here, task.inputs(actions))
+        found = own.step(here, task.inputs(actions), impulses=impulses)
         bad, over = found.status != Status.SOLVED, task.ends(found.x)
         rewards = task.rewards(here, actions, found.x)[0] + task.survival * ~over - shift
         out[alive] += np.where(bad, 0.0, rewards)
         x[alive] = found.x
         steps, unsolved = steps + len(alive), unsolved + int(bad.sum())
-        alive = alive[~(bad | over)]
+        if (bad | over).any():
+            alive, impulses = alive[~(bad | over)], impulses.of_rows(~(bad | over))
         if not len(alive):
             break
     return PairReturns(out.reshape(2, n), seen, steps, unsolved)

@@ -222,11 +222,12 @@ def roll_policy_batch(
     lags.begin()
     out.x[0] = starts
     one_pass = slopes and kappa_grad is None
+    impulses = model.sim.row_impulses(len(starts))
     for t in range(steps):
         rates = out.act(t, noise, slopes)
         out.applied[t], out.decided_in[t] = lags.apply(t, out.actions[t], model.delay)
         x, inputs = out.x[t], task.inputs(out.applied[t])
-        found = model.step(x, inputs, one_pass)
+        found = model.step(x, inputs, one_pass, impulses=impulses)
         A, B, unsolved = found.A, found.B, found.status != Status.SOLVED
         if slopes and not one_pass:
             smooth = model.step(x, inputs, True, kappa_grad)
@@ -244,6 +245,7 @@ def roll_policy_batch(
         if restart is not None:
             out.cut[t] |= restart(t, out.terminated[t], unsolved, out.x[t + 1])
         lags.forget(out.cut[t])
+        impulses.forget(out.cut[t])
     return out
 
 

@@ -14,6 +14,7 @@ from sim.mechanism.memory_limit import room_for
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.contact_groups import ContactGroups
 from sim.simulator.row_batch import BatchStep
+from sim.simulator.row_impulses import RowImpulses
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
@@ -136,20 +137,28 @@ class Drawn:
 
     __repr__ = short_repr
 
-    def step(self, xs: Floats, inputs: Floats, derivatives: bool = False, kappa: float | None = None) -> BatchStep:
-        """One action of every row, from states of the task to states of the task; a kappa instead of that of rows.
+    def step(
+        self,
+        xs: Floats,
+        inputs: Floats,
+        derivatives: bool = False,
+        kappa: float | None = None,
+        impulses: RowImpulses | None = None,
+    ) -> BatchStep:
+        """One action of every row, from states of the task to states of the task; a kappa instead of that of rows, and
+        the impulses of the actions before, as for `Simulator.step_batch`.
 
         Forces at the end of states have no derivatives: beside these, they are those of a second call.
         """
         nx, level = self.sim.nx, self.kappa if kappa is None else kappa
-        asked = xs[:, :nx], inputs, self.substeps
-        touched = self.touch is not None
-        found = self.sim.step_batch(*asked, derivatives, level, self.parameters, contacts=touched and not derivatives)
+        asked, given = (xs[:, :nx], inputs, self.substeps), (level, self.parameters)
+        touched = self.touch is not None and not derivatives
+        found = self.sim.step_batch(*asked, derivatives, *given, contacts=touched, impulses=impulses)
         if xs.shape[1] == nx:
             return found
         x = np.concatenate([found.x, xs[:, nx:]], axis=1)
         if self.touch is not None:
-            felt = self.sim.step_batch(*asked, False, level, self.parameters, contacts=True) if derivatives else found
+            felt = self.sim.step_batch(*asked, False, *given, contacts=True) if derivatives else found
             assert felt.contacts is not None
             x[:, -6 * self.touch.count :] = self.touch.wrenches(felt.x, felt.contacts).reshape(len(x), -1)
         return replace(found, x=x)

@@ -2,6 +2,7 @@
 each with its own model, settings and guess.
 
 Nothing is carried from one row to the next, so a row does not depend on its neighbours, nor on the number of threads.
+A row of a batch may start from the impulses of its own last step.
 """
 
 from __future__ import annotations
@@ -9,8 +10,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.integrators.rollout import Linearized, MotionBuffers, linearize, roll
+from sim.model.layout import data_view
 from sim.model.record_columns import StepReport, StepSetting
 from solvers.compiler import Table, kernel, parallel_kernel, prange, seconds
+from solvers.dense import copy
 from solvers.status import Status
 from solvers.types import Cube, Integers, Matrix, Vector
 
@@ -81,7 +84,30 @@ class RowTables(NamedTuple):
 
     models: Table  # (n, ...) tables of their Models
     scratch: Table  # (n, ...) tables of their Data; rows of one chunk may share one
-    settings: Matrix  # (n, 7), with one deadline
+    settings: Matrix  # (n, 8), with one deadline
+    cones: Cube  # (n, ncontact, 12) cone variables that the last steps ended with, in and out; or empty
+    bounds: Cube  # (n, nlimit, 2) of limits
+    dry: Cube  # (n, ndry, 4) of dry friction
+
+
+@kernel
+def _take_impulses(rows: RowTables, i: int) -> None:
+    """Impulses of row i into its Data: no row reads those that another one has left there."""
+    if rows.cones.shape[0] > 0:
+        data = data_view(rows.scratch[i])
+        copy(rows.cones[i], data.cone)
+        copy(rows.bounds[i], data.bound)
+        copy(rows.dry[i], data.dry)
+
+
+@kernel
+def _keep_impulses(rows: RowTables, i: int) -> None:
+    """Impulses of row i out of its Data."""
+    if rows.cones.shape[0] > 0:
+        data = data_view(rows.scratch[i])
+        copy(data.cone, rows.cones[i])
+        copy(data.bound, rows.bounds[i])
+        copy(data.dry, rows.dry[i])
 
 
 @kernel
@@ -93,11 +119,14 @@ def _linearize_some(rows: RowTables, part: tuple[int, int], substeps: int, line:
             if begun and seconds() > rows.settings[i, StepSetting.DEADLINE]:
                 return
             begun = True
+            if done[i] == 0:
+                _take_impulses(rows, i)
             knots = (i, i * substeps + done[i], i + 1)
             end = linearize(rows.models[i], rows.scratch[i], rows.settings[i], knots, substeps, line)
             done[i] = end - i * substeps
             if done[i] < substeps:
                 return
+            _keep_impulses(rows, i)
 
 
 @parallel_kernel
@@ -125,9 +154,12 @@ def _roll_some(rows: RowTables, part: tuple[int, int], motions: BatchBuffers) ->
             contacts = motions.contacts[i * steps : (i + 1) * steps]  # without rows where none are kept
             one = MotionBuffers(x, u, motions.wrenches, report, contacts, motions.A, motions.B)
             knot = motions.knots[i]
+            if knot == 0:
+                _take_impulses(rows, i)
             motions.knots[i] = roll(rows.models[i], rows.scratch[i], rows.settings[i], one, knot, None, None)
             if report[0, StepReport.STATUS] == _SOLVED and motions.knots[i] < steps:
                 return
+            _keep_impulses(rows, i)
 
 
 @parallel_kernel

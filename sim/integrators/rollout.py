@@ -1,7 +1,7 @@
 """Whole horizons, where Python enters compiled code: rollouts, linearizations, batches.
 
-    settings   (7,) time step [s], kappa [N s m], tolerance, largest number of iterations, deadline [s], largest gain
-               and loss of energy, of those that change in a step
+    settings   (8,) time step [s], kappa [N s m], tolerance, largest number of iterations, deadline [s], largest gain
+               and loss of energy, of those that change in a step, and 1 if the Data has impulses for the first step
     report     (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
                accuracy of derivatives, 0 where there are none
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
@@ -166,7 +166,7 @@ def roll(
     nq = data.theta1.shape[0]
     for t in range(first // n, motion.us.shape[0]):
         x, report = motion.xs[t], motion.reports[min(t, motion.reports.shape[0] - 1)]
-        velocity, known = x[nq:], t > 0
+        velocity, known = x[nq:], t > 0 or settings[StepSetting.IMPULSES] > 0.0
         if following is not None:
             begin_knot(model, data, following, x, motion.us[t], t)
             velocity = data.step_x[1, nq:] if n == 1 else velocity
@@ -277,7 +277,7 @@ def linearize(
             copy_vector(line.xs[t], x_next)
         for s in range(before, substeps):
             copy_vector(x_next, x)
-            guess = Guess(velocity if substeps == 1 else x[nq:], s > 0)
+            guess = Guess(velocity if substeps == 1 else x[nq:], s > 0 or settings[StepSetting.IMPULSES] > 0.0)
             set_external(data, line.wrenches, t)
             if step(model, data, options, x, line.us[t], guess, x_next, report) != _SOLVED:
                 break

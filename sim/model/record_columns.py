@@ -280,6 +280,7 @@ class StepSetting(Code):
     DEADLINE = 4  # when to go back to Python [s] (model/interruptible_loops.py)
     GAIN = 5  # largest gain of energy (solve/energy_balance.py)
     LOSS = 6
+    IMPULSES = 7  # 1 where the first step may start from the impulses in its Data, those of a step before it
 
 
 class StepReport(Code):

@@ -20,10 +20,11 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory_limit import room_for
 from sim.mechanism.short_repr import short_repr
 from sim.model.interruptible_loops import pieces
-from sim.model.record_columns import StepReport, StepSetting
+from sim.model.record_columns import Dry, StepReport, StepSetting
 from sim.simulator.engines.division import DIVISIBLE, Division
-from sim.simulator.engines.engine import REPORT, Engine, finite_rows, refuse
+from sim.simulator.engines.engine import BOUND, CONE, REPORT, Engine, finite_rows, refuse
 from sim.simulator.results import Contacts, Result, contacts_of, ended, sentence
+from sim.simulator.row_impulses import RowImpulses
 from sim.simulator.state_space import StateSpace
 from solvers.status import Status
 from solvers.types import Integers
@@ -132,6 +133,7 @@ class RowBatch:
     substeps: int
     kappas: Floats  # (n,), NaN for that of the engine
     contacts: Floats  # (n, ncontact, 11) out, of the last step of each row, or (0, ncontact, 11): not kept
+    impulses: RowImpulses  # of n rows, or of none
 
     __repr__ = short_repr
 
@@ -148,6 +150,7 @@ class RowBatch:
         elif n:
             self._roll(x_next, reports)
         for i in np.flatnonzero(reports[:, StepReport.STATUS]):
+            self.impulses.known[i : i + 1] = False
             if int(reports[i, StepReport.STATUS]) in DIVISIBLE:
                 self._divide(int(i), derivatives, A, B, x_next, reports)
         if derivatives and (refuse(reports, n, A, B) < n or reports[:, StepReport.STATUS].any()):
@@ -178,7 +181,11 @@ class RowBatch:
         settings = np.array([engine.settings.array() for engine in self.engines])[self.index]
         given = ~np.isnan(self.kappas)
         settings[given, StepSetting.KAPPA] = self.kappas[given]
-        return RowTables(np.array(models)[self.index], scratch, settings), count
+        kept = self.impulses
+        if len(kept):
+            settings[:, StepSetting.IMPULSES] = kept.known
+            kept.known[:] = True
+        return RowTables(np.array(models)[self.index], scratch, settings, kept.cones, kept.bounds, kept.dry), count
 
     def _linearize(self, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
         """Steps and their derivatives."""
@@ -320,6 +327,7 @@ class RowStepping(StateSpace):
         parameters: Mapping[str, ArrayLike] | None = None,
         *,
         contacts: bool = False,
+        impulses: RowImpulses | None = None,
         throw: bool = False,
     ) -> BatchStep:
         """One knot of independent rows, over all cores: row i goes from X[i] by `substeps` steps with U[i] held.
@@ -336,6 +344,9 @@ class RowStepping(StateSpace):
                 `with_parameters`, with the kappa of this simulator. A model is made once for each row of new values,
                 and kept.
             contacts: whether to return those of the last step of every row, too; without derivatives.
+            impulses: those with which the last steps of these rows ended, of `row_impulses`; written, so that a motion
+                of many calls starts each knot where the last one ended, with fewer iterations. `forget` rows that jump
+                (default None: every row starts from its state alone).
             throw: raise SimulationError where a step is not solved.
 
         Returns:
@@ -351,7 +362,9 @@ class RowStepping(StateSpace):
         given: Any = X if quick else checks.array(f"{call}(X)", X, (count, self.nx))
         states = self._arguments.states(f"{call}(X)", given)
         steps = room_for(f"{call}(substeps=...)", substeps, 8.0 * (self.nx + self.nu) * max(count, 1))
-        if count == 1 and kappa is None and not parameters and not derivatives and self.has_single_rows:
+        kept = self._impulses(call, impulses, count)
+        alone = count == 1 and kappa is None and not parameters and not derivatives and not len(kept)
+        if alone and self.has_single_rows:
             return ended(self.single_row(steps, contacts).step(states, inputs), throw)
         kappas = np.full(count, np.nan)
         if kappa is not None:
@@ -366,13 +379,44 @@ class RowStepping(StateSpace):
             raise ValueError(f"{call}(contacts=True): expected no derivatives, and a simulator without an accuracy")
         engines, index = self._row_models.of(f"{call}(parameters=...)", parameters, count)
         rows = np.zeros((count if contacts else 0, *self._engine.unkept[0].shape[1:]))
-        found, reports = RowBatch(engines, index, states, inputs, steps, kappas, rows).step(bool(derivatives))
+        found, reports = RowBatch(engines, index, states, inputs, steps, kappas, rows, kept).step(bool(derivatives))
         if contacts:
             found = replace(found, contacts=contacts_of(self.mechanism, self.time_step, rows))
         if len(found.unsolved):
             i = int(found.unsolved[0])
             found = replace(found, detail=sentence(self.mechanism, f"{call}: row {i}", reports[i], self.tolerance))
         return ended(found, throw)
+
+    def row_impulses(self, count: int) -> RowImpulses:
+        """Room for the impulses of independent rows between calls of `step_batch`; in the beginning, none are known.
+
+        Args:
+            count: number of rows.
+
+        Returns:
+            RowImpulses.
+
+        Raises:
+            ValueError: count is not a whole number, or the rows do not fit the memory.
+        """
+        model = self._engine.model
+        size = CONE * len(model.contact_body) + BOUND * len(model.limit_dof) + len(Dry) * len(model.dry_dof)
+        return RowImpulses.of(model, room_for("Simulator.row_impulses(count)", count, 8.0 * (1 + size), least=0))
+
+    def _impulses(self, call: str, given: RowImpulses | None, count: int) -> RowImpulses:
+        """Checked impulses of `count` rows; of none where there are none, or where engines have no use for them."""
+        if given is None or not self._engine.in_one_kernel:
+            return self._no_impulses
+        if not isinstance(given, RowImpulses):
+            raise TypeError(f"{call}(impulses=...): expected impulses of Simulator.row_impulses, got {given!r}")
+        none = self._no_impulses
+        if given.cones.shape != (count, *none.cones.shape[1:]) or given.bounds.shape[1] != none.bounds.shape[1]:
+            raise ValueError(f"{call}(impulses=...): expected those of {count} rows of this simulator, got {given!r}")
+        return given
+
+    @cached_property
+    def _no_impulses(self) -> RowImpulses:
+        return RowImpulses.of(self._engine.model, 0)
 
     @cached_property
     def _single_rows(self) -> dict[tuple[int, int, bool], SingleRow]:

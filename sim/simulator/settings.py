@@ -39,10 +39,11 @@ class Settings(NamedTuple):
     def array(self, kappa: float | None = None) -> Vector:
         """The settings as an array for kernels, without those that only choose the engine.
 
-        kappa: replaces that of the settings. The deadline (interruptible_loops.py) is infinite.
+        kappa: replaces that of the settings. The deadline (interruptible_loops.py) is infinite; motions begin without
+        impulses.
         """
         level = self.kappa if kappa is None else kappa
-        limits = self.max_iterations, inf, self.gain, self.loss
+        limits = self.max_iterations, inf, self.gain, self.loss, 0.0
         return np.array((self.time_step, level, self.tolerance, *limits), dtype=np.float64)
 
 

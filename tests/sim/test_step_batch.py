@@ -95,6 +95,72 @@ def test_rows_have_their_own_parameters(sim):
     np.testing.assert_array_equal(mixed.x[[0, 3]], found.x[[0, 3]])
 
 
+def _motion(sim, X, U, impulses, substeps=1):
+    """States and iterations of four knots, of rows in the order of X."""
+    states, iterations = [], []
+    for U_t in U:
+        found = sim.step_batch(X, U_t, substeps, impulses=impulses)
+        assert found.success
+        X = found.x
+        states.append(X)
+        iterations.append(found.iterations)
+    return np.array(states), np.array(iterations)
+
+
+def test_rows_start_from_their_own_impulses(sim):
+    X, U = _rows(sim)
+    U = np.array([U, U + 0.1, U - 0.1, U])
+    states, iterations = _motion(sim, X, U, sim.row_impulses(7))
+    alone, cold = _motion(sim, X, U, None)
+    np.testing.assert_allclose(states, alone, atol=1e-4)  # the same solutions, up to the tolerance of a step
+    np.testing.assert_array_equal(states[0], alone[0])  # before any impulses are known
+    assert iterations[1:].sum() < 0.7 * cold[1:].sum()
+    order = np.array([6, 2, 4, 0])
+    np.testing.assert_array_equal(_motion(sim, X[order], U[:, order], sim.row_impulses(4))[0], states[:, order])
+    with threads(1):
+        np.testing.assert_array_equal(_motion(sim, X, U, sim.row_impulses(7))[0], states)
+    kept = sim.row_impulses(7)
+    for x, U_t, end in zip([X, *states], U, states, strict=False):
+        found = sim.step_batch(x, U_t, derivatives=True, impulses=kept)
+        np.testing.assert_array_equal(found.x, end)  # derivatives change nothing
+
+
+def test_impulses_are_forgotten_and_taken_along(sim):
+    X, U = _rows(sim)
+    kept = sim.row_impulses(7)
+    X = sim.step_batch(X, U, impulses=kept).x
+    assert kept.known.all()
+    some = np.array([1, 5])
+    part = kept.of_rows(some)
+    known = sim.step_batch(X[some], U[some], impulses=part).x
+    kept.forget([0, 2])
+    found = sim.step_batch(X, U, impulses=kept).x
+    np.testing.assert_array_equal(found[some], known)
+    np.testing.assert_array_equal(found[[0, 2]], sim.step_batch(X, U).x[[0, 2]])
+    assert not np.array_equal(found[some], sim.step_batch(X, U).x[some])
+
+
+def test_an_unsolved_row_has_no_impulses():
+    sim = dojo.Simulator(dojo.models.sphere(), time_step=0.05, max_iterations=1, divide=False)
+    X = np.tile(sim.neutral(), (2, 1))
+    X[:, 2] += 2.0
+    X[1, 2] = 0.4  # below the ground
+    kept = sim.row_impulses(2)
+    found = sim.step_batch(X, np.zeros((2, sim.nu)), impulses=kept)
+    np.testing.assert_array_equal(kept.known, found.status == dojo.Status.SOLVED)
+    assert kept.known[0] and not kept.known[1]
+
+
+def test_wrong_impulses_are_named(sim):
+    X, U = _rows(sim)
+    other = dojo.Simulator(dojo.models.sphere(), time_step=0.05)
+    for impulses, kind in ((sim.row_impulses(6), ValueError), (other.row_impulses(7), ValueError), (True, TypeError)):
+        with pytest.raises(kind, match=r"step_batch\(impulses=...\)"):
+            sim.step_batch(X, U, impulses=impulses)
+    with pytest.raises(ValueError, match="row_impulses"):
+        sim.row_impulses(-1)
+
+
 def test_an_unsolved_row_stands_still_and_is_named():
     sim = dojo.Simulator(dojo.models.sphere(), time_step=0.05, max_iterations=1, divide=False)
     X = np.tile(sim.neutral(), (3, 1))
