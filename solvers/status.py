@@ -19,7 +19,6 @@ class Status(Code):
     LOOP_STEP = 6
     COLLISION_STEP = 7
     ENERGY_STEP = 8
-    JOINT_STEP = 8  # deprecated name of ENERGY_STEP, until version 0.2
     CONTACT_SUNK = 9
     MAX_REGULARIZATION = 10
     LINE_SEARCH = 11

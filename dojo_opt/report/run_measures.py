@@ -1,4 +1,4 @@
-"""Gauge: measures of a run for studies, by one formula for every engine."""
+"""Measures of a run for studies, by one formula for every engine."""
 
 from __future__ import annotations
 

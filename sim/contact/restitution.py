@@ -69,7 +69,7 @@ def look_back(model: Model, data: Data, h: float, configuration: int) -> None:
         c = data.active[m]
         b = data.bounce[c]
         k = data.contact_kin[c]
-        b[14 if first else 15] = k[Kin.GAP]
+        b[Bounce.GAP1 if first else Bounce.GAP2] = k[Kin.GAP]
         row = b[Bounce.ROW1 : Bounce.ROW2] if first else b[Bounce.ROW2 : Bounce.GAP1]
         if c < model.contact_height.shape[0]:
             contact_jacobian(model, data, h, c)
@@ -84,9 +84,9 @@ def look_back(model: Model, data: Data, h: float, configuration: int) -> None:
             F[PairFrame.POINT] - o[0], F[PairFrame.POINT + 1] - o[1], F[PairFrame.POINT + 2] - o[2], n[0], n[1], n[2]
         )
         for r in range(3):
-            b[16 + r if first else 19 + r] = F[PairFrame.POINT + r]
+            b[(Bounce.POINT1 if first else Bounce.POINT2) + r] = F[PairFrame.POINT + r]
         if is_absent(data, c - model.contact_height.shape[0]):  # absent contacts have no impact
-            b[14 if first else 15] = -_NEVER if first else _NEVER
+            b[Bounce.GAP1 if first else Bounce.GAP2] = -_NEVER if first else _NEVER
 
 
 @kernel

@@ -95,7 +95,7 @@ def momentum_slopes(model: Model, data: Data, h: float, q: Vector, v: Vector, p_
     _momentum_jacobians(model, data, h)
     pose2_to_origin(data)
     sum_composites(model, data)
-    residual_derivatives(model, data, h)
+    residual_derivatives(model, data)
     add_swing_curvature(model, data, q)
     _add_springs(model, data, h, q, v)
     nv = v.shape[0]

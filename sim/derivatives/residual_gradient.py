@@ -13,7 +13,7 @@ from solvers.types import Matrix, Vector
 
 
 @kernel
-def residual_derivatives(model: Model, data: Data, h: float) -> None:
+def residual_derivatives(model: Model, data: Data) -> None:
     """dR_dq and the momentum part of dR_dv (unit columns), without joint-space terms.
 
     For dofs j and k on one branch, with the composite of the deeper body:

@@ -48,7 +48,7 @@ def gradient(model: Model, data: Data, h: float, kappa: float, q: Vector, v: Vec
         return False
     add_coupling_composites(model, data, h)
     sum_composites(model, data)
-    residual_derivatives(model, data, h)
+    residual_derivatives(model, data)
     add_swing_curvature(model, data, q)  # before `factor_coupling`, whose solves use up data.subtree
     add_bounce_derivatives(model, data, h)
     add_coupling_derivatives(model, data)

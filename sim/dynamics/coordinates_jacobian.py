@@ -92,7 +92,7 @@ def _maximal_column(data: Data, h: float, i: int, d: int, J: Mat3, R: Mat3, out:
 
 
 @kernel
-def _difference_rows(model: Model, data: Data, h: float, i: int, w: Vec3) -> None:
+def _difference_rows(model: Model, data: Data, i: int, w: Vec3) -> None:
     """Rows of the quaternion of joint i turned into those of its rotation vector over the interval, w = log(r1^* r2).
 
     dw = J^-1 (psi2 - R(exp w)^T psi1), psi the right perturbations of r:   F <- J^-1 F,  G <- J^-1 R^T G
@@ -148,7 +148,7 @@ def minimal_jacobian(model: Model, data: Data, h: float, z: Matrix, out: Matrix)
             if p >= 0:
                 _configuration_row(data, d, 6, p, out)
         if model.joint_nrot[i] == 3:
-            _difference_rows(model, data, h, i, _joint_turn(model, data, i))
+            _difference_rows(model, data, i, _joint_turn(model, data, i))
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
             _minimal_row(data, h, z, d, 0, i, out)
             if p >= 0:

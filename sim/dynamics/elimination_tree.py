@@ -37,7 +37,7 @@ def clear_tree(model: Model, tree: Tree, X: Matrix, c: int) -> None:
 
 
 @kernel
-def clear_twists(model: Model, tree: Tree, P: Matrix) -> None:
+def clear_twists(tree: Tree, P: Matrix) -> None:
     """P = 0 of the bodies of a tree."""
     for i in range(tree.begin, tree.end):
         put(P, 6 * i, 0, zeros())

@@ -120,8 +120,8 @@ def test_energy_on_arrival_has_a_bound(kind, damper, rng):
         v = sim.step(x, throw=True).x[sim.nq :].copy()
         ours, bound = arriving(*tables(sim), 0.03, v, True), most(*tables(sim), 0.03, v)
         assert ours <= bound * (1.0 + 1e-12)
-    if not damper:
-        assert bound < 1.001 * ours
+        if not damper and speed < 1.0:
+            assert bound < 1.001 * ours
 
 
 @pytest.mark.parametrize(

@@ -91,7 +91,7 @@ def axis_and_rim(x: Vec3, u: Vec3, l: float, rho: float, z: float, place: int, r
 
 
 @inner_kernel
-def two_rims(rim: int, place: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> int:
+def two_rims(rim: int, place: int, sizes: Vector, R: Vector, r: Vector) -> int:
     """Code of two rims where they touch; 0 for nowhere."""
     top, z = (1.0 if rim & 1 else -1.0), (sizes[PairSize.B + 1] if rim & 2 else -sizes[PairSize.B + 1])
     circle, radii = rim_of(top, sizes, R, r), (sizes[0], sizes[PairSize.B])
@@ -139,7 +139,7 @@ def crossing(part: int, sizes: Vector, R: Vector, r: Vector, turned: Vector, out
         if k > 0:
             code = code_of(RIM_AXIS, True, top, k - 1)
     else:
-        code = two_rims((part - 9) // 2, part & 1, sizes, R, r, out)
+        code = two_rims((part - 9) // 2, part & 1, sizes, R, r)
     if code != 0:
         put_crossing(code, sizes, R, r, turned, out)
     return code

@@ -255,7 +255,7 @@ def add_time_step(model: Model, data: Data, at: At, w: float, col: int) -> None:
         else:
             f, t = _input_wrench(model, data, j, at.u)
             add_wrench(model, data, i, f, moment(data, i, f, t), -2.0 * w, col)
-    add_dry_time_step(model, data, h, at.v, w, col)
+    add_dry_time_step(model, data, h, w, col)
     for d in range(at.v.shape[0]):
         by_damper, _ = lag_rates(model, h, d)
         X[d, col] += w * (model.dof_damper[d] * by_damper - damper_lag(model, h, d) / h) * (data.nu[d] - at.v[d])

@@ -109,9 +109,10 @@ def element_turn(model: Model, data: Data, j: int, which: int, n: Vec3) -> Vec3:
 def earlier_shift(model: Model, data: Data, j: int, which: int, b: Vector, configuration: int) -> Vec3:
     """`element_shift` at configuration 1 or 2, from the values of `look_back` (contact/restitution.py) in b."""
     first = configuration == 1
-    n = row(b, 2 if first else 8)
-    p = row(b, 16 if first else 19)
-    return element_shift(model, data, j, which, b[14 if first else 15], n, p, configuration)
+    n = row(b, Bounce.ROW1 if first else Bounce.ROW2)
+    p = row(b, Bounce.POINT1 if first else Bounce.POINT2)
+    gap = b[Bounce.GAP1 if first else Bounce.GAP2]
+    return element_shift(model, data, j, which, gap, n, p, configuration)
 
 
 @kernel

@@ -275,7 +275,7 @@ def dry_boundary(model: Model, data: Data) -> float:
 
 
 @optional(Slot.ADD_DRY_TIME_STEP)
-def add_dry_time_step(model: Model, data: Data, h: float, v: Vector, w: float, col: int) -> None:
+def add_dry_time_step(model: Model, data: Data, h: float, w: float, col: int) -> None:
     """columns += w d lambda/dh where h nu and h v stay, F and M in proportion to h:
 
     c d lambda = b/(F - lambda) d(M + F) + f/(F + lambda) d(M - F) + the change of the drive
@@ -285,7 +285,7 @@ def add_dry_time_step(model: Model, data: Data, h: float, v: Vector, w: float, c
         force, middle = model.dry_force[k], model.dry_middle[k]
         change = z[Dry.BACKWARD] / z[Dry.LEFT_BACKWARD] * (middle + force)
         change += z[Dry.FORWARD] / z[Dry.LEFT_FORWARD] * (middle - force)
-        change += drive_by_time_step(model, data, h, k, v, dry_impulse(data, k))
+        change += drive_by_time_step(model, data, h, k, dry_impulse(data, k))
         data.columns[model.dry_dof[k], col] += w * change / dry_compliance(data, k)
 
 

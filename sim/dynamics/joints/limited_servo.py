@@ -35,7 +35,7 @@ def begin_drive(model: Model, data: Data, h: float, k: int, q: Vector, v: Vector
 
 
 @kernel
-def drive_by_time_step(model: Model, data: Data, h: float, k: int, v: Vector, impulse: float) -> float:
+def drive_by_time_step(model: Model, data: Data, h: float, k: int, impulse: float) -> float:
     """e dP/dh + (P - T) de/dh of element k with the impulse T, where h nu and h v stay; 0 of dry friction.
 
     P + kd h nu is in proportion to h.

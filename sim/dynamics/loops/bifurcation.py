@@ -36,7 +36,7 @@ def _largest(a: Vector) -> float:
 
 
 @kernel
-def _add_directions(model: Model, data: Data, S: Matrix, B: Matrix, sign: float, out: Matrix) -> None:
+def _add_directions(model: Model, S: Matrix, B: Matrix, sign: float, out: Matrix) -> None:
     """out[row] += sign S^T B, the generalized impulses of unit forces of the rows of loops."""
     for k in range(model.coupling_body.shape[0] - model.loop_ntrans.shape[0], model.coupling_body.shape[0]):
         for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
@@ -90,13 +90,13 @@ def _set_rows(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
             data.bifurcation_direction[row, d] = 0.0
     tree_moves(model, data, Increment(q, v, h), True)
     turn_bodies(data, data.rot3)
-    _add_directions(model, data, data.S2, data.couple_B, 1.0, data.bifurcation_row)
+    _add_directions(model, data.S2, data.couple_B, 1.0, data.bifurcation_row)
     for m in range(model.loop_ntrans.shape[0]):
         loop_rows(model, data, m, data.pos3, data.rot3, data.couple_G)
-    _add_directions(model, data, data.S3, data.couple_G, 0.5, data.bifurcation_direction)
+    _add_directions(model, data.S3, data.couple_G, 0.5, data.bifurcation_direction)
     for m in range(model.loop_ntrans.shape[0]):
         loop_rows(model, data, m, data.pos1, data.rot1, data.couple_G)
-    _add_directions(model, data, data.S1, data.couple_G, -0.5, data.bifurcation_direction)
+    _add_directions(model, data.S1, data.couple_G, -0.5, data.bifurcation_direction)
 
 
 @kernel

@@ -110,7 +110,7 @@ def _fill(model: Model, data: Data, whole: bool) -> None:
             p = data.couple_start[m] + e
             data.couple_T[p, left + e] += data.couple_E[data.couple_live[p, 0]]
         for side in range(2):
-            clear_twists(model, moved_tree(model, k, side), data.couple_Z)
+            clear_twists(moved_tree(model, k, side), data.couple_Z)
 
 
 @kernel
