@@ -241,6 +241,8 @@ def _users() -> None:
     def observation(x: Any, out: Any) -> None:
         out[0] = x[0]
 
+    tip = dojo.Kinematics(sim).compiled("pose", sim.mechanism.body_names[0])
+    tip(x, np.zeros(7))
     (term,) = dojo.Problem(sim, x, 1, cost=dojo.cost.ResidualCost(residual, 1)).costs
     term.expand(np.stack([x] * 2), np.zeros((1, 1)), np.zeros((2, 3)), np.zeros((2, 3, 3)))
     task = dojo.learn.Task(sim, 1, observation, 1, lambda x, a, after: 0.0, -np.ones(1), np.ones(1), lambda rng: x)

@@ -10,12 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.joint import WORLD
+from sim.mechanism.pose import quaternion
 from sim.mechanism.shapes import rotation_matrices, rotation_matrix
 from sim.model.state_columns import BodyState
 from sim.simulator.central_differences import ORDER_8
 from sim.simulator.contact_forces import GroundForces, balanced, least_forces
 from sim.simulator.ground_balls import GroundBalls
 from sim.simulator.simulator import Simulator
+from sim.simulator.task_space.compiled_kinematics import CompiledKinematics, Quantity
 
 Floats = NDArray[np.float64]
 
@@ -365,6 +367,40 @@ class Kinematics:
         force = self._mass[:, None] * rate[..., :3]
         torque = (I @ rate[..., 3:, None])[..., 0] + np.cross(w, (I @ w[..., None])[..., 0])
         return np.einsum("...bkd,...bk->...d", J, np.concatenate([force, torque], axis=-1))
+
+    def compiled(self, quantity: str, frame: str | None = None) -> CompiledKinematics:
+        """A function of (x, out) for residuals, observations and rewards of your own, which Numba compiles.
+
+        | quantity | out | |
+        |---|---|---|
+        | "pose" | (7,) | place of a frame [m], and its unit quaternion (w, x, y, z) to world axes |
+        | "jacobian" | (6, nv) | place [m] and orientation by tangent coordinates, as `jacobian` |
+        | "velocity" | (6,) | mean velocity of its origin [m/s] and angular velocity [rad/s] over the last time step |
+        | "velocity_jacobian" | (6, ndx) | the same by tangent state |
+        | "center_of_mass" | (3,) | of all bodies [m] |
+        | "com_jacobian" | (3, nv) | by tangent coordinates |
+
+        x is a state (nx,). Mechanism and time step are those of now; later changes of them do not matter. Each function
+        takes about a second to compile in a process. It runs in any number of threads.
+
+        Args:
+            quantity: what it evaluates, one of the table.
+            frame: name of the frame; None for the centre of mass.
+
+        Returns:
+            The function, also for calls from Python.
+
+        Raises:
+            ValueError: the quantity or the frame is unknown, or there is a frame too many.
+        """
+        call, names = "Kinematics.compiled", {q.name.lower(): q for q in Quantity}
+        found = names[checks.one_of(f"{call}(quantity)", quantity, names)]
+        whole = found in (Quantity.CENTER_OF_MASS, Quantity.COM_JACOBIAN)
+        if whole != (frame is None):
+            raise ValueError(f"{call}({quantity!r}, frame): expected {'no' if whole else 'the name of a'} frame")
+        body, point, turn = (-1, np.zeros(3), np.eye(3)) if frame is None else self._frame(f"{call}(frame)", frame)
+        place = np.concatenate([point, quaternion(turn)])
+        return CompiledKinematics(self.sim, found, body, place)
 
     def _frame(self, call: str, name: str) -> tuple[int, Floats, Floats]:
         if isinstance(name, str) and name == WORLD and WORLD not in self._frames:

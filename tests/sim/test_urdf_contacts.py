@@ -129,8 +129,35 @@ def test_friction_is_the_callers_or_the_files_or_the_usual_one(tmp_path: Path) -
     slick, sticky = one(tmp_path, collision(SPHERE)), one(tmp_path, rubber, collision(SPHERE))
     assert (slick.contacts[0].friction, sticky.contacts[0].friction) == (0.8, 1.5)
     assert one(tmp_path, rubber, collision(SPHERE), friction=0.2).contacts[0].friction == 0.2
-    assert "rolling and spinning friction and restitution are not modelled: body" in str(sticky.report)
+    assert "rolling and spinning friction are not modelled: body" in str(sticky.report)
     assert one(tmp_path, collision(SPHERE), law="linear").contacts[0].law == "linear"
+
+
+def test_restitution_is_that_of_the_file_where_the_caller_asks_for_it(tmp_path: Path) -> None:
+    """Not by default: physics engines multiply it with that of their ground, which is zero."""
+    rubber = '<contact><lateral_friction value="0.7"/><restitution value="0.5"/></contact>'
+    ball, plain = (rubber, collision(SPHERE)), (collision(SPHERE),)
+    still, bouncing = one(tmp_path, *ball), one(tmp_path, *ball, restitution=None)
+    assert [m.contacts[0].restitution for m in (still, bouncing)] == [0.0, 0.5]
+    assert [m.bodies[0].shapes[0].restitution for m in (still, bouncing)] == [None, 0.5]
+    assert "without the restitution of the file, which restitution=None uses: body" in str(still.report)
+    assert "restitution" not in str(bouncing.report)
+    assert one(tmp_path, *plain, restitution=None).contacts[0].restitution == 0.0
+    assert one(tmp_path, *ball, restitution=0.2).contacts[0].restitution == 0.2
+    wall = dojo.Collision("body", shape_b=dojo.HalfSpace(center=(1.0, 0.0, 0.0), orientation=(0.8, 0.0, -0.6, 0.0)))
+    walled = dojo.Mechanism(bouncing.bodies, bouncing.joints, collisions=[wall])
+    assert (walled.collisions[0].friction, walled.collisions[0].restitution) == (0.7, 0.5)
+    sim = dojo.Simulator(bouncing, time_step=0.01)
+    x = sim.neutral()
+    x[2] += 0.5
+    fall = sim.rollout(x, np.zeros((70, sim.nu)), throw=True).x[:, sim.nq + 2]
+    assert fall.max() == pytest.approx(-0.5 * fall.min(), rel=0.05)  # up after the impact as fast as half of the fall
+
+
+def test_a_contact_that_is_placed_by_hand_keeps_all_of_its_properties(tmp_path: Path) -> None:
+    spot = dojo.Contact("body", (0.1, 0.0, 0.0), 0.02, restitution=0.4, height=0.1, friction=0.3)
+    (found,) = one(tmp_path, collision(SPHERE), contacts=[spot]).contacts
+    assert (found.restitution, found.height, found.friction, found.radius) == (0.4, 0.1, 0.3, 0.02)
 
 
 def test_contact_names_never_collide(tmp_path: Path) -> None:

@@ -113,6 +113,10 @@ BROKEN: dict[str, tuple[tuple[str, ...], str]] = {  # parts from line 2 on, and 
         (link("base", inertial(), '<contact><lateral_friction value="-1"/></contact>'),),
         "line 2, <lateral_friction>: expected a coefficient >= 0, got -1",
     ),
+    "restitution beyond one": (
+        (link("base", inertial(), '<contact><restitution value="1.5"/></contact>'),),
+        "line 2, <restitution>: expected a coefficient of restitution between 0 and 1, got 1.5",
+    ),
     "xacro element": (
         ('<xacro:include filename="a.xacro"/>',),
         "line 2, .*this is a xacro file; run xacro on it first",

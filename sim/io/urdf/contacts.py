@@ -11,6 +11,7 @@ hull        its corners; collision_meshes.py makes hulls of meshes
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -57,29 +58,18 @@ def find_contacts(
                 notes.add("no contacts on links that are fixed to the world", [name])
             continue
         link = place.link
-        mu, law, rim = choices.friction, choices.law, choices.rim_points
-        friction = mu if mu is not None else link.friction if link.friction is not None else FRICTION
+        friction = next(mu for mu in (choices.friction, link.friction, FRICTION) if mu is not None)
         for contact in given:
             point = place.pose.at(contact.point) - coms[body]
-            label = _free(contact.name or name, taken)
-            out.append(
-                Contact(
-                    body,
-                    point,
-                    contact.radius,
-                    friction=contact.friction,
-                    law=contact.law,
-                    normal=contact.normal,
-                    height=contact.height,
-                    name=label,
-                )
-            )
+            out.append(replace(contact, body=body, point=point, name=_free(contact.name or name, taken)))
         if given:
             continue
-        balls = [ball for shape in _shapes(place) for ball in _balls(shape, place, rim)]
+        balls = [ball for shape in _shapes(place) for ball in _balls(shape, place, choices.rim_points)]
         for k, (point, radius) in enumerate(balls):
             label = _free(name if len(balls) == 1 else f"{name}_{k}", taken)
-            out.append(Contact(body, point - coms[body], radius, friction=friction, law=law, name=label))
+            at, bounce = point - coms[body], link.restitution or 0.0
+            ball = Contact(body, at, radius, friction=friction, law=choices.law, name=label, restitution=bounce)
+            out.append(ball)
         other = sorted({s.kind for s in link.collisions if s.kind not in SHAPES})
         for kind in other:
             notes.add(f"no contact from collision shapes of kind {kind!r}", [name])

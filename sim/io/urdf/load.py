@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from numpy.typing import ArrayLike
@@ -37,6 +38,7 @@ def load_urdf(
     mimic: str = "auto",
     actuated: Sequence[str] | None = None,
     joint_friction: bool = False,
+    restitution: float | None = 0.0,
     law: str = "nonlinear",
     rim_points: int = 4,
     collisions: str | None = None,
@@ -71,6 +73,8 @@ def load_urdf(
         actuated: names of the joints with an input, in the order of u; None: all that move, but for floating ones.
         joint_friction: whether joints have the dry friction that the file gives them, see `Joint.friction`. Steps of a
             higher order or of a given accuracy are for joints without it.
+        restitution: coefficient of restitution of all contacts and shapes; None: <restitution> of the link if the file
+            has it, else 0.
         law: law of contacts with friction, see `dojo.Contact`.
         rim_points: number of points per rim of a cylinder.
         collisions: "self" lets all links collide but those that a joint connects; `report` lists pairs of shapes that
@@ -101,6 +105,7 @@ def load_urdf(
     robot = read_robot(root, notes)
     folders = [Path(folder) for folder in ([mesh_dirs] if isinstance(mesh_dirs, str | Path) else mesh_dirs)]
     choice = mesh_choices(meshes, robot.links), whole_number("load_urdf(mesh_corners=...)", mesh_corners, 4)
+    robot = _bouncing(robot, restitution, notes)
     robot = with_shapes(robot, file, choice, folders, ground and contacts is None, notes)
     loops = read_loops(root, robot, notes)
     held, geared = _held(robot, locked, mimic, notes)
@@ -127,6 +132,18 @@ def load_urdf(
         ),
     )
     return assemble(robot, loops, choices, notes)
+
+
+def _bouncing(robot: Robot, restitution: float | None, notes: Notes) -> Robot:
+    """The robot with the restitution of the caller, unless that of the file is asked for."""
+    if restitution is None:
+        return robot
+    value = checks.fraction("load_urdf(restitution=...)", restitution)
+    given = [name for name, link in robot.links.items() if link.restitution]
+    if given:
+        notes.add("contacts without the restitution of the file, which restitution=None uses", given)
+    links = {name: replace(link, restitution=value or None) for name, link in robot.links.items()}
+    return replace(robot, links=links)
 
 
 def _held(robot: Robot, locked: Collection[str], mimic: str, notes: Notes) -> tuple[frozenset[str], tuple[str, ...]]:

@@ -80,6 +80,7 @@ class UrdfLink:
     collisions: tuple[Geometry, ...]
     visuals: tuple[Geometry, ...]
     friction: float | None  # <contact><lateral_friction>, as PyBullet reads it
+    restitution: float | None  # <contact><restitution>, likewise
     element: Element
 
     @property
@@ -173,10 +174,14 @@ def _link(element: Element, palette: Palette, notes: Notes) -> UrdfLink:
     friction = lateral.number("value") if lateral else None
     if lateral and friction is not None and friction < 0.0:
         raise lateral.error(f"expected a coefficient >= 0, got {friction:g}")
-    if contact and any(e.tag in ("rolling_friction", "spinning_friction", "restitution") for e in contact.children):
-        notes.add("rolling and spinning friction and restitution are not modelled", [element.text("name")])
+    bounce = contact.one("restitution") if contact else None
+    restitution = bounce.number("value") if bounce else None
+    if bounce and restitution is not None and not 0.0 <= restitution <= 1.0:
+        raise bounce.error(f"expected a coefficient of restitution between 0 and 1, got {restitution:g}")
+    if contact and any(e.tag in ("rolling_friction", "spinning_friction") for e in contact.children):
+        notes.add("rolling and spinning friction are not modelled", [element.text("name")])
     shapes = [tuple(_geometry(e, palette) for e in element.all(tag)) for tag in ("collision", "visual")]
-    return UrdfLink(element.text("name"), mass, com, inertia, shapes[0], shapes[1], friction, element)
+    return UrdfLink(element.text("name"), mass, com, inertia, shapes[0], shapes[1], friction, restitution, element)
 
 
 def _geometry(element: Element, palette: Palette) -> Geometry:

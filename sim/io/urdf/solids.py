@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.io.urdf.robot import Geometry
+from sim.io.urdf.robot import Geometry, UrdfLink
 from sim.io.urdf.tree import MergedLinks
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.pose import Pose
@@ -21,7 +22,7 @@ Floats = NDArray[np.float64]
 def body_shapes(body: MergedLinks, com: Floats) -> tuple[Solid, ...]:
     """All primitives among the collision shapes of a body; without one the largest of its visual shapes, if any.
 
-    Each has the friction of its link, where the file gives one.
+    Each has friction and restitution of its link, where the file gives them.
     """
     found = collision_shapes(body, com)
     if found:
@@ -58,7 +59,7 @@ def body_visuals(body: MergedLinks, com: Floats) -> tuple[Visual, ...]:
                             color=shape.color,
                         )
                     )
-            elif (solid := solid_of(shape, at, com, "", None)) is not None:
+            elif (solid := solid_of(shape, at, com, "")) is not None:
                 out.append(Visual(solid, color=shape.color))
     return tuple(out)
 
@@ -80,20 +81,18 @@ def named(found: Sequence[Solid]) -> tuple[Solid, ...]:
 def _solids(body: MergedLinks, com: Floats, field: str) -> list[Solid]:
     """The primitives among the collision or visual shapes of a body."""
     found = [(link, s, pose.then(s.pose)) for link, pose in body.links for s in getattr(link, field)]
-    solids = [solid_of(s, pose, com, link.name, link.friction) for link, s, pose in found]
+    solids = [solid_of(s, pose, com, link.name, link) for link, s, pose in found]
     return [solid for solid in solids if solid is not None]
 
 
-def solid_of(shape: Geometry, pose: Pose, com: Floats, name: str, friction: float | None) -> Solid | None:
+def solid_of(shape: Geometry, pose: Pose, com: Floats, name: str, link: UrdfLink | None = None) -> Solid | None:
     """The shape in the body, from its centre of mass; None for a mesh that is not read or something without extent."""
-    center, turn = tuple(pose.point - com), pose.quaternion
+    settings: dict[str, Any] = {"center": tuple(pose.point - com), "orientation": pose.quaternion, "name": name}
+    if link is not None:
+        settings |= {"friction": link.friction, "restitution": link.restitution}
     if shape.points is not None:
-        return Polytope(shape.points, center=center, orientation=turn, name=name, friction=friction)
+        return Polytope(shape.points, **settings)
     if not shape.sizes or min(shape.sizes) <= 0.0:
         return None
-    if shape.kind == "sphere":
-        return Sphere(*shape.sizes, center=center, orientation=turn, name=name, friction=friction)
-    if shape.kind == "box":
-        return Box(*shape.sizes, center=center, orientation=turn, name=name, friction=friction)
-    kind = Cylinder if shape.kind == "cylinder" else Capsule
-    return kind(*shape.sizes, center=center, orientation=turn, name=name, friction=friction)
+    kinds: dict[str, type[Sphere | Box | Capsule]] = {"sphere": Sphere, "box": Box, "capsule": Capsule}
+    return kinds[shape.kind](*shape.sizes, **settings) if shape.kind in kinds else Cylinder(*shape.sizes, **settings)
