@@ -155,7 +155,7 @@ class Predictor:
     def predict(self, sim: Simulator, chain: Floats, window: Window, start: Floats, kappa: float) -> WindowErrors:
         """Errors of a window from a start (nx,), with their derivatives; chain: slopes of the space at theta."""
         rows, ndx = self.steps(window), sim.ndx
-        xs, line = sim.linearize_rollout(start, window.u, kappa, self._space.wrt)
+        xs, line = sim.linearize_rollout(start, window.u, kappa=kappa, wrt=self._space.wrt)
         solved = not np.any(line.status)
         errors = sim.difference(xs[rows], window.x[rows])
         slope = difference_slopes(self._layout(sim), errors) @ self._moved(line, rows, chain)

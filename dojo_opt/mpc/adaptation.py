@@ -194,7 +194,7 @@ class ParameterEstimator:
         self, fine: Simulator, x: Vector, us: Matrix, kappa: float | None = None
     ) -> tuple[Vector, Matrix, Matrix] | None:
         """State after the inputs us, A = d(state)/dx and J = d(state)/d(theta); None if a step fails."""
-        xs, linear = fine.linearize_rollout(x, us, kappa, wrt=self.space.wrt)
+        xs, linear = fine.linearize_rollout(x, us, kappa=kappa, wrt=self.space.wrt)
         if not linear.success:
             return None
         by_theta = self.space.chain(self._written, linear.parameters)

@@ -61,7 +61,7 @@ def motions(sim: Simulator) -> None:
     sim.rollout(x, us, wrenches=wrenches)
     sim.rollout_batch(np.stack([x] * 4), np.zeros((4, 2, sim.nu)))
     k, K = np.zeros((2, sim.nu)), np.zeros((2, sim.nu, sim.ndx))
-    sim.closed_loop(x, us, np.stack([x] * 3), k, K)
+    sim.closed_loop(x, us, np.stack([x] * 3), ks=k, Ks=K)
 
 
 def derivatives(sim: Simulator) -> None:
@@ -89,11 +89,11 @@ def parameters(sim: Simulator) -> None:
     """Features of order 2 only: reactions, derivatives by maximal coordinates and by parameters."""
     x, us = sim.neutral(), np.zeros((2, sim.nu))
     sim.reactions(x[None], us[:1])
-    sim.linearize_maximal(sim.maximal(x), us[0], 1e-3)
+    sim.linearize_maximal(sim.maximal(x), us[0], kappa=1e-3)
     kinds = tuple(dict.fromkeys(name.split(":")[0].split("[")[0] for name in sim.parameters().names))
     sim.linearize(x, us[0], wrt=kinds)
     sim.linearize_rollout(x, us, wrt=kinds)
-    sim.vjp((np.stack([x] * 3), us), np.zeros((3, sim.ndx)), ("state", "input", *kinds))
+    sim.vjp((np.stack([x] * 3), us), np.zeros((3, sim.ndx)), wrt=("state", "input", *kinds))
 
 
 def _every(sim: Simulator) -> None:

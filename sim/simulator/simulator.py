@@ -270,6 +270,7 @@ class Simulator(RowStepping):
         x0: ArrayLike,
         us: ArrayLike,
         xs: ArrayLike | None = None,
+        *,
         ks: ArrayLike | None = None,
         Ks: ArrayLike | None = None,
         gaps: ArrayLike | None = None,
@@ -278,7 +279,6 @@ class Simulator(RowStepping):
         substeps: int = 1,
         kappa: float | None = None,
         wrenches: Wrenches | None = None,
-        *,
         throw: bool = False,
     ) -> Shot:
         """Rollout under a feedback law, each knot `substeps` steps with u held:
@@ -389,10 +389,10 @@ class Simulator(RowStepping):
         self,
         x: ArrayLike,
         u: ArrayLike | None = None,
-        kappa: float | None = None,
-        wrenches: Wrenches | None = None,
-        wrt: Sequence[str] | None = None,
         *,
+        kappa: float | None = None,
+        wrt: Sequence[str] | None = None,
+        wrenches: Wrenches | None = None,
         throw: bool = False,
     ) -> Jacobian:
         """Derivatives of one step, by the implicit function theorem, in tangent coordinates.
@@ -432,10 +432,10 @@ class Simulator(RowStepping):
         self,
         x: ArrayLike,
         us: ArrayLike,
+        *,
         kappa: float | None = None,
         wrt: Sequence[str] = (),
         wrenches: Wrenches | None = None,
-        *,
         throw: bool = False,
     ) -> tuple[Floats, Linearization]:
         """A rollout and its derivatives in one pass: `rollout` and `linearize_trajectory`, each step solved once.
@@ -475,10 +475,10 @@ class Simulator(RowStepping):
         self,
         xs: ArrayLike,
         us: ArrayLike,
+        *,
         substeps: int = 1,
         kappa: float | None = None,
         wrenches: Wrenches | None = None,
-        *,
         throw: bool = False,
     ) -> Linearization:
         """`linearize` at the knots (xs_t, us_t), in parallel; each knot spans `substeps` steps with u held.
@@ -514,7 +514,7 @@ class Simulator(RowStepping):
         return ended(linear, throw)
 
     def linearize_maximal(
-        self, z: ArrayLike, u: ArrayLike | None = None, kappa: float | None = None, *, throw: bool = False
+        self, z: ArrayLike, u: ArrayLike | None = None, *, kappa: float | None = None, throw: bool = False
     ) -> Jacobian:
         """Derivatives of the next maximal state by maximal state and input, in the tangents of `maximal_jacobian`.
 
@@ -531,7 +531,7 @@ class Simulator(RowStepping):
             Jacobian with the blocks (12 nbody, 12 nbody) and (12 nbody, nu).
         """
         bodies = checks.array("Simulator.linearize_maximal(z)", z, (self.nbody, 13))
-        found = self.linearize(self.minimal(bodies), u, kappa, throw=throw)
+        found = self.linearize(self.minimal(bodies), u, kappa=kappa, throw=throw)
         if not found.success:
             return found
         out = self.maximal_jacobian(found.x_next)
@@ -542,10 +542,10 @@ class Simulator(RowStepping):
         self,
         trajectory: Trajectory | tuple[ArrayLike, ArrayLike],
         dL_dx: ArrayLike,
+        *,
         wrt: Sequence[str] = ("state", "input"),
         kappa: float | None = None,
         wrenches: Wrenches | None = None,
-        *,
         throw: bool = False,
     ) -> Gradient:
         """Gradient of a scalar L(x_0, ..., x_T) of a rollout, by one sweep from its end.

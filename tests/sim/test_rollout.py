@@ -115,7 +115,9 @@ def test_closed_loop_follows_its_policy() -> None:
     rng = np.random.default_rng(3)
     x0, us, xs = rng.normal(size=4), rng.normal(size=(3, 2)), rng.normal(size=(4, 4))
     ks, Ks, gaps = rng.normal(size=(3, 2)), rng.normal(size=(3, 2, 4)), rng.normal(size=(4, 4))
-    shot = PENDULUM.closed_loop(x0, us, xs, ks, Ks, gaps, alpha=0.25, limits=(-1.0, [0.5, np.inf]), substeps=2)
+    shot = PENDULUM.closed_loop(
+        x0, us, xs, ks=ks, Ks=Ks, gaps=gaps, alpha=0.25, limits=(-1.0, [0.5, np.inf]), substeps=2
+    )
     x = x0
     for t in range(3):
         u = np.clip(us[t] + 0.25 * ks[t] + Ks[t] @ (x - xs[t]), -1.0, [0.5, np.inf])

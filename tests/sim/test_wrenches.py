@@ -99,7 +99,7 @@ def test_gradients_of_a_pushed_rollout(rng):
     assert t.wrenches is not None and t.wrenches.shape == (T, 1, 6) and sim.rollout(x, us).wrenches is None
     wrt = ("state", "input", "mass", "friction", "gravity", "time_step")
     loss = rng.normal(size=(T + 1, sim.ndx))
-    g = sim.vjp(t, loss, wrt)
+    g = sim.vjp(t, loss, wrt=wrt)
     assert g["input"].shape == (T, sim.nu)
     xs, lines = sim.linearize_rollout(x, us, wrt=("mass", "friction"), wrenches=push)
     np.testing.assert_allclose(xs, t.x, atol=1e-9)
