@@ -1,7 +1,8 @@
 """Results of Simulator: frozen dataclasses of arrays, each a Result with `success`, `status` and `message`.
 
 No method raises for an unsolved step unless throw=True: the result has its status. Derivatives of
-an unsolved step are zero; taking them out of their result, by unpacking or by name, raises SimulationError.
+an unsolved step are zero: a Jacobian or Gradient raises SimulationError when they are taken out, by unpacking or by
+name; a Linearization, of many knots, has their status.
 """
 
 from __future__ import annotations
@@ -363,17 +364,16 @@ class Shot(Result):
 
 @dataclass(frozen=True)
 class Jacobian(Result):
-    """Derivatives of one step: `A, B = jacobian`; with names (wrt=...), a table of blocks by these names.
+    """Derivatives of one step: unpacks into its blocks, `A, B = jacobian`, and is a table of them by name.
 
     Access to A, B or a block of an unsolved step raises SimulationError.
 
     Attributes:
-        blocks: "state" (ndx, ndx), "input" (ndx, nu), parameters (ndx, n).
+        blocks: in the order of wrt=...: "state" (ndx, ndx), "input" (ndx, nu), parameters (ndx, n).
         x_next: (nx,) state after the step.
         status: Status of the step.
         accuracy: estimate of the error, relative to the largest entry.
         detail: sentence about an unsolved step, with its numbers.
-        by_name: whether the blocks were requested by names.
     """
 
     blocks: Mapping[str, Floats]
@@ -381,7 +381,6 @@ class Jacobian(Result):
     status: Status
     accuracy: float = 0.0
     detail: str = ""
-    by_name: bool = False
 
     __repr__ = short_repr
 
@@ -395,9 +394,8 @@ class Jacobian(Result):
         """(ndx, nu) d(next state)/d(input)."""
         return self["input"]
 
-    def __iter__(self) -> Iterator[Any]:
-        self.check()
-        return iter(self.blocks) if self.by_name else iter((self.A, self.B))
+    def __iter__(self) -> Iterator[Floats]:
+        return iter(self.values())
 
     def __len__(self) -> int:
         return len(self.blocks)
@@ -407,7 +405,7 @@ class Jacobian(Result):
 
     def __getitem__(self, name: str | int) -> Floats:
         self.check()
-        return self.blocks[("state", "input")[name] if isinstance(name, int) else name]
+        return tuple(self.blocks.values())[name] if isinstance(name, int) else self.blocks[name]
 
     def keys(self) -> Iterable[str]:
         """Names of the blocks, in the order of wrt=...; `dict(jacobian)` is a table of them.

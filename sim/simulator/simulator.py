@@ -426,7 +426,7 @@ class Simulator(RowStepping):
         detail = "" if status == Status.SOLVED else sentence(self.mechanism, call, report, self.tolerance)
         if selected is not None and status == Status.SOLVED:
             blocks = {name: blocks[name] for name in selected[0]}
-        return ended(Jacobian(blocks, x_next, status, accuracy, detail, wrt is not None), throw)
+        return ended(Jacobian(blocks, x_next, status, accuracy, detail), throw)
 
     def linearize_rollout(
         self,

@@ -184,7 +184,7 @@ def test_without_wrt_nothing_changes() -> None:
     case = case_of("sliding")
     A, B = case.sim.linearize(case.x, case.u)
     blocks = case.sim.linearize(case.x, case.u, wrt=("input", "state"))
-    assert list(blocks) == ["input", "state"]
+    assert list(blocks.keys()) == ["input", "state"]
     np.testing.assert_array_equal(blocks["state"], A)
     np.testing.assert_array_equal(blocks["input"], B)
 

@@ -57,7 +57,9 @@ def test_a_solved_call_unpacks_and_is_a_table() -> None:
     sim = HOPPER.replace(max_iterations=100)
     found = sim.linearize(X, wrt=("friction", "state"))
     A, B = sim.linearize(X)
+    friction, state = found
     assert found.success and list(dict(found)) == ["friction", "state"]
+    assert friction is found["friction"] and state is found["state"] is found.A
     np.testing.assert_array_equal(found["state"], A)
     assert B.shape == (sim.ndx, sim.nu)
 
