@@ -66,7 +66,7 @@ class MujocoPlant(Plant):
         import mujoco
 
         mujoco.mj_resetData(self._model, self._data)
-        self._data.qpos[:], self._data.qvel[:] = self.x[: self.sim.nq], self.x[self.sim.nq :]
+        self._data.qpos[:], self._data.qvel[:] = self.x[: self.nominal.nq], self.x[self.nominal.nq :]
         mujoco.mj_forward(self._model, self._data)
 
     def step(self, command: Vector) -> tuple[Vector, StepResult]:
@@ -75,14 +75,14 @@ class MujocoPlant(Plant):
         data.ctrl[:] = u
         self._step(self._model, data)
         x = np.concatenate([data.qpos, data.qvel])
-        rows = np.zeros((self.sim.ncontact, _ROW))
+        rows = np.zeros((self.nominal.ncontact, _ROW))
         rows[:, _GAP] = np.inf
         for k in range(data.ncon):
             contact = data.contact[k]
             at = self._index[frozenset((int(contact.geom1), int(contact.geom2)))]
             rows[at, _GAP] = min(rows[at, _GAP], float(contact.dist))
         status = Status.SOLVED if np.all(np.isfinite(x)) else Status.NOT_FINITE
-        result = StepResult(x, status, 0, 0.0, 0.0, (self.sim.mechanism, self.sim.time_step, rows))
+        result = StepResult(x, status, 0, 0.0, 0.0, (self.nominal.mechanism, self.nominal.time_step, rows))
         if status == Status.SOLVED:
             self.x = x
             self.steps += 1

@@ -101,11 +101,11 @@ class _ProblemEpisode:
         self.problem = problem.with_own_terms()
         self._plant = self.plant = Plant(problem.sim, problem.start) if plant is None else plant
         self.sim, self.knot_time, self.steps, self._sampler = problem.sim, problem.knot_time, problem.horizon, sampler
-        self._substeps = round(problem.knot_time / self.plant.sim.time_step)
-        if abs(self._substeps * self.plant.sim.time_step - problem.knot_time) > 1e-9:
+        self._substeps = round(problem.knot_time / self.plant.nominal.time_step)
+        if abs(self._substeps * self.plant.nominal.time_step - problem.knot_time) > 1e-9:
             raise ValueError(
                 f"Environment(plant=...): expected a time step that divides a knot of {problem.knot_time:g} s, got "
-                f"{self.plant.sim.time_step:g} s"
+                f"{self.plant.nominal.time_step:g} s"
             )
         self.observations, nu = problem.sim.nx, problem.sim.nu
         lo, hi = problem.control_limits or (np.full(nu, -np.inf), np.full(nu, np.inf))

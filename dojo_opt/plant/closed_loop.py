@@ -162,7 +162,7 @@ def closed_loop(
         raise TypeError(f"closed_loop(plant): expected a Plant, such as Plant(simulator), got {plant!r}")
     if not callable(controller):
         raise TypeError(f"closed_loop(controller): expected an MPC or a function of (time, x), got {controller!r}")
-    h, steps = plant.sim.time_step, steps_of("closed_loop(duration)", plant, duration)
+    h, steps = plant.nominal.time_step, steps_of("closed_loop(duration)", plant, duration)
     every = 1 if control_step is None else round(checks.number("closed_loop(control_step=...)", control_step) / h)
     if every < 1 or (control_step is not None and abs(every * h - control_step) > 1e-9):
         raise ValueError(
@@ -182,19 +182,19 @@ def closed_loop(
 
 def steps_of(call: str, plant: Plant, duration: float) -> int:
     """Steps of the plant in a duration [s], whose record fits the memory."""
-    steps = round(checks.number(call, duration, above=0.0) / plant.sim.time_step)
-    numbers = plant.sim.nx + plant.sim.nu + 11 * plant.sim.ncontact
+    steps = round(checks.number(call, duration, above=0.0) / plant.nominal.time_step)
+    numbers = plant.nominal.nx + plant.nominal.nu + 11 * plant.nominal.ncontact
     check_room(call, steps, _RECORD + 8.0 * numbers, "run it in parts")
     return steps
 
 
 def _closed_loop(run: _LoopRecord, controller: Controller, plant: Plant, reference: Any) -> ClosedLoop:
     """The record of the steps, as arrays."""
-    h, count = plant.sim.time_step, len(run.u)
+    h, count = plant.nominal.time_step, len(run.u)
     own, tracked = getattr(controller, "references", None), None
     if reference is None and own is not None and own.state is not None:
         times = h * np.arange(float(len(run.planes)))
-        reference, tracked = OnPlanes(own.state, times, run.planes, plant.sim.nq), own.tracked
+        reference, tracked = OnPlanes(own.state, times, run.planes, plant.nominal.nq), own.tracked
     return ClosedLoop(
         simulator=plant.simulator,
         time=h * np.arange(count + 1.0),
@@ -252,12 +252,12 @@ def _drive(
     finished: Callable[[float, Vector], bool] | None,
 ) -> None:
     """Call the controller at regular steps of the plant, until the end, the aim, a fall, or an unsolved step."""
-    command = np.zeros(plant.sim.nu)
+    command = np.zeros(plant.nominal.nu)
     own, log = getattr(controller, "references", None), getattr(controller, "log", [])
     for k in range(steps):
         if k % every == 0:
             answer = controller(plant.time, plant.measure().copy())  # a controller may write into its argument
-            command = checks.array("closed_loop: controller's u", answer, (plant.sim.nu,))
+            command = checks.array("closed_loop: controller's u", answer, (plant.nominal.nu,))
             run.log += [tick for tick in log[-1:] if not run.log or tick is not run.log[-1]]
         run.planes.append(GroundPlane() if own is None else own.plane)
         u, result = plant.step(command)

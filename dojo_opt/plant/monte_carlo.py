@@ -162,7 +162,7 @@ def monte_carlo(
     check_executor("monte_carlo", executor)
     whole_number("monte_carlo(seed=...)", seed, 0)
     steps_of("monte_carlo(duration)", plant, duration)
-    count = room_for("monte_carlo(runs=...)", runs, _RUN + 8.0 * plant.sim.nx)
+    count = room_for("monte_carlo(runs=...)", runs, _RUN + 8.0 * plant.nominal.nx)
     children = np.random.SeedSequence(seed).spawn(count)
     tasks = [(controller, plant, sampler, float(duration), (control_step, components), child) for child in children]
     outcomes: list[MonteCarloRun] = []

@@ -61,7 +61,7 @@ class Plant:
             raise TypeError(f"Plant(perturbation=...): expected a Perturbation, got {perturbation!r}")
         if perturbation is not None and fields:
             raise ValueError(f"Plant(perturbation=...): give either it or its fields, got both: {', '.join(fields)}")
-        self.sim = sim
+        self.nominal = sim
         self.start = sim.neutral() if start is None else checks.array("Plant(start=...)", start, (sim.nx,))
         self.perturbation = p = Perturbation(**fields) if perturbation is None else perturbation
         self.simulator = sim.replace(mechanism=p.mechanism(sim.mechanism))
@@ -96,7 +96,7 @@ class Plant:
         Raises:
             ValueError: a value is out of range, or a delay is not a multiple of the time step.
         """
-        return Plant(self.sim, self.start, perturbation)
+        return Plant(self.nominal, self.start, perturbation)
 
     def reset(self) -> None:
         """Put the plant back to its start."""
@@ -109,7 +109,7 @@ class Plant:
     @property
     def time(self) -> float:
         """Time since the start [s]."""
-        return self.steps * self.sim.time_step
+        return self.steps * self.nominal.time_step
 
     def measure(self) -> Vector:
         """The state with noise.
@@ -119,7 +119,7 @@ class Plant:
         """
         if not self._noise.any():
             return self.x
-        return self.sim.integrate(self.x, self._noise * self._random.standard_normal(self.sim.ndx))
+        return self.nominal.integrate(self.x, self._noise * self._random.standard_normal(self.nominal.ndx))
 
     def step(self, command: Vector) -> tuple[Vector, StepResult]:
         """One time step; an unsolved step leaves the state unchanged.
@@ -134,7 +134,7 @@ class Plant:
         Raises:
             ValueError: the shape of the command is wrong, or a number is not finite.
         """
-        given = checks.array("Plant.step(command)", command, (self.sim.nu,))
+        given = checks.array("Plant.step(command)", command, (self.nominal.nu,))
         lowest, highest = self._limits
         u = np.maximum(given, lowest)  # a copy: its owner may write into the command meanwhile
         np.minimum(u, highest, out=u)
@@ -143,8 +143,8 @@ class Plant:
             late = len(self._waiting) > self._late
             u = self._waiting.popleft() if late else self._waiting[0].copy()  # the first command also acted before
         if self.perturbation.pushes:
-            end = self.time + self.sim.time_step
-            u = np.concatenate([u, self.perturbation.push_forces(self.sim.mechanism, self.time, end)])
+            end = self.time + self.nominal.time_step
+            u = np.concatenate([u, self.perturbation.push_forces(self.nominal.mechanism, self.time, end)])
         result = self.simulator.step(self.x, u)
         if not result.success:
             result = self._soften(u, result)
@@ -172,7 +172,7 @@ class Plant:
         Returns:
             True if it has fallen. Always False for a robot whose base neither floats nor moves in a vertical plane.
         """
-        if not stands_free(self.sim.mechanism):
+        if not stands_free(self.nominal.mechanism):
             return False
         now, first = self._base(x), self._base(self._x0)
         low = self._above(now[:3]) < _LOW * self._above(first[:3])
@@ -191,7 +191,7 @@ class Plant:
 
     def _base(self, x: Vector) -> Vector:
         """Maximal state (13,) of the first body."""
-        return np.asarray(self.sim.maximal(x)[0])
+        return np.asarray(self.nominal.maximal(x)[0])
 
 
 def _spread(call: str, value: ArrayLike, size: int) -> Vector:
