@@ -22,6 +22,7 @@ _ACCEPT, _LEAST, _MOST = 1e-12, 1e-12, 1e6  # damping where it begins, and its r
 _SMALL = 1e-12  # [rad, m] a step that ends the iterations
 _SPREAD = 0.5  # [rad, m] of the coordinates of a further start
 _TURN = 1.0  # [rad] largest change of a coordinate in an iteration
+_ORTHOGONAL = 1e-6  # error of R R^T of a rotation matrix
 
 
 Target = tuple[Floats | None, Floats | None]  # place, rotation
@@ -69,8 +70,9 @@ def ik(
 
     Args:
         sim: the simulator, or its Kinematics with frames that were added.
-        targets: by frame: its place (3,) [m], or, with its orientation, (place, quaternion (w, x, y, z)) or (None,
-            quaternion). "center of mass" is a place, too.
+        targets: by frame: its place (3,) [m], or, with its orientation, (place, orientation) or (None, orientation),
+            a quaternion (w, x, y, z) or a rotation matrix, as from `Kinematics.pose`. "center of mass" is a place,
+            too.
         start: coordinates (nq,), by default those of the neutral state.
         fixed: names of joints that keep their coordinates, "floating_base" for one.
         limits: whether joint limits hold; cone limits are ignored.
@@ -159,13 +161,23 @@ def _target(kin: Kinematics, name: str, given: Any) -> Target:
     if name != COM:
         checks.one_of("ik(targets)", name, [*kin.frames, COM])
     pair = isinstance(given, tuple | list) and len(given) == 2
-    place, quat = given if pair else (given, None)
-    if place is None and quat is None:
-        raise ValueError(f"{call}: expected a place (3,), or (place, quaternion), got {given!r}")
-    if name == COM and quat is not None:
+    place, orientation = given if pair else (given, None)
+    if place is None and orientation is None:
+        raise ValueError(f"{call}: expected a place (3,), or (place, orientation), got {given!r}")
+    if name == COM and orientation is not None:
         raise ValueError(f"{call}: it has a place, but no orientation")
     at = None if place is None else checks.array(call, place, (3,))
-    return at, None if quat is None else rotation_matrix(checks.quaternion(call, quat))
+    return at, None if orientation is None else _rotation(call, orientation)
+
+
+def _rotation(call: str, given: Any) -> Floats:
+    """The rotation matrix of a quaternion, or of such a matrix."""
+    if np.shape(given) != (3, 3):
+        return rotation_matrix(checks.quaternion(call, given))
+    R = checks.array(call, given, (3, 3))
+    if not np.abs(R @ R.T - np.eye(3)).max() < _ORTHOGONAL or np.linalg.det(R) < 0.0:
+        raise ValueError(f"{call}: expected a quaternion (4,) or a rotation matrix (3, 3), got {given!r}")
+    return R
 
 
 def _residual(kin: Kinematics, q: Floats, wanted: Mapping[str, Target]) -> tuple[Floats, Floats]:

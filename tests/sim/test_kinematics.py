@@ -129,6 +129,12 @@ def test_inverse_kinematics_of_a_floating_robot(tmp_path: Path) -> None:
     np.testing.assert_array_equal(held.q[:7], start[:7])
     with pytest.raises(ValueError, match=r"ik\(fixed=\.\.\.\): 'base' is not one of"):
         dojo.ik(sim, {"hand": (0, 0, 0)}, fixed=["base"])
+    again = dojo.ik(sim, {"hand": kin.pose("hand", found.q)}, start)
+    assert again.success, again.message
+    for got, expected in zip(kin.pose("hand", again.q), kin.pose("hand", found.q), strict=True):
+        np.testing.assert_allclose(got, expected, atol=1e-7)
+    with pytest.raises(ValueError, match="rotation matrix"):
+        dojo.ik(sim, {"hand": (None, 2.0 * np.eye(3))})
 
 
 def test_arrays_have_any_leading_axes(tmp_path: Path, rng: np.random.Generator) -> None:
