@@ -149,8 +149,8 @@ class RowBatch:
             self._linearize(A, B, x_next, reports)
         elif n:
             self._roll(x_next, reports)
+        whole = reports[:, StepReport.STATUS] == Status.SOLVED
         for i in np.flatnonzero(reports[:, StepReport.STATUS]):
-            self.impulses.known[i : i + 1] = False
             if int(reports[i, StepReport.STATUS]) in DIVISIBLE:
                 self._divide(int(i), derivatives, A, B, x_next, reports)
         if derivatives and (refuse(reports, n, A, B) < n or reports[:, StepReport.STATUS].any()):
@@ -159,6 +159,8 @@ class RowBatch:
         for i in np.flatnonzero(reports[:, StepReport.STATUS]):
             x_next[i] = self.xs[i]
             A[i : i + 1], B[i : i + 1] = 0.0, 0.0
+        if len(self.impulses):
+            self.impulses.known[:] = whole & (reports[:, StepReport.STATUS] == Status.SOLVED)
         statuses, iterations = (reports[:, k].astype(np.int64) for k in (StepReport.STATUS, StepReport.ITERATIONS))
         return BatchStep(x_next, statuses, iterations, A, B), reports
 
@@ -184,7 +186,6 @@ class RowBatch:
         kept = self.impulses
         if len(kept):
             settings[:, StepSetting.IMPULSES] = kept.known
-            kept.known[:] = True
         return RowTables(np.array(models)[self.index], scratch, settings, kept.cones, kept.bounds, kept.dry), count
 
     def _linearize(self, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
