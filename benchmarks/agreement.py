@@ -150,7 +150,7 @@ def run(given: argparse.Namespace) -> Report:
         for label in pairs:
             header += [f"{label}difference [%]", f"{label}within 5 % [%]"]
     report.tables.append(Table("returns", tuple(header), cells))
-    report.rows = [number(f"{row[0]}, difference of mean returns", row[3], 100 * WITHIN, unit="%") for row in cells]
+    report.rows = [number(f"{row[0]}, difference of mean returns", row[4], 100 * WITHIN, unit="%") for row in cells]
     return report
 
 

@@ -23,6 +23,7 @@ from dojo_opt.mpc.moving_reference import Sampled as Sampled
 from dojo_opt.planning.ilqr import ilqr as ilqr
 from dojo_opt.planning.options import Options as Options, Stage as Stage
 from dojo_opt.planning.plan import Plan as Plan
+from dojo_opt.planning.plan_library import plan_library as plan_library
 from dojo_opt.planning.problem import Problem as Problem
 from dojo_opt.planning.residual import kernel as kernel
 from dojo_opt.planning.tracking import tracking_gains as tracking_gains

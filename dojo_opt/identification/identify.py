@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.identification.delayed_space import DelayedSpace
 from dojo_opt.identification.normal_equations import NormalEquations
 from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.identification.windows import Predictor, Window, WindowErrors, cut_windows
@@ -69,7 +70,7 @@ class Identified:
         outliers: share of states with reduced weight.
         cost: cost of the data and the prior, see the module.
         starts: (nx,) fitted first state of every window.
-        windows: the measured windows.
+        windows: the measured windows, with the inputs that act under the delay.
         noise: (ndx,) standard deviations of the measurement.
         solved: whether each window could be predicted at the end.
         history: one record per iteration.
@@ -170,7 +171,7 @@ class Prior:
     mean (n,); precision (n,) the inverse of the variance, 0 where nothing is known
     """
 
-    def __init__(self, space: ParameterSpace, given: Mapping[str, Any]) -> None:
+    def __init__(self, space: DelayedSpace, given: Mapping[str, Any]) -> None:
         self.mean, self.precision = space.values.copy(), np.zeros(len(space.values))
         for name, value in checks.mapping("identify(prior=...)", given).items():
             call = f"identify(prior=...): {name!r}"
@@ -192,7 +193,7 @@ class _Fit:
     """Parameters, starts and their normal equations."""
 
     def __init__(
-        self, space: ParameterSpace, windows: list[Window], predictor: Predictor, outlier: float, prior: Prior
+        self, space: DelayedSpace, windows: list[Window], predictor: Predictor, outlier: float, prior: Prior
     ) -> None:
         self.space, self.windows, self.predictor, self.outlier, self.prior = space, windows, predictor, outlier, prior
         self.theta, self.base = space.values.copy(), space.simulator(space.values)
@@ -207,10 +208,11 @@ class _Fit:
             sim = self.space.simulator(theta).replace(kappa=kappa)
         except ValueError:
             return None
+        windows = self.space.delayed(self.windows, theta)
         if not slopes:
-            return self.predictor.errors(sim, self.windows, starts)
+            return self.predictor.errors(sim, windows, starts)
         predict, chain = self.predictor.predict, self.space.slopes(theta)
-        return [predict(sim, chain, w, s, kappa) for w, s in zip(self.windows, starts, strict=True)]
+        return [predict(sim, chain, w, s, kappa) for w, s in zip(windows, starts, strict=True)]
 
     def weigh(self, found: list[WindowErrors], usable: list[bool]) -> tuple[float, list[Floats], float]:
         """(cost, weights of the states of each window, share of outliers)."""
@@ -265,6 +267,10 @@ class IdentifyOptions:
     Attributes:
         window: steps that are predicted from one start, which is free within the noise (default None: whole motions).
         every: number of steps from one compared state to the next (default 1).
+        delay: time from an input to the moment when it acts [s]: a number if it is known, or the range (low, high) of a
+            delay to fit, as the parameter "delay" (default 0). An input that acts within a step counts with its share
+            of the step; before a motion, inputs are those of its first step. Delays have local minima, a time step
+            apart: give `starts`, which are spread over the range evenly.
         kappas: smoothing of contacts, one after the other [N s m]: smooth contacts act at a distance (default None:
             that of the simulator).
         outlier: number of deviations; states whose errors have a larger root mean square count linearly (default 3).
@@ -275,6 +281,7 @@ class IdentifyOptions:
 
     window: int | None = None
     every: int = 1
+    delay: ArrayLike = 0.0
     kappas: Sequence[float] | None = None
     outlier: float = 3.0
     tolerance: float = 1e-4
@@ -336,12 +343,12 @@ def identify(
     checks.keywords(f"{call}(...)", options, [f.name for f in fields(IdentifyOptions)])
     o = IdentifyOptions(**options)
     parameters, bodies = checks.names(f"{call}(parameters)", parameters), checks.names(f"{call}(bodies=...)", bodies)
-    space = ParameterSpace(sim, parameters, bodies, bounds)
+    space = DelayedSpace(ParameterSpace(sim, parameters, bodies, bounds), o.delay, sim.time_step)
     deviations = checks.spread(f"{call}(noise=...)", noise, sim.ndx)
     if not np.all(deviations > 0.0) or not np.isfinite(deviations).any():
         raise ValueError(f"{call}(noise=...): expected numbers above 0, not all infinite, got {noise!r}")
     check_executor(call, executor)
-    known, windows = Prior(space, prior or {}), cut_windows(sim, trajectories, o.window)
+    known, windows = Prior(space, prior or {}), cut_windows(sim, trajectories, o.window, space.past)
     count = room_for(f"{call}(starts=...)", starts, 8.0 * sum(w.x.size for w in windows))
     first = _first_values(space, known, count, checks.whole_number(f"{call}(seed=...)", seed, 0))
     calls = [(space, windows, deviations, o, known, values) for values in first]
@@ -350,7 +357,7 @@ def identify(
     return replace(best, seconds=sum(each.seconds for each in found))
 
 
-def _first_values(space: ParameterSpace, known: Prior, count: int, seed: int) -> list[Floats]:
+def _first_values(space: DelayedSpace, known: Prior, count: int, seed: int) -> list[Floats]:
     """Values (n,) that fits begin with: those of the space, then random ones within their bounds."""
     rng, out = np.random.default_rng(seed), [space.values.copy()]
     told = known.precision > 0.0
@@ -358,6 +365,8 @@ def _first_values(space: ParameterSpace, known: Prior, count: int, seed: int) ->
     spread = np.where(told, np.maximum(known.precision, 1e-300) ** -0.5, _AWAY * np.abs(space.values))
     while len(out) < count:
         values = np.clip(middle + spread * rng.standard_normal(len(middle)), space.low, space.high)
+        if space.fitted and not told[-1]:  # minima lie side by side, and the range is all that is known
+            values[-1] = space.low[-1] + (len(out) - 0.5) / (count - 1) * (space.high[-1] - space.low[-1])
         with suppress(ValueError):  # of bodies that cannot be
             space.simulator(values)
             out.append(values)
@@ -365,7 +374,7 @@ def _first_values(space: ParameterSpace, known: Prior, count: int, seed: int) ->
 
 
 def _fitted(
-    space: ParameterSpace, windows: list[Window], noise: Floats, o: IdentifyOptions, known: Prior, values: Floats
+    space: DelayedSpace, windows: list[Window], noise: Floats, o: IdentifyOptions, known: Prior, values: Floats
 ) -> Identified:
     """The fit from one start; at module level, so that other processes can import it."""
     began = time.process_time()
@@ -463,6 +472,6 @@ def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str,
     return Identified(
         status == Status.SOLVED, status, _MESSAGES[status], space.labels, fit.theta, space.values, covariance,
         space.simulator(fit.theta), float(np.sqrt(cost / max(count, 1))), unseen, far,
-        fit.rest(cost, found, usable), fit.starts, fit.windows, fit.predictor.noise, usable,
+        fit.rest(cost, found, usable), fit.starts, space.delayed(fit.windows, fit.theta), fit.predictor.noise, usable,
         history, time.process_time() - began,
     )  # fmt: skip

@@ -6,13 +6,12 @@ r_0 = s (-) m_0,    r_t = x_t(s, theta) (-) m_t,    both over the noise of the m
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.planning.manifold import tangent_layout
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
@@ -26,6 +25,16 @@ Integers = NDArray[np.int64]
 __all__ = ["Window", "WindowErrors", "cut_windows", "difference_slopes", "slopes_along"]
 
 
+class Space(Protocol):
+    """What a prediction needs of the parameters."""
+
+    values: Floats
+
+    @property
+    def wrt(self) -> tuple[str, ...]:
+        """Names of the parameters of the simulator."""
+
+
 @dataclass(frozen=True)
 class Window:
     """A piece of a measured motion: it is predicted as a whole from its start."""
@@ -34,12 +43,35 @@ class Window:
     first: int  # step of the trajectory it begins at
     x: Floats  # (T + 1, nx) measured states
     u: Floats  # (T, nu)
+    past: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (m, nu) inputs of the steps before, if kept
+    rate: Floats | None = None  # (T, nu) derivative of u by the delay [1/s], if it is fitted
 
     __repr__ = short_repr
 
+    def delayed(self, steps: float, time_step: float | None) -> Window:
+        """The window with the inputs that act if they come later by so many steps: means over each step.
 
-def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None) -> list[Window]:
-    """Windows of `length` steps that follow one another, the last one shorter; whole motions for None."""
+            u_t = (1 - f) u[t - k] + f u[t - k - 1],   k + f = steps,   du_t/ddelay = (u[t - k - 1] - u[t - k])/h
+
+        Args:
+            steps: of the delay.
+            time_step: h, for the derivative [s]; None: without it.
+
+        Returns:
+            The window.
+        """
+        k = int(steps)
+        every, m, T = np.concatenate([self.past, self.u]), len(self.past), len(self.u)
+        now, before = every[m - k : m - k + T], every[m - k - 1 : m - k - 1 + T]
+        rate = None if time_step is None else (before - now) / time_step
+        return replace(self, u=now + (steps - k) * (before - now), rate=rate)
+
+
+def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None, past: int = 0) -> list[Window]:
+    """Windows of `length` steps that follow one another, the last one shorter; whole motions for None.
+
+    past: steps before a window whose inputs it keeps; before a motion, inputs are those of its first step.
+    """
     call, out = "identify(trajectories)", []
     if isinstance(trajectories, Trajectory) or not isinstance(trajectories, Iterable):
         raise TypeError(f"{call}: expected a list of motions, got {checks.shown(trajectories)}")
@@ -48,9 +80,10 @@ def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None)
         us = checks.array(call, raw[1], ("T", sim.nu))
         xs = checks.array(call, raw[0], (len(us) + 1, sim.nx))
         size = len(us) if length is None else length
+        before = np.concatenate([np.repeat(us[:1], past, axis=0), us])  # us[t] is before[past + t]
         for first in range(0, len(us), max(size, 1)):
             last = min(first + size, len(us))
-            out.append(Window(number, first, xs[first : last + 1], us[first:last]))
+            out.append(Window(number, first, xs[first : last + 1], us[first:last], before[first : first + past]))
     if not out:
         raise ValueError(f"{call}: expected motions of at least one step, got none")
     return out
@@ -120,7 +153,7 @@ class WindowErrors:
 class Predictor:
     """Predictions of windows by one simulator of a space."""
 
-    def __init__(self, space: ParameterSpace, noise: Floats, every: int) -> None:
+    def __init__(self, space: Space, noise: Floats, every: int) -> None:
         self._space, self._every, self.noise = space, every, noise
         self.measured = np.flatnonzero(np.isfinite(noise))
         self._scale = 1.0 / noise[self.measured]
@@ -158,11 +191,16 @@ class Predictor:
         xs, line = sim.linearize_rollout(start, window.u, kappa=kappa, wrt=self._space.wrt)
         solved = not np.any(line.status)
         errors = sim.difference(xs[rows], window.x[rows])
-        slope = difference_slopes(self._layout(sim), errors) @ self._moved(line, rows, chain)
+        slope = difference_slopes(self._layout(sim), errors) @ self._moved(line, rows, chain, window.rate)
         slope = slope[:, self.measured] * self._scale[:, None]
         return WindowErrors(errors[:, self.measured] * self._scale, slope[..., :ndx], slope[..., ndx:], solved)
 
-    def _moved(self, line: Linearization, rows: Integers, chain: Floats) -> Floats:
-        """(len(rows), ndx, ndx + n) derivatives of the states at some steps by the start and by theta."""
+    def _moved(self, line: Linearization, rows: Integers, chain: Floats, rate: Floats | None) -> Floats:
+        """(len(rows), ndx, ndx + n) derivatives of the states at some steps by the start and by theta, whose last
+        component is the delay if the inputs have a derivative by it.
+        """
         blocks = [np.asarray(line.parameters[name]) for name in self._space.wrt]
-        return slopes_along(line.A, np.concatenate(blocks, axis=2) @ chain, rows)
+        by_theta = np.concatenate(blocks, axis=2) @ chain
+        if rate is not None:
+            by_theta[:, :, -1] += np.matmul(line.B, rate[:, :, None])[:, :, 0]
+        return slopes_along(line.A, by_theta, rows)

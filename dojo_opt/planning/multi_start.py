@@ -20,7 +20,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Planner = Callable[..., Plan]
 
-__all__ = ["multi_start"]
+__all__ = ["multi_start", "of_problem", "planned"]
 
 _POINTS = 6  # of the splines that are added to a guess
 _SHARE = 0.25  # of the range of a limited input: standard deviation of a point
@@ -72,7 +72,7 @@ def multi_start(
     tasks = [(planner, problem, one, settings) for one in guesses]
     plans: list[Plan] = []
     try:
-        plans.extend(results_in_order(_run, tasks, executor))  # those before Ctrl-C stay
+        plans.extend(results_in_order(planned, tasks, executor))  # those before Ctrl-C stay
     except KeyboardInterrupt as stop:
         begun = getattr(stop, "result", None)
         raise Interrupted(_best(problem, plans, starts) if plans else begun) from None
@@ -100,7 +100,7 @@ def _changed(problem: Problem, center: Matrix, spread: Vector, seed: np.random.S
     return out if problem.control_limits is None else np.clip(out, *problem.control_limits)
 
 
-def _run(planner: Planner, problem: Problem, guess: Guess, settings: dict[str, Any]) -> Plan:
+def planned(planner: Planner, problem: Problem, guess: Guess, settings: dict[str, Any]) -> Plan:
     """One plan, without its problem, which the caller has; at module level, so that other processes can import it."""
     own = problem.with_own_terms()
     own.free_start = problem.free_start
@@ -113,7 +113,20 @@ def _best(problem: Problem, plans: list[Plan], starts: int) -> Plan:
     """The best plan; its message says how many are solved, its `seconds` are those of all."""
     solved = [plan for plan in plans if plan.success]
     best = min(solved, key=lambda plan: plan.fun) if solved else min(plans, key=lambda p: (p.violation, p.gap, p.fun))
-    of = problem if problem.refinement == 1 or not best.success else problem.refined(problem.refinement)
     message = f"{best.message} The best of {starts} starts, {len(solved)} of them solved."
     seconds = sum(plan.seconds for plan in plans)
-    return replace(best, problem=of, simulator=of.sim, message=message, seconds=seconds)
+    return replace(of_problem(best, problem), message=message, seconds=seconds)
+
+
+def of_problem(plan: Plan, problem: Problem) -> Plan:
+    """The plan with its problem: the caller's, or that with shorter time steps where the refinement was reached.
+
+    Args:
+        plan: a plan without its problem, from a worker.
+        problem: the caller's.
+
+    Returns:
+        The plan.
+    """
+    of = problem if plan.substeps == problem.substeps else problem.refined(problem.refinement)
+    return replace(plan, problem=of, simulator=of.sim)

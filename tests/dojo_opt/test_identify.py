@@ -10,6 +10,7 @@ import pytest
 from scipy.linalg import block_diag
 
 import dojo_opt as dojo
+from dojo_opt.identification.delayed_space import DelayedSpace
 from dojo_opt.identification.identify import _Fit
 from dojo_opt.identification.normal_equations import NormalEquations
 from dojo_opt.identification.windows import Predictor, WindowErrors, cut_windows, difference_slopes
@@ -157,12 +158,16 @@ def test_a_quadruped_finds_payload_friction_and_damping_in_its_own_log():
     assert motion.success
     noise = np.repeat((1e-3, 3e-3, 2e-3, 0.02, 0.03, 0.05), (3, 3, 12) * 2)  # [m, rad, rad, and their rates]
     measured = sim.integrate(motion.x, noise * rng.standard_normal((len(motion.x), sim.ndx)))
-    found = dojo.identify(sim, [(measured, motion.u)], tuple(truth), noise=noise, window=10)
-    assert found.success and found.labels == tuple(truth)
-    values = np.array(list(truth.values()))
+    late = 1  # [steps] from what the log says to what acts
+    log, limits = (measured[:-late], motion.u[late:]), (0.0, 4.0 * sim.time_step)
+    found = dojo.identify(sim, [log], tuple(truth), noise=noise, window=10, delay=limits, starts=4)
+    assert found.success and found.labels == (*truth, "delay")
+    values = np.array([*truth.values(), late * sim.time_step])
     assert np.all(np.abs(found.start - values) > 0.1 * values)
     np.testing.assert_array_less(np.abs(found.values - values), 4.0 * found.deviation)
     np.testing.assert_array_less(found.deviation, 0.1 * values)
+    known = dojo.identify(sim, [log], tuple(truth), noise=noise, window=10, delay=late * sim.time_step)
+    np.testing.assert_array_less(np.abs(known.values - values[:-1]), 4.0 * known.deviation)
 
 
 def test_starts_are_eliminated_from_the_normal_equations():
@@ -219,3 +224,89 @@ def test_a_report_has_parameters_residuals_and_both_motions(tmp_path):
     assert "damper" in page and "v joint_0" in page
     with pytest.raises(TypeError, match="Identified"):
         dojo.identification_report(motions, tmp_path)
+
+
+def _late(us, steps):
+    """Inputs (T, nu) as they act after so many steps: means over the steps."""
+    k, f = int(steps), steps - int(steps)
+    earlier = lambda n: np.concatenate([np.repeat(us[:1], n, axis=0), us])[: len(us)]  # noqa: E731
+    return (1.0 - f) * earlier(k) + f * earlier(k + 1)
+
+
+def test_the_delay_of_inputs_is_fitted_or_given():
+    rng, noise, steps = np.random.default_rng(5), np.array([1e-3, 5e-3]), 2.6
+    truth, guess = _arm(0.3), _arm(0.2)
+    logs = []
+    for _ in range(3):
+        us = np.repeat(rng.uniform(-2, 2, (10, 1)), 4, axis=0)
+        x = truth.rollout(np.array([rng.uniform(-1, 1), 0.0]), _late(us, steps)).x
+        logs.append((x + noise * rng.standard_normal(x.shape), us))
+    for window in (None, 7):
+        found = dojo.identify(guess, logs, ("damper",), noise=noise, delay=(0.0, 0.1), window=window)
+        assert found.success and found.labels[-1] == "delay" and found.start[-1] == 0.05
+        errors = (found.values - [0.3, steps * truth.time_step]) / found.deviation
+        assert np.abs(errors).max() < 3.0, (found.values, found.deviation)
+        assert found.deviation[1] < 0.1 * truth.time_step
+        assert found.rms == pytest.approx(1.0, abs=0.15)
+    given = dojo.identify(guess, logs, ("damper",), noise=noise, delay=steps * truth.time_step)
+    assert given.labels == ("damper:hinge",) and abs(given.values[0] - 0.3) < 3.0 * given.deviation[0]
+    without = dojo.identify(guess, logs, ("damper",), noise=noise)
+    assert without.rms > 5.0 * given.rms
+
+
+def test_derivatives_by_a_delay_agree_with_central_differences():
+    sim = _arm()
+    us = np.random.default_rng(6).uniform(-2, 2, (12, 1))
+    xs = sim.rollout(np.array([0.3, 0.0]), us).x
+    space = DelayedSpace(dojo.ParameterSpace(sim, ("damper",)), (0.0, 0.1), sim.time_step)
+    window = cut_windows(sim, [(xs, us)], 5, space.past)[1]
+    np.testing.assert_array_equal(window.past, us[5 - space.past :][: space.past] if space.past <= 5 else window.past)
+    predictor, theta, eps = Predictor(space, np.array([0.01, 0.1]), 1), np.array([0.3, 0.033]), 1e-6
+
+    def errors(theta):
+        (late,) = space.delayed([window], theta)
+        return predictor.predict(space.simulator(theta), space.slopes(theta), late, xs[5], sim.kappa)
+
+    slopes = errors(theta).by_theta
+    for j in range(2):
+        d = eps * np.eye(2)[j]
+        numeric = (errors(theta + d).errors - errors(theta - d).errors) / (2 * eps)
+        np.testing.assert_allclose(slopes[..., j], numeric, rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("delay", [-0.1, (0.1, 0.0), (0.0, np.inf), (0.0, 0.1, 0.2), "late"])
+def test_bad_delays_are_named(delay):
+    with pytest.raises((ValueError, TypeError), match=r"identify\(delay=\.\.\.\)"):
+        dojo.identify(_arm(), _motions(_arm(), np.random.default_rng(0), 0.01), ("damper",), delay=delay)
+
+
+@pytest.mark.slow
+def test_feet_that_stand_on_a_terrain_tell_its_heights():
+    """From noisy states of a standing quadruped; heights that no foot is near stay as uncertain as before."""
+    i, j = np.meshgrid(range(6), range(3), indexing="ij")
+    heights = 0.015 * np.sin(1.7 * i + 2.3 * j)
+
+    def terrain(values):
+        return dojo.Terrain(values, origin=(-0.3, -0.2), spacing=(0.2, 0.2))
+
+    def robot(values):
+        mech = dojo.models.quadruped(damper=0.5)
+        servos = [dojo.Input(j.name, servo="position", stiffness=60.0, damping=2.0) for j in mech.joints[1:]]
+        return dojo.Simulator(replace(mech, inputs=servos).on(terrain(values)), time_step=0.01, kappa=1e-5)
+
+    truth, rng = robot(heights), np.random.default_rng(0)
+    x = truth.neutral()
+    x[2] += 0.05
+    path = truth.rollout(x, np.tile(x[7:19], (60, 1)), throw=True)
+    noise = np.repeat((1e-3, 3e-3, 2e-3, 0.02, 0.03, 0.05), (3, 3, 12) * 2)  # [m, rad, rad, and their rates]
+    measured = truth.integrate(path.x[30:], noise * rng.standard_normal((31, truth.ndx)))
+    found = dojo.identify(
+        robot(np.zeros_like(heights)), [(measured, path.u[30:])], ("terrain",), noise=noise, window=15,
+        prior={"terrain": (0.0, 0.03)}, kappas=(1e-3, 1e-5),
+    )  # fmt: skip
+    assert found.success
+    own = terrain(found.values.reshape(heights.shape))
+    for x, y, _ in path.contacts.point[-1]:
+        assert abs(own.height(x, y) - terrain(heights).height(x, y)) < 2e-3
+    deviation = found.deviation.reshape(heights.shape)
+    assert np.all(deviation[5] > 0.025) and np.all(deviation[1:3] < 0.02), deviation

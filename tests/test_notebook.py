@@ -1,0 +1,46 @@
+"""The notebooks of docs/ run from top to bottom, and hold no outputs of an earlier run."""
+
+from __future__ import annotations
+
+import ast
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+NOTEBOOKS = sorted((Path(__file__).resolve().parents[1] / "docs").glob("*.ipynb"))
+
+
+def _run(source: str, names: dict[str, Any]) -> Any:
+    """What a notebook does with a cell: the value of an expression at the end, None behind a semicolon."""
+    tree, shown = ast.parse(source), None
+    last = tree.body[-1]
+    if isinstance(last, ast.Expr) and not source.rstrip().endswith(";"):
+        tree.body.pop()
+        shown = ast.Expression(last.value)
+    exec(compile(tree, "cell", "exec"), names)
+    return None if shown is None else eval(compile(shown, "cell", "eval"), names)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
+def test_notebooks_run(path, monkeypatch):
+    pytest.importorskip("gymnasium")
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    page = json.loads(path.read_text(encoding="utf-8"))
+    assert (page["nbformat"], page["nbformat_minor"]) >= (4, 5)
+    assert len({cell["id"] for cell in page["cells"]}) == len(page["cells"])
+    names: dict[str, Any] = {}
+    for cell in page["cells"]:
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == [] and cell["execution_count"] is None
+            value = _run("".join(cell["source"]), names)
+            if value is not None:
+                assert "<" in value._repr_html_()
+    if path.stem == "learning":
+        assert np.linalg.norm(names["flight"].x[-1, :3] - names["goal"]) < 0.2
+        assert names["total"].mean() > 300.0
+        assert len(names["found"].unseen) == 1
+        np.testing.assert_allclose(names["known"].values, (1.0, 0.2, 0.05), rtol=0.05)
