@@ -51,7 +51,7 @@ class _TaskEpisode:
         self.edge, self.kind = np.ones(task.sim.nu), np.float32
         self.x, self._count = np.zeros((1, task.nx)), task.steps
         self._rngs, self._model = [np.random.default_rng()], Drawn.of(task)
-        self._quick = task.sim.has_single_rows and task.touch_groups is None
+        self._quick = task.sim.has_single_rows
 
     def reset(self, rng: np.random.Generator) -> Vector:
         """To a first state."""
@@ -71,7 +71,7 @@ class _TaskEpisode:
         if message:
             return task.observe(self.x)[0][0], 0.0, True, late, {"message": message}
         observation, reward, over = task.judge(before[0], given, self.x[0])
-        if task.hold is not None:
+        if task.hold is not None and self._count % task.hold == 0:
             task.redraw(self.x, np.array([self._count]), self._rngs)
             observation = task.observe(self.x)[0][0]
         return observation, reward, over, late, {}
@@ -83,11 +83,15 @@ class _TaskEpisode:
         if not self._quick:
             found = self._model.step(x, inputs[None])
             return found.x, "" if found.success else found.message
-        row = sim.single_row(self.task.substeps)
+        touch = self.task.touch_groups
+        row = sim.single_row(self.task.substeps, touch is not None)
         if not row.advance(x[0, :nx], inputs):
             return x, row.result(x[:, :nx]).message
-        after = row.end[None].copy()
-        return after if x.shape[1] == nx else np.concatenate([after, x[:, nx:]], axis=1), ""
+        after = x.copy()
+        after[0, :nx] = row.end
+        if touch is not None:
+            after[0, -6 * touch.count :] = touch.of_rows(after[:, :nx], row.last_contacts).ravel()
+        return after, ""
 
     def state(self) -> Vector:
         """The present one, of the simulator."""

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.contact.group_wrenches import group_wrenches
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
+from sim.model.record_columns import ContactRow
 from sim.simulator.results import Contacts
 from sim.simulator.simulator import Simulator
 
@@ -55,8 +56,26 @@ class ContactGroups:
         Raises:
             ValueError: a wrong shape.
         """
-        forces, points = np.ascontiguousarray(contacts.force), np.ascontiguousarray(contacts.point)
-        states = checks.array("ContactGroups.wrenches(X)", X, (len(forces), self.sim.nx))
-        out, engine = np.empty((len(forces), self.count, 6)), self.sim._engine
+        states = checks.array("ContactGroups.wrenches(X)", X, (len(contacts.impulse), self.sim.nx))
+        return self._sums(states, contacts.impulse, contacts.point, contacts.time_step)
+
+    def of_rows(self, states: Floats, rows: Floats) -> Floats:
+        """As `wrenches`, without checks: from rows of `ContactRow` of a step of the simulator.
+
+        Args:
+            states: (n, nx) at the end of the step.
+            rows: (n, ncontact, 11).
+
+        Returns:
+            (n, count, 6) forces [N], then torques [N m].
+        """
+        impulses, points = (rows[..., k : k + 3] for k in (ContactRow.IMPULSE, ContactRow.POINT))
+        return self._sums(np.ascontiguousarray(states), impulses, points, self.sim.time_step)
+
+    def _sums(self, states: Floats, impulses: Floats, points: Floats, time_step: float) -> Floats:
+        """Sums over the contacts of the groups."""
+        out, engine = np.empty((len(states), self.count, 6)), self.sim._engine
+        forces = np.ascontiguousarray(impulses / time_step)
+        points = np.ascontiguousarray(points)
         group_wrenches(engine.step_table(), engine.table(), states, forces, points, self._numbers, out)
         return out

@@ -311,8 +311,13 @@ class SingleRow:
     @property
     def contacts(self) -> Contacts | None:
         """Contacts (1, ncontact) of the last step, where they are kept."""
-        rows = self._motion.contacts
-        return contacts_of(self._mechanism, self._engine.settings.time_step, rows[-1:].copy()) if len(rows) else None
+        rows = self.last_contacts
+        return contacts_of(self._mechanism, self._engine.settings.time_step, rows.copy()) if len(rows) else None
+
+    @property
+    def last_contacts(self) -> Floats:
+        """The same as rows (1, ncontact, 11) of `ContactRow`, until the next call; (0, ncontact, 11) without."""
+        return self._motion.contacts[-1:]
 
 
 class RowStepping(StateSpace):
