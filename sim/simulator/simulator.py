@@ -401,9 +401,9 @@ class Simulator(RowStepping):
             x: (nx,) state.
             u: (nu,) input; zero by default.
             kappa: central-path parameter at which the step is solved; that of the simulator by default.
-            wrenches: external wrenches, (nbody, 6) or by body, constants.
             wrt: "state", "input" and parameters, as in `parameters`. x and u are held fixed, so the poses and momenta
                 that belong to x move with a parameter.
+            wrenches: external wrenches, (nbody, 6) or by body, constants.
             throw: raise SimulationError where the step is not solved.
 
         Returns:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dojo_opt.report.stability import measures
+from benchmarks.studies.stability import scene_measures
 from dojo_opt.report.stability.trial import StabilityTrial
 from sim.mechanism.body import Body
 from sim.mechanism.joint import Joint
@@ -24,7 +24,7 @@ def spin(inertia: Three, omega: Three, time_step: float, *, refusal: str = "") -
         (0.0, 0.0, 0.0, *omega),
         time_step,
         1.0,
-        measures.angular_momentum,
+        scene_measures.angular_momentum,
         1e-10,
         samples=100,
         tolerance=1e-13,

@@ -7,6 +7,7 @@ from math import pi
 
 import numpy as np
 
+from benchmarks.studies.stability import scene_measures
 from dojo_opt.report.stability import measures
 from dojo_opt.report.stability.trial import StabilityTrial
 from sim.mechanism.body import Body
@@ -53,7 +54,7 @@ def pendulum(
         np.zeros(links),
         time_step,
         duration,
-        measures.energy_error(scale),
+        scene_measures.energy_error(scale),
         0.05,
         samples=round(duration / 0.01),
         why=WHY,
@@ -77,7 +78,7 @@ def heavy_tip(ratio: float, time_step: float, *, angle: float, refusal: str = ""
         np.zeros(10),
         time_step,
         5.0,
-        measures.energy_error(0.2 * ratio * G * 2.0),
+        scene_measures.energy_error(0.2 * ratio * G * 2.0),
         0.01,
         samples=500,
         why=WHY,
@@ -99,7 +100,7 @@ def lengths() -> StabilityTrial:
         np.zeros(3),
         1e-3,
         10.0,
-        measures.energy_error(10.0 * G * 10.0),
+        scene_measures.energy_error(10.0 * G * 10.0),
         1e-3,
         samples=1000,
     )

@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 
+from benchmarks.studies.stability import scene_measures
 from dojo_opt.models.block import block
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.models.sphere import sphere
@@ -47,7 +48,7 @@ def on_a_foot(ratio: float, time_step: float) -> StabilityTrial:
         np.zeros(7),
         time_step,
         2.0,
-        measures.standing_at(1, 0.35 - sag),
+        scene_measures.standing_at(1, 0.35 - sag),
         1e-4,
     )
 
@@ -76,7 +77,7 @@ def impact(shape: str, time_step: float) -> StabilityTrial:
         velocity,
         time_step,
         30 * time_step,
-        measures.penetration,
+        scene_measures.penetration,
         1e-8,
     )
 
@@ -92,7 +93,7 @@ def drop(time_step: float, duration: float) -> StabilityTrial:
         np.zeros(6),
         time_step,
         duration,
-        measures.resting,
+        scene_measures.resting,
         1e-6,
         samples=min(1000, round(duration / time_step)),
         kappa=1e-12 if time_step < 1e-4 else 0.0,
@@ -132,7 +133,7 @@ def plate(contacts: int, time_step: float) -> StabilityTrial:
         np.zeros(6),
         time_step,
         3.0,
-        measures.resting,
+        scene_measures.resting,
         1e-6,
     )
 
@@ -153,7 +154,7 @@ def box_on_8() -> StabilityTrial:
         np.zeros(6),
         1e-2,
         3.0,
-        measures.resting,
+        scene_measures.resting,
         1e-6,
     )
 
@@ -169,7 +170,7 @@ def small(edge: float, mass: float) -> StabilityTrial:
         np.zeros(6),
         1e-3,
         1.0,
-        measures.standing_at(0, 0.5 * edge),
+        scene_measures.standing_at(0, 0.5 * edge),
         0.01 * edge,
         kappa=1e-11 * mass / 1e-3,
         why="kappa is the gap times the impulse m g h: it has to shrink with the mass",
@@ -187,7 +188,7 @@ def overlap(depth: float) -> StabilityTrial:
         np.zeros(6),
         1e-2,
         1.0,
-        measures.late_penetration(0.1),
+        scene_measures.late_penetration(0.1),
         1e-8,
         why="it is thrown out at depth / h: a state in overlap has no past that led there",
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.studies.stability import scene_measures
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.report.stability import measures
 from dojo_opt.report.stability.trial import StabilityTrial
@@ -30,7 +31,7 @@ def spring(stiffness: float, time_step: float) -> StabilityTrial:
         (0.0,),
         time_step,
         1.0,
-        measures.amplitude_error,
+        scene_measures.amplitude_error,
         0.01,
     )
 
@@ -49,7 +50,7 @@ def turning_spring(kind: str, stiffness: float, time_step: float) -> StabilityTr
         np.zeros(mechanism.nv),
         time_step,
         1.0,
-        measures.amplitude_error,
+        scene_measures.amplitude_error,
         0.01,
     )
 
@@ -65,7 +66,7 @@ def damper(coefficient: float, time_step: float) -> StabilityTrial:
         (1.0,),
         time_step,
         1.0,
-        measures.travelled(0, 0, 1.0 / coefficient),
+        scene_measures.travelled(0, 0, 1.0 / coefficient),
         0.1,
     )
 
@@ -82,7 +83,7 @@ def jammed(width: float) -> StabilityTrial:
         (0.0,),
         1e-2,
         1.0,
-        measures.beyond(0, 0, 0.0, width),
+        scene_measures.beyond(0, 0, 0.0, width),
         1e-8,
         inputs=push,
     )
@@ -106,7 +107,7 @@ def jammed_fingers() -> StabilityTrial:
         np.zeros(count),
         1e-2,
         1.0,
-        measures.beyond(count - 1, 0, 0.0, count * 1e-3),
+        scene_measures.beyond(count - 1, 0, 0.0, count * 1e-3),
         1e-8,
         inputs=(-1e3,),
     )
