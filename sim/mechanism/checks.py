@@ -79,12 +79,20 @@ def all_finite(values: Floats) -> bool:
     return bool(np.isfinite(values).all())
 
 
+def _fits(shape: tuple[int, ...], wanted: tuple[int | str | None, ...]) -> bool:
+    """Whether a shape is the wanted one, in which None and letters stand for any length."""
+    if len(shape) != len(wanted):
+        return False
+    for n, m in zip(shape, wanted, strict=True):  # `all` of a generator takes three times as long
+        if n != m and isinstance(m, int):
+            return False
+    return True
+
+
 def array(call: str, value: Any, shape: tuple[int | str | None, ...]) -> Floats:
     """`value` as a finite float64 array of the given shape; None or a letter stands for any length."""
     out = floats(call, value)
-    fits = out.shape == shape or (
-        out.ndim == len(shape) and all(not isinstance(n, int) or n == m for n, m in zip(shape, out.shape, strict=True))
-    )
+    fits = out.shape == shape or _fits(out.shape, shape)
     if fits and all_finite(out):
         return out
     if not fits:

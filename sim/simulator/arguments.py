@@ -83,11 +83,12 @@ class Arguments:
 
     def inputs(self, method: str, name: str, u: ArrayLike, shape: tuple[int | str | None, ...]) -> Floats:
         """Inputs of the given shape; refused if the results of all rows do not fit the memory."""
-        rows = checks.shape(f"Simulator.{method}({name})", u)[:-1]
-        if prod(rows) > _MANY:
+        call = f"Simulator.{method}({name})"
+        rows = prod((u.shape if type(u) is np.ndarray else checks.shape(call, u))[:-1])
+        if rows > _MANY:
             slopes = self._engine.ndx * (self._engine.ndx + self.nu) if method.startswith("linearize") else 0
-            self.check_room(method, name, prod(rows), slopes)
-        return checks.array(f"Simulator.{method}({name})", u, shape)
+            self.check_room(method, name, rows, slopes)
+        return checks.array(call, u, shape)
 
     def steps(self, method: str, steps: int | None) -> int:
         """A number of steps whose results fit the memory."""

@@ -230,8 +230,9 @@ class Simulator(RowStepping):
         """A rollout under the inputs (T, nu)."""
         knot, xs, reports = rolled.knot, rolled.xs, rolled.reports
         last = reports[min(knot, len(reports) - 1)] if len(reports) else np.zeros(REPORT)
-        status, where = STATUSES[int(last[StepReport.STATUS])], f"Simulator.rollout: step {knot}"
-        errors = rolled.division.errors[:knot]
+        status, (substeps, shares, errors) = STATUSES[int(last[StepReport.STATUS])], rolled.division
+        where = "Simulator.rollout: step "
+        detail = missed(errors) if status == Status.SOLVED else self._sentence(f"{where}{knot}", last, xs[knot])
         return Trajectory(
             simulator=self,
             x=xs[: knot + 1],
@@ -242,10 +243,10 @@ class Simulator(RowStepping):
             residual=float(last[StepReport.RESIDUAL]),
             iterations=reports[:knot, StepReport.ITERATIONS].astype(np.int64),
             contacts=contacts_of(self.mechanism, self.time_step, rolled.contacts[:knot]),
-            substeps=rolled.division.substeps[:knot],
-            shares=rolled.division.shares[:knot],
-            errors=errors,
-            detail=missed(errors) if status == Status.SOLVED else self._sentence(where, last, xs[knot]),
+            substeps=substeps[:knot],
+            shares=shares[:knot],
+            errors=errors[:knot],
+            detail=detail,
             wrenches=None if wrenches is None else wrenches[:knot],
         )
 

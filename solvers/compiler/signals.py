@@ -76,8 +76,8 @@ _DELICATE = frozenset(("__enter__", "__exit__", "__del__", "acquire", "release",
 
 
 def _is_delicate(code: Any) -> bool:
-    """One of these functions, or one that makes or takes an object of LLVM, whose owner it would lose."""
-    return code.co_name in _DELICATE or code.co_filename.startswith(_OF_LLVM)
+    """One of these functions, or one that makes the owner of an object of LLVM. Calls of LLVM may take a second."""
+    return code.co_name in _DELICATE or (code.co_name == "__init__" and code.co_filename.startswith(_OF_LLVM))
 
 
 class _Selective:

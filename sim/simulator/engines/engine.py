@@ -21,11 +21,11 @@ from sim.model.data import Data
 from sim.model.interruptible_loops import pieces
 from sim.model.layout import data_view
 from sim.model.model import Model
-from sim.model.record_columns import ContactRow, Inactive, StepReport
+from sim.model.record_columns import Inactive, StepReport
 from sim.simulator.engines.division import Division
 from sim.simulator.engines.linked_model import LinkedModel
 from sim.simulator.engines.mean_states import MeanStates
-from sim.simulator.results import Interrupted
+from sim.simulator.results import IMPULSE, NORMAL, POINT, Interrupted
 from sim.simulator.settings import Settings, of_call
 from solvers.compiler import Table
 from solvers.status import Status
@@ -35,9 +35,6 @@ Floats = NDArray[np.float64]
 
 # numbers of a step, in loops that follow a law one more; and of one of its contacts or limits
 REPORT, CONTACT, CONE, BOUND = 6, 11, 12, 2
-_IMPULSE = slice(ContactRow.IMPULSE, ContactRow.POINT)
-_POINT = slice(ContactRow.POINT, ContactRow.GAP)
-_NORMAL = slice(ContactRow.NORMAL, CONTACT)
 _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 
@@ -68,15 +65,15 @@ class Divided(NamedTuple):
         """
         parts = self.rolled.contacts
         out = parts[-1].copy()
-        out[:, _IMPULSE] = parts[..., _IMPULSE].sum(axis=0)
-        weight = np.linalg.norm(parts[..., _IMPULSE], axis=2)
+        out[:, IMPULSE] = parts[..., IMPULSE].sum(axis=0)
+        weight = np.linalg.norm(parts[..., IMPULSE], axis=2)
         total = weight.sum(axis=0)
         pressed = total > 0.0
-        points, normals = (np.einsum("tc,tcj->cj", weight, parts[..., part]) for part in (_POINT, _NORMAL))
-        out[pressed, _POINT] = points[pressed] / total[pressed, None]
+        points, normals = (np.einsum("tc,tcj->cj", weight, parts[..., part]) for part in (POINT, NORMAL))
+        out[pressed, POINT] = points[pressed] / total[pressed, None]
         length = np.linalg.norm(normals, axis=1)
-        turned = (length > 0.0) & out[:, _NORMAL].any(axis=1)  # without a normal, it is beyond its reach at the end
-        out[turned, _NORMAL] = normals[turned] / length[turned, None]
+        turned = (length > 0.0) & out[:, NORMAL].any(axis=1)  # without a normal, it is beyond its reach at the end
+        out[turned, NORMAL] = normals[turned] / length[turned, None]
         return np.asarray(out)
 
 
