@@ -35,7 +35,7 @@ CASES = {
         ("foam brick", "in-air"),
         ("stick", "flip"),
     )
-}
+} | {"trifinger_cube": ("trifinger", ("cube",))}
 TRIALS = 20
 SUCCESS, ANGLE, DISTANCE, RATE = 96.5, 11.0, 7.8, 50.0  # [%], [deg], [mm], [Hz] of the publication
 OURS, MUJOCO = "ours, 2 ms, kappa 1e-8", "MuJoCo, default contacts"

@@ -36,7 +36,7 @@ from sim.mechanism.checks import nearest, one_of
 PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap")
 GAITS = ("trot", "bound", "pace", "walk", "turn", "jump", "leap")
 LOOPS = ("free_gait_mpc", "hopper_mpc", "quadruped_mpc")  # run in closed loop with a plant
-SUITES = ("crisp", "idto")  # of tasks that are run by SUITE.TASK, such as idto.spinner
+SUITES = ("crisp", "idto", "jin")  # of tasks that are run by SUITE.TASK, such as idto.spinner
 _ENDED_BY_SIGINT = 128 + 2  # as shells say it
 
 

@@ -5,8 +5,13 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.plant.closed_loop import closed_loop
+from dojo_opt.tasks.jin import trifinger
 from dojo_opt.tasks.jin.fingertips import mechanism, trial_of
+from dojo_opt.tasks.jin.grasp import grasp, place_of_ball
 from dojo_opt.tasks.jin.placing import Placing
+from dojo_opt.tasks.jin.trifinger import mechanism as trifinger_mechanism
+from dojo_opt.tasks.jin.trifinger import place_of_tip
+from dojo_opt.tasks.jin.trifinger import trial_of as trifinger_trial
 
 # starts (x, y, yaw) and goals of the publication, drawn by its own code
 GIVEN = [
@@ -83,6 +88,68 @@ def test_a_loop_ends_when_its_aim_is_achieved():
     assert loop.survived
     assert loop.message == "Achieved its aim at 0.260 s."
     assert len(loop.x) == 27
+
+
+def test_trials_of_the_trifinger_are_those_of_the_publication():
+    first, second = (trifinger_trial("cube", k) for k in (0, 1))
+    np.testing.assert_allclose(
+        first.start, [0.004340494179, -0.02216306149, 0.03, 0.9929791059, 0, 0, 0.1182898778], atol=1e-9
+    )
+    np.testing.assert_allclose(
+        first.goal, [0.03447761323, -0.04952811438, 0.03, 0.8284634664, 0, 0, -0.5600431099], atol=1e-9
+    )
+    np.testing.assert_allclose(second.goal[[0, 6]], [-0.03284783438, 0.5007664008], atol=1e-9)
+
+
+def test_tips_of_the_trifinger_are_where_its_links_end():
+    """The formula in the cost against the simulator's kinematics, and its derivatives against central differences."""
+    sim = dojo.Simulator(trifinger_mechanism("cube"), time_step=2e-3)
+    random = np.random.default_rng(3)
+    x = sim.neutral()
+    x[7:16] += random.uniform(-0.8, 0.8, 9)
+    ends = [c.point for c in sim.mechanism.contacts[8:]]
+    bodies = sim.maximal(x)
+    for k in range(3):
+        at = np.array(place_of_tip(x, k))
+        lower = bodies[3 + 3 * k]
+        w, r = lower[6], lower[7:10]
+        end = lower[:3] + np.asarray(ends[k]) + 2.0 * np.cross(r, np.cross(r, ends[k]) + w * np.asarray(ends[k]))
+        np.testing.assert_allclose(at[:3], end, atol=1e-12)
+        for j in range(3):
+            sides = []
+            for step in (1e-6, -1e-6):
+                moved = x.copy()
+                moved[7 + 3 * k + j] += step
+                sides.append(np.array(place_of_tip(moved, k))[:3])
+            np.testing.assert_allclose(at[3 + j :: 3], (sides[0] - sides[1]) / 2e-6, atol=1e-8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("made", "place"), [(mechanism, place_of_ball), (trifinger_mechanism, place_of_tip)])
+def test_the_slope_of_a_grasp_is_that_of_its_residual(made, place):
+    sim = dojo.Simulator(made("cube"), time_step=2e-3)
+    cost = grasp(3, 3, place, 1.0, 0.05, 5)
+    x = sim.integrate(sim.neutral(), np.random.default_rng(1).uniform(-0.05, 0.05, sim.ndx))
+    u, out, slope = np.zeros(9), np.zeros(12), np.zeros((12, sim.ndx + 9))
+    cost.jacobian(x, u, slope)
+    for j in range(sim.ndx):
+        sides = []
+        for step in (1e-6, -1e-6):
+            dx = np.zeros(sim.ndx)
+            dx[j] = step
+            cost.function(sim.integrate(x, dx), u, out)
+            sides.append(out.copy())
+        np.testing.assert_allclose(slope[:, j], (sides[0] - sides[1]) / 2e-6, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_three_fingers_move_a_cube():
+    """Over 36 mm, and by 25 degrees, within 3 s."""
+    task = trifinger("cube", trial=1)
+    outcome = task.outcome(task.run(seconds=3.0))
+    assert outcome.success
+    assert outcome.penetration < 1e-4
+    assert outcome.measures["off [mm]"] < 20.0
 
 
 @pytest.mark.slow

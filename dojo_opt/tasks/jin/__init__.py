@@ -13,9 +13,10 @@ lets a servo follow positions. Here the state has velocities, the inputs are for
 from typing import TYPE_CHECKING, Any
 
 from dojo_opt.tasks.jin.fingertips import fingertips
+from dojo_opt.tasks.jin.trifinger import trifinger
 from sim.mechanism.checks import nearest
 
-__all__ = ["fingertips"]
+__all__ = ["fingertips", "trifinger"]
 
 
 if not TYPE_CHECKING:

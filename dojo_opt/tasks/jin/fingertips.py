@@ -10,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.cost import Effort
-from dojo_opt.mpc.controller import MPC
-from dojo_opt.planning.options import Options, Stage
-from dojo_opt.planning.problem import Problem
-from dojo_opt.tasks.jin.grasp import grasp_of_points
-from dojo_opt.tasks.jin.placing import Placing
+from dojo_opt.tasks.jin.grasp import grasp, place_of_ball
+from dojo_opt.tasks.jin.reposing import HORIZON, Aim, reposing
+from dojo_opt.tasks.jin.table import on_table
 from dojo_opt.tasks.jin.trial import Trial, draws, followed, pose, turn, within
-from dojo_opt.tasks.suite import SuiteTask, quadratic
+from dojo_opt.tasks.suite import SuiteTask
 from sim.mechanism import checks
 from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
@@ -25,21 +23,14 @@ from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Box, Capsule, Sphere
-from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 
 __all__ = ["fingertips"]
 
 _CALL = "tasks.jin.fingertips"
-_KNOT, _HORIZON, _RATE = 0.04, 10, 50.0  # [s], knots, [Hz]
-_STEP, _BUDGET = 2e-3, 40.0  # [s] of the plant, and of a run
-_KAPPA = 1e-6  # [N s m]
-_NEAR, _TURNED = 0.02, 0.015  # [m], squared sine of half the angle
-_FAR = 0.5  # [m] from the middle of the table
 _TIPS, _TIP, _TIP_MASS = 3, 0.01, 0.00418879  # number, radius [m], [kg]
 _PLACES = ((0.2, 0.0), (0.0, 0.2), (-0.2, 0.0))  # [m]
-_FRICTION = 0.5  # assumed by plans, as in the publication; with all of .9, grasps slip in the plant of MuJoCo
 _DAMPER, _FORCE = 2.0, 0.5  # [N s/m], [N]
 _TABLE = 0.5  # friction
 _MASS = 0.01  # [kg] of objects
@@ -132,11 +123,7 @@ def mechanism(item: str, damped: bool = False) -> Mechanism:
     inputs = [
         Input(tip, dof=k, name=f"{tip} {axis}", limits=(-limit, limit)) for tip in tips for k, axis in enumerate("xyz")
     ]
-    friction, rounded = max(_TABLE, float(shape.friction or 0.0)), _ROUNDED.get(item, 0.0)
-    stance = shape.stance()
-    assert stance is not None
-    feet = shape.place(stance.points - rounded * np.sign(stance.points))
-    contacts = [Contact(item, point, stance.radius + rounded, friction=friction) for point in feet]
+    contacts = on_table(item, shape, _TABLE, _ROUNDED.get(item, 0.0))
     contacts += [Contact(tip, radius=_TIP, friction=_TABLE) for tip in tips]
     pairs = [(item, tip) for tip in tips]
     if not damped:
@@ -179,40 +166,7 @@ def fingertips(item: str = "cube", motion: str = "rotation", trial: int = 0, **s
         ValueError: there is no such object, motion or trial, or an argument is out of range.
     """
     given = trial_of(item, motion, trial)
-    sim, own = Simulator(mechanism(item, damped=True), time_step=_KNOT, kappa=_KAPPA), mechanism(item)
-    start = sim.neutral()
-    start[:7] = given.start
-    goal = start.copy()
-    goal[:7] = given.goal
-    still, object_, tips = np.zeros(6 + 3 * _TIPS), np.ones(3), np.zeros(3 * _TIPS)
-    end = (
-        np.concatenate([5000.0 * object_, 12.5 * object_, tips]),
-        np.concatenate([10.0 * object_, 0.02 * object_, tips]),
-    )
-    running = still, np.concatenate([1e-3 * object_, 1e-3 * object_, tips])
-    cost = [quadratic(goal, 1.0, _HORIZON, running, end), Effort(5e-3), grasp_of_points(_TIPS, 1.0, 0.05, _HORIZON)]
-    problem = Problem(sim, start, _HORIZON, cost=cost)
-    mine: dict[str, Any] = {"period": 1.0 / _RATE, "iterations": 2, "servo": own, "gain_scale": 0.0}
-    mine |= {"kappa": _KAPPA, "friction": _FRICTION}
-    mine |= {"first": Options(stages=(Stage(_KAPPA, _KAPPA),), max_iterations=20)}
-    mpc = MPC(problem, **{**mine, **settings})
-    model = Simulator(own, time_step=_STEP, kappa=1e-8)
-    placing = Placing(slice(0, 7), given.goal, _NEAR, _TURNED, 1.0 / _RATE)
-    spread = np.concatenate([np.full(2, 5e-3), np.zeros(3), [0.1], np.zeros(9), np.zeros(15)])
-    return SuiteTask(
-        name=f"jin.fingertips {item} {motion} {trial}",
-        mpc=mpc,
-        model=model,
-        start=start,
-        duration=1.5 * _BUDGET if motion == "in-air" else _BUDGET,
-        spread=spread,
-        judge=placing,
-        rate=_RATE,
-        lost=_lost,
-        finished=placing.finished,
-    )
-
-
-def _lost(x: Vector) -> bool:
-    """Whether the object has been thrown away."""
-    return bool(np.abs(x[:3]).max() > _FAR)
+    aim = Aim(near=0.02, turned=0.015, period=0.02, budget=60.0 if motion == "in-air" else 40.0)
+    terms = [Effort(5e-3), grasp(_TIPS, 3, place_of_ball, 1.0, 0.05, HORIZON)]
+    name = f"jin.fingertips {item} {motion} {trial}"
+    return reposing(name, given, mechanism(item, damped=True), mechanism(item), terms, aim, settings)

@@ -11,18 +11,21 @@ import numpy as np
 from dojo_opt.cost import ResidualCost
 from dojo_opt.planning.residual import kernel
 
-__all__ = ["grasp_of_points"]
+__all__ = ["grasp", "place_of_ball"]
 
-_SMALL = 1e-9  # [m] a tip at the centre of the object has no direction
+_SMALL = 1e-9  # [m^2] a tip at the centre of the object has no direction
 
 
-def grasp_of_points(tips: int, near: float, around: float, horizon: int) -> ResidualCost:
+def grasp(tips: int, joints: int, place: Callable[..., Any], near: float, around: float, horizon: int) -> ResidualCost:
     """near sum_k |p - p_k|^2 + around |sum_k (p_k - p) / |p_k - p||^2, over all knots but the last.
 
-    The coordinates of a state are the pose of the object at p, and then the places p_k of the tips.
+    The coordinates of a state are the pose of the object at p, and then those of the fingers, whose tips are at p_k.
 
     Args:
-        tips: number of tips.
+        tips: number of fingers.
+        joints: number n of coordinates of a finger.
+        place: kernel of a state and the number k of a finger that returns a tuple of 3 + 3 n numbers, p_k [m] and its
+            derivatives by the coordinates of the finger, by rows.
         near: weight of the distances [1/m^2].
         around: weight of the sum of the directions, which is zero for tips on all sides.
         horizon: number of knots.
@@ -30,39 +33,58 @@ def grasp_of_points(tips: int, near: float, around: float, horizon: int) -> Resi
     Returns:
         The cost.
     """
-    residual, slope = _kernels(tips)
     weight = np.concatenate([np.full(3 * tips, near), np.full(3, around)])
+    residual, slope = _residual(tips, place), _slope(tips, joints, place)
     return ResidualCost(residual, 3 * tips + 3, weight, slope, knots=range(horizon))
 
 
-def _kernels(tips: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """The residual and its derivative."""
-
+def _residual(tips: int, place: Callable[..., Any]) -> Callable[..., Any]:
     @kernel
     def residual(x, u, out):  # type: ignore[no-untyped-def]
         out[3 * tips :] = 0.0
         for k in range(tips):
-            length = _SMALL
+            at, length = place(x, k), _SMALL
             for c in range(3):
-                out[3 * k + c] = x[c] - x[7 + 3 * k + c]
+                out[3 * k + c] = x[c] - at[c]
                 length += out[3 * k + c] ** 2
             for c in range(3):
                 out[3 * tips + c] -= out[3 * k + c] / sqrt(length)
 
+    return residual
+
+
+def _slope(tips: int, joints: int, place: Callable[..., Any]) -> Callable[..., Any]:
     @kernel
     def slope(x, u, out):  # type: ignore[no-untyped-def]
         out[:, :] = 0.0
         for k in range(tips):
-            length = _SMALL
+            at, first, length = place(x, k), 6 + joints * k, _SMALL
             for c in range(3):
-                length += (x[c] - x[7 + 3 * k + c]) ** 2
-            for c in range(3):
+                length += (x[c] - at[c]) ** 2
                 out[3 * k + c, c] = 1.0
-                out[3 * k + c, 6 + 3 * k + c] = -1.0
+                for j in range(joints):
+                    out[3 * k + c, first + j] = -at[3 + joints * c + j]
+            for c in range(3):
                 for d in range(3):
-                    along = (x[c] - x[7 + 3 * k + c]) * (x[d] - x[7 + 3 * k + d]) / length
+                    along = (x[c] - at[c]) * (x[d] - at[d]) / length
                     across = ((1.0 if c == d else 0.0) - along) / sqrt(length)
                     out[3 * tips + c, d] -= across
-                    out[3 * tips + c, 6 + 3 * k + d] += across
+                    for j in range(joints):
+                        out[3 * tips + c, first + j] += across * at[3 + joints * d + j]
 
-    return residual, slope
+    return slope
+
+
+@kernel
+def place_of_ball(x: Any, k: int) -> Any:
+    """Place and its derivatives of a tip whose coordinates are its place.
+
+    Args:
+        x: (nx,) state.
+        k: number of the tip.
+
+    Returns:
+        (12,) tuple.
+    """
+    a = 7 + 3 * k
+    return x[a], x[a + 1], x[a + 2], 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
