@@ -36,7 +36,8 @@ DISTURBED = tuple(SPEEDS)[1:]
 DISTURBANCES: dict[str, Any] = {"push": (8.0, 8.0), "push_time": (3.0, 6.0), "payload": (0.0, 1.0)}
 DISTURBANCES |= {"friction": (0.4, 0.8), "slope": (0.0, 0.1)}
 OURS, MUJOCO = "ours, 1 ms, kappa 1e-8", "MuJoCo, default contacts"
-PLANTS = {"ours": OURS, "mujoco": MUJOCO}
+FIRM = "MuJoCo, elliptic cone, impratio 10"  # its friction yields less than by default
+PLANTS = {"ours": OURS, "mujoco": MUJOCO, "firm": FIRM}
 HEADER = (
     *("task", "succeed", "of", "replans at [Hz]", "allowed [ms]", "tick [ms]", "99 % [ms]", "fell back", "of ticks"),
     *("penetration [mm]", "measured in the first run", "other ends"),
@@ -72,7 +73,8 @@ def starts(task: Any, kind: str, perturbed: range) -> list[Any]:
         return [task.plant(seed) for seed in seeds]
     from benchmarks.engines.mujoco_plant import MujocoPlant
 
-    return [MujocoPlant(task.model, task.begin(seed)) for seed in seeds]
+    options = {"cone": "elliptic", "impratio": "10"} if kind == FIRM else {}
+    return [MujocoPlant(task.model, task.begin(seed), **options) for seed in seeds]
 
 
 def line(task: Any, kind: str, perturbed: range, seconds: float | None) -> tuple[list[Cell], list[Any]]:
@@ -130,7 +132,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments.add_argument("tasks", nargs="*", default=list(TASKS), metavar="TASK", help=", ".join(TASKS))
     arguments.add_argument("--runs", type=int, default=10, help="perturbed starts per task")
     arguments.add_argument("--first", type=int, default=0, help="seed of the first perturbed start")
-    arguments.add_argument("--plant", choices=PLANTS, help="one plant only (default: both)")
+    arguments.add_argument("--plant", choices=PLANTS, help="one plant only (default: ours and mujoco)")
     return deliver("mpc_suites", run, arguments, argv)
 
 

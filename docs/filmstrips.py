@@ -16,7 +16,15 @@ import dojo_opt as dojo
 from sim.mechanism.joint import WORLD
 
 OUT = Path(__file__).resolve().parent / "filmstrips.png"
-SECONDS = {"jaco_ball": 3.0, "jaco": 1.5, "dual_jaco": 1.25, "allegro": 5.0}  # of a task
+SECONDS = {
+    "jaco_ball": 3.0,
+    "jaco": 1.5,
+    "dual_jaco": 1.25,
+    "allegro": 5.0,
+    "air_hockey": 2.0,
+    "spinner": 2.5,
+    "mini_cheetah": 2.5,
+}  # of a task
 FRAMES = 6
 DPI = 90
 

@@ -38,17 +38,18 @@ class MujocoPlant(Plant):
     Args:
         sim: mechanism and time step.
         start: (nx,) first state.
+        **options: attributes of MJCF's <option>, such as impratio="10" (default: MuJoCo's own, so a pyramidal cone).
 
     Raises:
         ImportError: MuJoCo is not installed.
         ValueError: for a mechanism that cannot be written for MuJoCo.
     """
 
-    def __init__(self, sim: Simulator, start: Vector) -> None:
+    def __init__(self, sim: Simulator, start: Vector, **options: str) -> None:
         import mujoco
 
         self._step = mujoco.mj_step
-        self._model, self._index = _scene(sim)
+        self._model, self._index = _scene(sim, {"cone": "pyramidal", **options})
         self._data = mujoco.MjData(self._model)
         super().__init__(sim, start)
         places = sim.maximal(self.x)[:, :3]
@@ -89,13 +90,13 @@ class MujocoPlant(Plant):
         return u, result
 
 
-def _scene(sim: Simulator) -> tuple[Any, dict[frozenset[int], int]]:
+def _scene(sim: Simulator, options: dict[str, str]) -> tuple[Any, dict[frozenset[int], int]]:
     """(MjModel, number of our contact by the numbers of its two geoms)."""
     import mujoco
 
     mechanism: Mechanism = replace(sim.mechanism, collisions=(), contacts=_on_planes(sim.mechanism))
     bare = Simulator(mechanism, time_step=sim.time_step)
-    spec = mujoco.MjSpec.from_string(mjcf(bare.model, sim.time_step, cone="pyramidal"))
+    spec = mujoco.MjSpec.from_string(mjcf(bare.model, sim.time_step, hinges=False, **options))
     names = sim.mechanism.body_names
     first: dict[str, int] = {}  # number of the first contact point of a collision
     for k, touch in enumerate(sim.mechanism.touches):

@@ -37,6 +37,7 @@ Stack = NDArray[np.float64]
 _SCALES = (1.0, 0.5, 0.0)  # of the gains of the rollouts that guess="feedback" chooses from
 _ROUNDING = 1e-9  # [s] times are sums of floating-point steps
 _LOST = 10.0  # times the merit of the guess of a tick: a rollout worse than that has left it
+_PATIENCE = 3  # ticks in a row without a new plan, after which a tick begins with rollouts
 
 __all__ = ["MPC"]
 
@@ -46,7 +47,8 @@ class MPC:
 
     A tick shifts the plan by the elapsed time and keeps its states as the guess, with the measured state in front: the
     disturbance is then the first gap, which the iteration closes. (A rollout of the shifted inputs would fall over
-    together with the robot.) If the planner rejects a plan, the previous one stays in force. `log` has one `Tick` per
+    together with the robot.) If the planner rejects a plan, the previous one stays in force; after three ticks of that
+    the next one begins with rollouts from the measured state. `log` has one `Tick` per
     plan; `estimator` has the parameters that `adapt` names, None without.
 
     Args:
@@ -281,13 +283,17 @@ class MPC:
         return ended and bool(np.isfinite(result.now.merit)) and result.consistent and near
 
     def _guess(self, shifted: Policy) -> Iterate | None:
-        """First trajectory of a tick: the shifted plan, or the best rollout under its gains or a share of them."""
+        """First trajectory of a tick: the shifted plan, or the best rollout under its gains or a share of them.
+
+        A plan that has been in force for several ticks is no guess of states any more.
+        """
         solver = self._solver
-        if self.settings.guess == "states":
+        stalled = len(self.log) >= _PATIENCE and all(tick.fallback for tick in self.log[-_PATIENCE:])
+        if self.settings.guess == "states" and not stalled:
             xs = shifted.x.copy()
             xs[0] = self.problem.start
             return solver.guess(xs, shifted.u)
-        scales = _SCALES if self.settings.guess == "feedback" else (0.0,)
+        scales = (0.0,) if self.settings.guess == "open loop" else _SCALES
         nominal = Iterate(shifted.x, shifted.u)
         shots = (solver.rollout(nominal, scale * shifted.K) for scale in scales)
         return min((shot for shot in shots if shot is not None), key=lambda shot: shot.merit, default=None)

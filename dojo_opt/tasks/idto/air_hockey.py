@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dojo_opt.cost import Effort
+from dojo_opt.cost import Clearance, Effort
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.mpc.moving_reference import Sampled
 from dojo_opt.planning.options import Options, Stage
@@ -27,8 +27,10 @@ _KNOT, _HORIZON, _RATE = 0.05, 40, 200.0  # [s], knots, [Hz]
 _PUCK = slice(3, 6)  # its coordinates in a state
 _NEAR = 0.1  # [m] off the goal at the end
 _KAPPA = 3e-5  # [N s m] at 1e-4 a contact that acts at a distance leaves the puck 9 cm off
+_TOUCH = 0.02  # [1/m^2] of the distance of the discs: with .2 the pusher stays at the puck on the wrong side of it
 _FRICTION = 0.3  # assumed by plans: with all of 1 they turn the puck by its rim, lose it, and end 20 cm off
 _MASS, _RADIUS, _HEIGHT = 0.1, 0.1, 0.05  # [kg], [m], [m] of either disc
+_DISC = Sphere(_RADIUS)
 _START, _GOAL = (0.0, 0.5, 0.0), (0.3, 1.0, 1.0)  # [m, m, rad] of the puck
 
 
@@ -46,7 +48,7 @@ def mechanism(friction: float) -> Mechanism:
     across = _MASS * (3.0 * _RADIUS**2 + _HEIGHT**2) / 12.0
     inertia = np.diag([across, across, 0.5 * _MASS * _RADIUS**2])
     joints = [Joint("planar_axis", None, "pusher"), Joint("planar_axis", None, "puck", damper=0.1)]
-    rims = Collision("pusher", "puck", Sphere(_RADIUS), Sphere(_RADIUS), friction=friction, name="rims")
+    rims = Collision("pusher", "puck", _DISC, _DISC, friction=friction, name="rims")
     return Mechanism(
         [Body("pusher", _MASS, inertia), Body("puck", _MASS, inertia)],
         joints,
@@ -64,7 +66,8 @@ def air_hockey(**settings: Any) -> SuiteTask:
     A run of 4 s is a success when the puck ends within .1 m of its goal. Its heading hardly changes: friction at the
     rim would have to give .1 N m s against the damper, and a push of 1 N s with it, a hundred times that of the way.
     The publication plans once, and plays the plan; with hard contact a played plan loses the puck, so it is a closed
-    loop here, at a rate of ours.
+    loop here, at a rate of ours. The squared distance of the discs weighs .02 per m^2; without it, a pusher that has
+    lost the puck waits where it is.
 
     Args:
         **settings: settings of `dojo.MPC`, instead of the ones of the task.
@@ -87,7 +90,11 @@ def air_hockey(**settings: Any) -> SuiteTask:
     pusher, puck = np.zeros(3), np.ones(3)
     running = np.concatenate([pusher, 0.1 * puck]), np.concatenate([pusher + 0.5, 0.1 * puck])
     end = np.concatenate([pusher, 10.0 * puck]), np.ones(6)
-    cost = [quadratic(begin, _KNOT, _HORIZON, running, end), Effort(_KNOT * 0.1)]
+    cost = [
+        quadratic(begin, _KNOT, _HORIZON, running, end),
+        Effort(_KNOT * 0.1),
+        Clearance("pusher", "puck", target=0.0, shape_a=_DISC, shape_b=_DISC, weight=_TOUCH),
+    ]
     problem = Problem(sim, start, _HORIZON, cost=cost)
     given = timed(_RATE) | {"kappa": _KAPPA, "friction": _FRICTION}
     given |= {"first": Options(stages=(Stage(1e-2, 1e-2), Stage(_KAPPA, _KAPPA)))}
