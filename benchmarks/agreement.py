@@ -145,7 +145,8 @@ def run(given: argparse.Namespace) -> Report:
             "MuJoCo, 1 and 0.5 ms: ": (there, theirs(name, task, episodes, 0.5 * H)),
         }
         shares = [100 * share for pair in pairs.values() for share in apart(*pair)]
-        cells.append([name, here.mean(), there.mean(), hard.mean(), *shares])
+        means = [float(returns.mean()) for returns in (here, there, hard)]
+        cells.append([name, *(round(n, 1) for n in (*means, *shares))])
         header = ["task", "here", "MuJoCo", "stiff MuJoCo"]
         for label in pairs:
             header += [f"{label}difference [%]", f"{label}within 5 % [%]"]

@@ -65,6 +65,10 @@ measure adaptation "$python" "$here/benchmarks/adaptation.py" $quick --out "$out
 measure dexterous "$python" "$here/benchmarks/dexterous.py" $quick --out "$out"
 measure crisp "$python" "$here/benchmarks/crisp.py" $quick --out "$out"
 measure mpc_suites "$python" "$here/benchmarks/mpc_suites.py" $quick spinner acrobot free_gait_disturbed free_gait_fast --out "$out"  # the others take minutes
+measure environments "$python" "$here/benchmarks/environments.py" $quick --out "$out"
+if [ -z "$quick" ]; then  # needs gymnasium[mujoco]
+    measure agreement "$python" "$here/benchmarks/agreement.py" --out "$out"
+fi
 measure parameter_derivatives "$python" "$here/benchmarks/parameter_derivatives.py" $quick --out "$out"
 if "$python" -c 'import importlib.metadata as m; m.version("example-robot-data")' 2>/dev/null; then
     measure urdf_zoo "$python" "$here/benchmarks/urdf_zoo.py" $quick --out "$out"

@@ -1,6 +1,6 @@
 """The real cube: parameters identified from films of its tosses, and predictions of tosses that were not used.
 
-python benchmarks/cube.py FOLDER [--tosses 4 8 16 32 64 300] [--held-out 100] [--no-prior] [--all] [--out DIR]
+python benchmarks/cube.py FOLDER [--tosses 4 8 16 32 64 300] [--held-out 100] [--mujoco 8 64 300] [--no-prior] [--all]
 
 FOLDER holds tosses_train.npz: `states` (N, 13) of position, quaternion, velocity, angular velocity (body) at 148 Hz, in
 half widths of 52.4 mm, of all tosses stacked, and `lengths`: 400 of the 570 tosses of ContactNets (Pfrommer, Halm,
@@ -70,7 +70,7 @@ def tosses(folder: Path) -> list[Floats]:
     return np.split(states, np.cumsum(data["lengths"])[:-1])
 
 
-def errors(sim: dojo.Simulator, motions: list[Floats]) -> dict[str, Any]:
+def errors(sim: Any, motions: list[Floats]) -> dict[str, Any]:
     """Table of errors."""
     position, rotation = {n: [] for n in GRID}, {n: [] for n in GRID}
     average: list[tuple[float, float]] = []
@@ -136,6 +136,28 @@ def fitted(motions: list[Floats], judged: list[Floats], given: argparse.Namespac
     }
 
 
+def fitted_by_mujoco(motions: list[Floats], judged: list[Floats], given: argparse.Namespace) -> dict[str, Any]:
+    """The same by MuJoCo's least squares with finite differences: friction, one half width, two numbers of its soft
+    contact, one moment of inertia; windows begin at the filmed states.
+    """
+    from benchmarks.engines.mujoco_cube import fit as fit_mujoco
+
+    began = time.process_time()
+    found, rms = fit_mujoco(motions, H, NOISE, given.window, 4, cube(0.18, 0.125, HALF))
+    seconds = time.process_time() - began
+    friction, half, *_ = (float(value) for value in found.values)
+    print(f"MuJoCo, {len(motions)} tosses: {found.values}", file=sys.stderr)
+    names = ("friction", "half width [m]", "time constant [s]", "damping ratio", "inertia [kg m^2]")
+    return errors(found, judged) | {
+        "seconds": seconds,
+        "friction": [friction, None],
+        "restitution": [None, None],
+        "further": dict(zip(names, found.values.tolist(), strict=True)),
+        "half widths": [1e3 * half] * 3,
+        "rms": rms,
+    }
+
+
 _COLUMNS = (*map(str, GRID), "average")
 _ERRORS = ("position, mean [mm]", "position, median [mm]", "rotation, mean [rad]", "rotation, median [rad]")
 _FEW, _MOST = 8, 300  # tosses that the bars are about
@@ -167,6 +189,8 @@ def run(given: argparse.Namespace) -> Report:
         if count > len(motions) - given.held_out:
             raise SystemExit(f"--tosses {count}: {len(motions) - given.held_out} are left beside those held out")
         rows[f"{count} tosses"] = fitted([motions[i] for i in order[:count]], unseen, given)
+    for count in given.mujoco:
+        rows[f"MuJoCo, {count} tosses"] = fitted_by_mujoco([motions[i] for i in order[:count]], unseen, given)
     if given.all:
         rows[f"all {len(motions)} tosses, in sample"] = fitted(motions, motions, given)
     report = Report(f"The real cube: errors on {len(unseen)} tosses held out, {given.window} steps a window")
@@ -206,6 +230,9 @@ def main(argv: list[str] | None = None) -> int:
     arguments.add_argument("--further", nargs="*", default=["inertia:cube", "com:cube"])
     arguments.add_argument(
         "--no-prior", action="store_true", help="without the prior from a ruler, scales and tables: PRIOR"
+    )
+    arguments.add_argument(
+        "--mujoco", nargs="*", type=int, default=[], help="also fit to so many tosses in MuJoCo, by mujoco.minimize"
     )
     arguments.add_argument("--all", action="store_true", help="also fit to all tosses, held-out ones included")
     return deliver("cube", run, arguments, argv)
