@@ -25,8 +25,8 @@ __all__ = ["HORIZON", "Aim", "reposing"]
 HORIZON = 10  # knots
 _KNOT, _RATE, _STEP = 0.04, 50.0, 2e-3  # [s], [Hz], [s] of the plant
 _KAPPA = 1e-6  # [N s m]
-# friction that plans assume, .9 in the plant: with all of it, grasps slip in MuJoCo's plant; with the .5 of the
-# publication, tips that plans expect to slide wedge objects in ours
+# friction that plans assume, .9 in the plant (.5 with the stick): with all of .9, grasps slip in MuJoCo's plant; with
+# the .5 of the publication, tips that plans expect to slide wedge objects in ours
 _FRICTION = 0.7
 _FAR = 0.5  # [m] from the middle of the table
 # of the squares of place, rotation vector, velocity and angular velocity: those of the publication, of which the second
