@@ -172,7 +172,8 @@ def jump(
     slow, size = legs.size**0.5, legs.size
     refinement = settings.pop("refinement", 5)
     follows, rest = _shared_out(settings)
-    step = _rounded(_STEP * slow) / whole_number("problems.jump(substeps=...)", follows.get("substeps", 1))
+    substeps = whole_number("problems.jump(substeps=...)", follows.get("substeps", 1))
+    step = _rounded(_STEP * slow) / substeps
     usual = {"distance": 0.3 * size, "height": 0.2 * size, "crouch": 0.1 * size, "clearance": 0.08 * size}
     usual |= {"before": 0.3 * slow, "after": 0.4 * slow}
     sim = legs.simulator(step, PLANNED)
@@ -182,6 +183,9 @@ def jump(
         bend = _CROUCH * _deepest(sim, legs.height)
         usual |= {name: min(usual[name], bend) for name in ("crouch", "clearance")}
     gait = _strongest(legs, sim, usual, rest)
+    odd = -(len(gait.x) - 1) % substeps
+    if odd:  # whole knots: the rest at the end takes longer
+        gait = _strongest(legs, sim, usual, {**rest, "after": {**usual, **rest}["after"] + odd * step})
     return locomotion.with_apex(_scaled(legs, gait, follows), refinement)
 
 
