@@ -18,6 +18,7 @@ _EVEN = 1e-6  # weight of the sharing of the load against its balance
 _RANK = 1e-7  # singular values below are the noise of differences: balls under one rigid foot do not move one by one
 _ROUNDS = 20
 _NEAR = 0.01  # [m] contacts may carry that are not further from the ground than the nearest by more than this
+_LOWEST = (_NEAR, 1e-3, 1e-4)  # [m] likewise, than the nearest of their body: of a round hull few corners touch at once
 
 
 def potential_gradient(sim: Simulator, x: ArrayLike) -> Array:
@@ -79,6 +80,37 @@ def _check_friction(name: str, feet: Feet, cosines: Array, force: Array) -> None
                 f"equilibrium({name}): {contact.name!r} stands on ground of slope {slope:.3g} with friction {limit:g}, "
                 "and would slide"
             )
+
+
+def _standing(
+    sim: Simulator, feet: Feet, state: Array, among: tuple[NDArray[np.bool_], float], iterations: int
+) -> tuple[Array, Array]:
+    """The state near `state` in which contacts carry the load as evenly as they can, and their forces.
+
+    among: the degrees of freedom without an input, and how far above the lowest contact of its body another one may
+    carry [m].
+    """
+    free, near = among
+    weight = float(np.abs(potential_gradient(sim, state)).max())
+    bodies = np.array([contact.body for contact in sim.mechanism.contacts])
+    same = bodies[:, None] == bodies
+    for _ in range(iterations):
+        down, up, cosine = _under(feet, state)
+        gap = feet.gaps(state)
+        lowest = np.where(same, gap, np.inf).min(axis=1)
+        touching = (gap < gap.min() + _NEAR) & (gap < lowest + near)
+        afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * cosine * np.maximum(gap, near)))
+        load = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ afar
+        force = least_pushes(up[:, free] * touching[:, None], load[free], _EVEN)
+        loaded = force > 1e-3 * weight
+        wanted = sim.kappa / (sim.time_step * (cosine * force)[loaded])
+        error = wanted - gap[loaded]
+        if np.abs(error).max(initial=0.0) < 1e-6 * wanted.min(initial=1.0):
+            break
+        move = np.zeros(sim.ndx)
+        move[: sim.nv] = np.linalg.lstsq(down[loaded], error, rcond=_RANK)[0]
+        state = sim.integrate(state, move)
+    return _pressed(sim, feet, state, free)
 
 
 def _pressed(sim: Simulator, feet: Feet, state: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -149,23 +181,11 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     if not names:
         return state, _held(sim, state, potential_gradient(sim, state) - stop_torques(sim, state), "inputs")
     feet, weight = Feet(sim, names), float(np.abs(potential_gradient(sim, state)).max())
-    for _ in range(iterations):
-        down, up, cosine = _under(feet, state)
+    for near in _LOWEST:
+        state, force = _standing(sim, feet, state, (free, near), iterations)
         gap = feet.gaps(state)
-        touching = gap < gap.min() + _NEAR
-        afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * cosine * np.maximum(gap, _NEAR)))
-        load = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ afar
-        force = least_pushes(up[:, free] * touching[:, None], load[free], _EVEN)
-        loaded = force > 1e-3 * weight
-        wanted = sim.kappa / (sim.time_step * (cosine * force)[loaded])
-        error = wanted - gap[loaded]
-        if np.abs(error).max(initial=0.0) < 1e-6 * wanted.min(initial=1.0):
+        if gap.min() > 0.0:
             break
-        move = np.zeros(sim.ndx)
-        move[: sim.nv] = np.linalg.lstsq(down[loaded], error, rcond=_RANK)[0]
-        state = sim.integrate(state, move)
-    state, force = _pressed(sim, feet, state, free)
-    gap = feet.gaps(state)
     if gap.min() <= 0.0:
         name = feet.names[int(gap.argmin())]
         raise ValueError(f"equilibrium({mech.name}): {name!r} is {-gap.min():.3g} m deep in the ground near x")

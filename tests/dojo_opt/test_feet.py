@@ -168,3 +168,19 @@ def test_pushes_are_zero_at_rest():
     x, u = equilibrium(block)
     assert np.all(u == 0.0)
     assert np.abs(block.step(x, u).x[block.nq :]).max() < 1e-7
+
+
+def test_round_hulls_stand_on_the_corners_that_are_lowest():
+    """Feet of 24 random corners under legs that slide: at most a few corners of each can touch at once."""
+    rng, places = np.random.default_rng(3), [(x, y) for x in (0.3, -0.3) for y in (0.2, -0.2)]
+    bodies, joints = [dojo.Body("trunk", 4.0, np.diag([0.1, 0.1, 0.1]))], [dojo.Joint("floating", None, "trunk")]
+    for k, (x, y) in enumerate(places):
+        corners = rng.normal(size=(12, 3))
+        corners *= 0.03 / np.linalg.norm(corners, axis=1)[:, None]
+        bodies.append(dojo.Body(f"foot{k}", 0.2, shape=dojo.Polytope(np.vstack([corners, -corners]))))
+        joints.append(dojo.Joint("prismatic", "trunk", f"foot{k}", parent_point=(x, y, -0.3), axis=(0.0, 0.0, 1.0)))
+    mech = dojo.Mechanism(bodies, joints).on(dojo.Terrain(), bodies=[f"foot{k}" for k in range(4)])
+    sim = dojo.Simulator(mech, time_step=0.01)
+    state, u = dojo.equilibrium(sim)
+    after = sim.rollout(state, np.tile(u, (5, 1)), throw=True).x[-1]
+    assert np.abs(sim.difference(after, state)).max() < 1e-5
