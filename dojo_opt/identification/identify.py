@@ -281,7 +281,7 @@ class IdentifyOptions:
 
     window: int | None = None
     every: int = 1
-    delay: ArrayLike = 0.0
+    delay: float | tuple[float, float] = 0.0
     kappas: Sequence[float] | None = None
     outlier: float = 3.0
     tolerance: float = 1e-4
