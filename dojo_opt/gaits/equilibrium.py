@@ -17,6 +17,7 @@ _STEP = 1e-5
 _EVEN = 1e-6  # weight of the sharing of the load against its balance
 _RANK = 1e-7  # singular values below are the noise of differences: balls under one rigid foot do not move one by one
 _ROUNDS = 20
+_FEW = 8  # contacts that a message names
 _NEAR = 0.01  # [m] contacts may carry that are not further from the ground than the nearest by more than this
 _LOWEST = (_NEAR, 1e-3, 1e-4)  # [m] likewise, than the nearest of their body: of a round hull few corners touch at once
 
@@ -146,6 +147,12 @@ def _held(sim: Simulator, state: Array, left: Array, by: str) -> Array:
     return np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
 
 
+def _named(names: tuple[str, ...]) -> str:
+    """The contacts in words: a few of them by name."""
+    few = ", ".join(map(repr, names[:_FEW]))
+    return few if len(names) <= _FEW else f"{few} and {len(names) - _FEW} more contacts"
+
+
 def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int = 20) -> tuple[Array, Array]:
     """A state of rest near x, and the input that holds it: for robots on feet, arms, and hands that hold an object.
 
@@ -191,6 +198,6 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         raise ValueError(f"equilibrium({mech.name}): {name!r} is {-gap.min():.3g} m deep in the ground near x")
     _, up, cosine = _under(feet, state)
     left = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ force
-    u = _held(sim, state, left, f"vertical forces at {', '.join(map(repr, feet.names))}")
+    u = _held(sim, state, left, f"vertical forces at {_named(feet.names)}")
     _check_friction(mech.name, feet, cosine, np.where(force > 1e-3 * weight, force, 0.0))
     return state, u

@@ -561,10 +561,7 @@ def path_of(call: str, trajectory: Any) -> tuple[Any, Any]:
         return trajectory.x, trajectory.u
     if isinstance(trajectory, tuple | list) and len(trajectory) == 2:
         return trajectory[0], trajectory[1]
-    why = f"{call}: expected a Trajectory or (states, inputs), got {trajectory!r}"
-    if hasattr(trajectory, "x") and hasattr(trajectory, "u"):
-        why += "; give its (x, u), if its rows are one time step of the simulator apart"
-    raise TypeError(why)
+    raise TypeError(f"{call}: expected a Trajectory or (states, inputs), one time step apart, got {trajectory!r}")
 
 
 def sentence(
