@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.contact.group_wrenches import group_wrenches
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.model.record_columns import ContactRow
@@ -40,6 +39,7 @@ class ContactGroups:
                     raise ValueError(f"{call}: {name!r} is in two groups")
                 numbers[k] = g
         self.sim, self.count, self._numbers = sim, len(groups), numbers
+        self._space = sim.task_space()
 
     __repr__ = short_repr
 
@@ -74,8 +74,5 @@ class ContactGroups:
 
     def _sums(self, states: Floats, impulses: Floats, points: Floats, time_step: float) -> Floats:
         """Sums over the contacts of the groups."""
-        out, engine = np.empty((len(states), self.count, 6)), self.sim._engine
         forces = np.ascontiguousarray(impulses / time_step)
-        points = np.ascontiguousarray(points)
-        group_wrenches(engine.step_table(), engine.table(), states, forces, points, self._numbers, out)
-        return out
+        return self._space.group_wrenches(states, forces, np.ascontiguousarray(points), self._numbers, self.count)

@@ -17,7 +17,7 @@ from sim.simulator.central_differences import ORDER_8
 from sim.simulator.contact_forces import GroundForces, balanced, least_forces
 from sim.simulator.ground_balls import GroundBalls
 from sim.simulator.simulator import Simulator
-from sim.simulator.task_space.compiled_kinematics import CompiledKinematics, Quantity
+from sim.simulator.task_space.compiled_kinematics import CompiledKinematics, KinematicQuantity
 
 Floats = NDArray[np.float64]
 
@@ -393,9 +393,9 @@ class Kinematics:
         Raises:
             ValueError: the quantity or the frame is unknown, or there is a frame too many.
         """
-        call, names = "Kinematics.compiled", {q.name.lower(): q for q in Quantity}
+        call, names = "Kinematics.compiled", {q.name.lower(): q for q in KinematicQuantity}
         found = names[checks.one_of(f"{call}(quantity)", quantity, names)]
-        whole = found in (Quantity.CENTER_OF_MASS, Quantity.COM_JACOBIAN)
+        whole = found in (KinematicQuantity.CENTER_OF_MASS, KinematicQuantity.COM_JACOBIAN)
         if whole != (frame is None):
             raise ValueError(f"{call}({quantity!r}, frame): expected {'no' if whole else 'the name of a'} frame")
         body, point, turn = (-1, np.zeros(3), np.eye(3)) if frame is None else self._frame(f"{call}(frame)", frame)

@@ -34,10 +34,10 @@ from solvers.types import Matrix, Vector
 
 Floats = NDArray[np.float64]
 
-__all__ = ["CompiledKinematics", "Quantity"]
+__all__ = ["CompiledKinematics", "KinematicQuantity"]
 
 
-class Quantity(Code):
+class KinematicQuantity(Code):
     """A quantity that a compiled function evaluates."""
 
     POSE = 0
@@ -114,17 +114,17 @@ def evaluate(
     data = data_view(table[3 * arrays :])
     nq = data.theta1.shape[0]
     node_poses(model, data, h, x)
-    if quantity == Quantity.POSE:
+    if quantity == KinematicQuantity.POSE:
         _pose(data, body, place, out)
-    elif quantity == Quantity.JACOBIAN:
+    elif quantity == KinematicQuantity.JACOBIAN:
         _jacobian(model, data, body, place, out)
-    elif quantity == Quantity.CENTER_OF_MASS:
+    elif quantity == KinematicQuantity.CENTER_OF_MASS:
         _center_of_mass(model, data, out)
-    elif quantity == Quantity.COM_JACOBIAN:
+    elif quantity == KinematicQuantity.COM_JACOBIAN:
         _com_jacobian(model, data, out)
     else:
         clear(out)
-        if body >= 0 and quantity == Quantity.VELOCITY:
+        if body >= 0 and quantity == KinematicQuantity.VELOCITY:
             frame_velocity(data, h, body, place, out[0])
         elif body >= 0:
             velocity_columns(model, data.S1, x[nq:], -h, data.S3nu)
@@ -135,13 +135,13 @@ def _function(model: Model, h: float, quantity: int, body: int, place: Floats) -
     """The function of a quantity, to be compiled among those of the user."""
     nv, nx = len(model.dof_body), int(model.body_qadr[-1]) + len(model.dof_body)
     rows, columns = {
-        Quantity.POSE: (1, 7),
-        Quantity.JACOBIAN: (6, nv),
-        Quantity.VELOCITY: (1, 6),
-        Quantity.VELOCITY_JACOBIAN: (6, 2 * nv),
-        Quantity.CENTER_OF_MASS: (1, 3),
-        Quantity.COM_JACOBIAN: (3, nv),
-    }[Quantity(quantity)]
+        KinematicQuantity.POSE: (1, 7),
+        KinematicQuantity.JACOBIAN: (6, nv),
+        KinematicQuantity.VELOCITY: (1, 6),
+        KinematicQuantity.VELOCITY_JACOBIAN: (6, 2 * nv),
+        KinematicQuantity.CENTER_OF_MASS: (1, 3),
+        KinematicQuantity.COM_JACOBIAN: (3, nv),
+    }[KinematicQuantity(quantity)]
     layout, arrays, whole, numbers, size = freeze(model)
     words, single = 3 * len(layout), rows == 1
     first, end = size + nx, size + nx + rows * columns
@@ -181,7 +181,7 @@ class CompiledKinematics:
         place: (7,) point and quaternion of the frame on its body.
     """
 
-    def __init__(self, sim: Simulator, quantity: Quantity, body: int, place: Floats) -> None:
+    def __init__(self, sim: Simulator, quantity: KinematicQuantity, body: int, place: Floats) -> None:
         self._arguments = sim, quantity, body, place
         self._kernel: Any = users_kernel(_function(sim.model, float(sim.time_step), quantity, int(body), place))
         self.py_func = getattr(self._kernel, "py_func", self._kernel)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.contact.group_wrenches import group_wrenches
 from sim.model.interruptible_loops import rows as parts_of
 from sim.simulator.engines.engine import Engine
 from sim.simulator.link_kernels import link_gradient, link_pairs, link_step
@@ -99,6 +100,15 @@ class TaskSpace:
         model, data = self._engine.linked(link_pairs), self._engine.table()
         for part in parts_of(len(out.knots)):
             distances.distances(model, data, out.rows(xs, us, part, derivatives=derivatives))
+
+    def group_wrenches(self, xs: Floats, forces: Floats, points: Floats, groups: Integers, count: int) -> Floats:
+        """Forces [N] of groups of contacts and their torques [N m] about the centre of mass, (n, count, 6), world axes.
+
+        xs: (n, nx) states; forces, points: (n, ncontact, 3); groups: (ncontact,) number of each, -1 for none.
+        """
+        out = np.empty((len(xs), count, 6))
+        group_wrenches(self._engine.step_table(), self._engine.table(), xs, forces, points, groups, out)
+        return out
 
     def _tables(self) -> tuple[Table, Table]:
         return self._engine.linked(), self._engine.table()
