@@ -97,7 +97,7 @@ def test_the_memory_is_that_of_the_machine_its_container_and_the_process(monkeyp
 
 
 def test_an_input_that_is_held_for_ever_ends_with_a_status(monkeypatch):
-    from sim.simulator import adaptive_engine
+    from sim.simulator.engines import adaptive_engine
 
     monkeypatch.setattr(adaptive_engine, "_MOST", 1000)
     found = SIM.replace(accuracy=1e-4).rollout(X + [1.0, 0.0], duration=1e9)

@@ -147,7 +147,7 @@ class ParameterSpace:
         call = "ParameterSpace.chain"
         at = checks.array(f"{call}(theta)", theta, self.values.shape)
         for name in self.wrt:
-            checks.one_of(f"{call}(blocks)", name, blocks)
+            checks.one_of(f"{call}(blocks)", name, blocks.keys())
         parts = []
         for group in self._groups:
             block = np.concatenate([np.asarray(blocks[name]) for name in group.names], axis=-1)

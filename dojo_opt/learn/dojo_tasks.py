@@ -13,12 +13,14 @@ from dojo_opt.models.ant import ant as ant_model
 from dojo_opt.models.quadruped import quadruped as quadruped_model
 from sim.mechanism import checks
 from sim.mechanism.input import Input
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
 __all__ = ["ant_ars", "quadruped_sampling", "sampled_gait"]
 
+_TURN, _JOINTS = BaseState.QUATERNION.start, BaseState.JOINTS  # columns of a state, for kernels
 _ANT_STEP = 0.05  # [s]
 _MOST = 150.0  # [N m] torque of the ant's hinges
 _GAINS = (100.0, 80.0, 60.0), (5.0, 4.0, 3.0)  # of hip, thigh, calf [N m/rad, N m s/rad]
@@ -44,11 +46,12 @@ def ant_ars() -> Task:
     nq, nx, h = mech.nq, mech.nq + mech.nv, _ANT_STEP
 
     def observation(x, out):  # type: ignore[no-untyped-def]
-        w, length = x[3], np.sqrt(x[4] ** 2 + x[5] ** 2 + x[6] ** 2)
+        turn = x[_TURN:_JOINTS]
+        w, length = turn[0], np.sqrt(turn[1] ** 2 + turn[2] ** 2 + turn[3] ** 2)
         rate = 2.0 if length < 1e-9 else 2.0 * np.arctan2(length, w) / length
         for k in range(3):
-            out[k], out[3 + k] = x[k], rate * x[4 + k]
-        for k in range(7, nx):
+            out[k], out[3 + k] = x[k], rate * turn[1 + k]
+        for k in range(_JOINTS, nx):
             out[k - 1] = x[k]
         for g in range((x.shape[0] - nx) // 6):
             out[nx - 1 + g] = min(max(h * x[nx + 6 * g + 2], -1.0), 1.0)
@@ -110,13 +113,13 @@ def quadruped_sampling() -> Task:
 
     def start(rng: np.random.Generator) -> Floats:
         q = home.copy()
-        q[7:] += rng.uniform(-0.02, 0.02, nq - 7)
+        q[_JOINTS:] += rng.uniform(-0.02, 0.02, nq - _JOINTS)
         q[2] += 0.01
         return np.concatenate([q, np.zeros(mech.nv)])
 
     return Task(
-        Simulator(mech, time_step=1e-3, kappa=1e-5), 10, observation, 2 * nq - 3, reward, home[7:] - _REACH,
-        home[7:] + _REACH, start, terminated, steps=200, name="QuadrupedSampling",
+        Simulator(mech, time_step=1e-3, kappa=1e-5), 10, observation, 2 * nq - 3, reward, home[_JOINTS:] - _REACH,
+        home[_JOINTS:] + _REACH, start, terminated, steps=200, name="QuadrupedSampling",
     )  # fmt: skip
 
 

@@ -12,12 +12,14 @@ from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Capsule, Sphere
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
 __all__ = ["swimmer"]
 
+_TURN, _JOINTS = BaseState.QUATERNION.start, BaseState.JOINTS  # columns of a state, for kernels
 _LENGTH, _RADIUS, _DENSITY = 1.0, 0.1, 1000.0  # of a link [m], [kg/m^3]
 _BEND = float(np.deg2rad(100.0))  # largest angle between links
 _GEAR = 150.0  # [N m]
@@ -77,9 +79,9 @@ def swimmer() -> Task:
     nq = mech.nq
 
     def observation(x, out):  # type: ignore[no-untyped-def]
-        q = x[3:7]
+        q = x[_TURN:_JOINTS]
         out[0] = np.arctan2(2.0 * (q[0] * q[3] + q[1] * q[2]), 1.0 - 2.0 * (q[2] ** 2 + q[3] ** 2))
-        out[1], out[2] = x[7], x[8]
+        out[1], out[2] = x[_JOINTS], x[_JOINTS + 1]
         out[3], out[4], out[5] = x[nq], x[nq + 1], x[nq + 5]
         out[6], out[7] = x[nq + 6], x[nq + 7]
 

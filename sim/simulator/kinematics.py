@@ -358,8 +358,8 @@ class Kinematics:
     def _twists(self, q: Floats, v: Floats) -> Floats:
         """Velocities and angular velocities (..., nbody, 6) of the bodies, world axes."""
         z = checks.within_range("Kinematics", self.sim.bodies(q, v))
-        spin = _rotations(z[..., BodyState.QUATERNION]) @ z[..., 10:13, None]
-        return np.concatenate([z[..., 3:6], spin[..., 0]], axis=-1)
+        spin = _rotations(z[..., BodyState.QUATERNION]) @ z[..., BodyState.SPIN, None]
+        return np.concatenate([z[..., BodyState.VELOCITY], spin[..., 0]], axis=-1)
 
     def _carried(self, J: Floats, R: Floats, twist: Floats, rate: Floats) -> Floats:
         """sum J_i^T [m_i a_i; J_i al_i + w_i x J_i w_i] of the bodies' twists and rates (..., nbody, 6)."""

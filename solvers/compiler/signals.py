@@ -14,6 +14,7 @@ import os
 import signal
 import sys
 import threading
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import wraps
@@ -28,6 +29,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _plain = import_module("_signal")  # `signal` makes enums, which takes thirty times as long
 _OF_LLVM = os.path.dirname(binding.__file__)
+
+
+def _put_back(number: int, ours: Any, before: Any) -> None:
+    """Replace our handler by the one before; not one that a handler of the user has put there meanwhile."""
+    if _plain.getsignal(number) is ours:
+        _plain.signal(number, before)
 
 
 class _Postponed:
@@ -49,7 +56,7 @@ class _Postponed:
         """Put back the handler before, and let it handle what came."""
         self.holds = False
         try:
-            _plain.signal(self._number, self._before)
+            _put_back(self._number, self, self._before)
         finally:
             for frame in self._frames:
                 self._before(self._number, frame)
@@ -73,11 +80,13 @@ def signals_held() -> Iterator[None]:
 
 # functions that take and leave locks, or whose exceptions Python drops
 _DELICATE = frozenset(("__enter__", "__exit__", "__del__", "acquire", "release", "enter_context"))
+_FINALIZER = weakref.finalize.__call__.__code__  # which calls what Numba does when a dispatcher is deleted
 
 
 def _is_delicate(code: Any) -> bool:
     """One of these functions, or one that makes the owner of an object of LLVM. Calls of LLVM may take a second."""
-    return code.co_name in _DELICATE or (code.co_name == "__init__" and code.co_filename.startswith(_OF_LLVM))
+    of_llvm = code.co_name == "__init__" and code.co_filename.startswith(_OF_LLVM)
+    return of_llvm or code.co_name in _DELICATE or code is _FINALIZER
 
 
 class _Selective:
@@ -105,7 +114,7 @@ class _Selective:
     def release(self) -> None:
         """Put back the handler before, and let it handle what came."""
         try:
-            _plain.signal(self._number, self._before)
+            _put_back(self._number, self, self._before)
         finally:
             self.handle()
 

@@ -138,7 +138,7 @@ def test_a_motion_begins_without_the_state_of_the_one_before() -> None:
         array[...] = 7
     _begin(table(work))
     cleared = {name for name, array in arrays_of(work).items() if array.size and not array.any()}
-    assert cleared == set(Carry._fields)
+    assert cleared == set(Carry._fields) - {"external"}  # which every step sets
 
 
 @pytest.mark.parametrize("sizes", [ALL, BARE])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.simulator import phased_engine
+from sim.simulator.engines import phased_engine
 from support.scenes import pendulum
 
 H, KAPPA, TOLERANCE = 0.02, 1e-12, 1e-10

@@ -10,7 +10,7 @@ import pytest
 
 import dojo_opt as dojo
 from sim.mechanism.pose import HERE, Pose, turn
-from sim.mechanism.self_collisions import _gap
+from sim.mechanism.self_collisions import separation
 from support.scenes import pendulum
 from support.urdf_files import collision, inertial, joint, link, write
 
@@ -18,13 +18,17 @@ from support.urdf_files import collision, inertial, joint, link, write
 def test_gaps_of_shapes_are_those_of_geometry() -> None:
     box, ball, rod = dojo.Box(0.2, 0.2, 0.2), dojo.Sphere(0.1), dojo.Capsule(0.05, 0.4)
     aside = Pose(turn(np.array([0.0, 0.0, 1.0]), np.pi / 4), np.array([0.3, 0.0, 0.0]))
-    assert _gap(HERE, box, aside, box) == pytest.approx(0.3 - 0.1 - 0.1 * np.sqrt(2.0), abs=2e-5)  # an edge and a face
+    assert separation(HERE, box, aside, box) == pytest.approx(
+        0.3 - 0.1 - 0.1 * np.sqrt(2.0), abs=2e-5
+    )  # an edge and a face
     above = Pose(np.eye(3), np.array([0.25, 0.25, 0.25]))
-    assert _gap(HERE, box, above, ball) == pytest.approx(0.15 * np.sqrt(3.0) - 0.1, abs=2e-5)  # a corner and a ball
+    assert separation(HERE, box, above, ball) == pytest.approx(
+        0.15 * np.sqrt(3.0) - 0.1, abs=2e-5
+    )  # a corner and a ball
     beside = Pose(turn(np.array([1.0, 0.0, 0.0]), np.pi / 2), np.array([0.2, 0.0, 0.1]))
-    assert _gap(HERE, rod, beside, rod) == pytest.approx(0.2 - 0.1, abs=2e-5)  # two rods that cross
-    assert _gap(HERE, box, Pose(np.eye(3), np.array([0.19, 0.19, 0.0])), box) < 0.0
-    assert _gap(HERE, box, Pose(np.eye(3), np.array([0.2, 0.0, 0.0])), box) < 0.0  # side by side
+    assert separation(HERE, rod, beside, rod) == pytest.approx(0.2 - 0.1, abs=2e-5)  # two rods that cross
+    assert separation(HERE, box, Pose(np.eye(3), np.array([0.19, 0.19, 0.0])), box) < 0.0
+    assert separation(HERE, box, Pose(np.eye(3), np.array([0.2, 0.0, 0.0])), box) < 0.0  # side by side
 
 
 def test_a_file_collides_with_itself_where_it_can(tmp_path: Path) -> None:

@@ -121,7 +121,6 @@ class _Raised:
         self.count += 1
         if self.count == self._number:
             self.where = f"{code.co_filename}:{frame.f_lineno}:{code.co_qualname}"
-            sys.settrace(None)
             handler = signal.getsignal(signal.SIGINT)
             assert callable(handler)
             handler(signal.SIGINT, frame)

@@ -16,6 +16,7 @@ from dojo_opt.tasks.jin.placing import Placing
 from dojo_opt.tasks.jin.trial import Trial
 from dojo_opt.tasks.suite import SuiteTask, quadratic
 from sim.mechanism.mechanism import Mechanism
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -80,9 +81,9 @@ def reposing(
     """
     sim = Simulator(damped, time_step=_KNOT, kappa=_KAPPA)
     start = sim.neutral()
-    start[:7] = trial.start
+    start[BaseState.POSE] = trial.start
     goal = start.copy()
-    goal[:7] = trial.goal
+    goal[BaseState.POSE] = trial.goal
     free = np.zeros(sim.nv - 6)
     running, end = (
         tuple(np.concatenate([np.repeat(pair, 3), free]) for pair in (row[:2], row[2:])) for row in (_RUNNING, _END)
