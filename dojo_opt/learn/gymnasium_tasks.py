@@ -1,7 +1,7 @@
 """Tasks of Gymnasium, version 5: its models, observations, rewards, ends and limits, in this simulator.
 
-The models are the MJCF files in Gymnasium's own package. Where a random first state is below the ground, which is hard
-here, it is lifted onto it. Ant and humanoid observe forces of contacts, and pay for them, only where they are asked to:
+The models are the MJCF files in Gymnasium's own package. Ground and limits of joints are hard here: a random first
+state below the ground is lifted onto it, and joints beyond their limits are as far within them. Ant and humanoid observe forces of contacts, and pay for them, only where they are asked to:
 these forces are those of contacts with the ground, in the last time step of an action.
 """
 
@@ -75,18 +75,31 @@ def _model(file: str) -> MjcfMechanism:
         return load_mjcf(path)
 
 
+def _coordinate_limits(mech: Mechanism) -> tuple[Floats, Floats]:
+    """(lower, upper) limits of the coordinates, (nq,) each, infinite where there are none."""
+    low, high = np.full(mech.nq, -np.inf), np.full(mech.nq, np.inf)
+    for joint in mech.joints:
+        if joint.nrot < 3:
+            low[mech.q_slice(joint.name)], high[mech.q_slice(joint.name)] = np.transpose(joint.limits)
+    return low, high
+
+
 def _starts(
     mech: Mechanism, height: int, position: float, velocity: Callable[..., Floats], home: Floats | None = None
 ) -> Callable[..., Floats]:
-    """First states: uniform noise of the coordinates, and the given one of the velocities (generator, nv)."""
+    """First states: uniform noise of the coordinates, within the limits of joints, and the given one of the velocities
+    (generator, nv).
+    """
     home, quaternions = np.array(mech.neutral if home is None else home, dtype=np.float64), []
     for joint in mech.joints:
         if joint.nrot == 3:
             stop = mech.q_slice(joint.name).stop
             quaternions.append(slice(stop - 4, stop))
+    low, high = _coordinate_limits(mech)
 
     def start(rng: np.random.Generator) -> Floats:
         q = home + rng.uniform(-position, position, len(home))
+        q = np.clip(np.where(q > high, 2.0 * high - q, np.where(q < low, 2.0 * low - q, q)), low, high)
         for part in quaternions:
             q[part] /= np.linalg.norm(q[part])
         v = velocity(rng, mech.nv)

@@ -189,6 +189,19 @@ def test_hopper_and_walker_end_where_gymnasium_says():
         assert task.ends(x).tolist() == [False, True, True]
 
 
+@pytest.mark.parametrize("make", ["half_cheetah", "hopper", "walker2d", "ant", "humanoid"])
+def test_first_states_are_within_the_limits_of_joints(make):
+    """Hopper and walker stand with straight legs, on a limit: the noise of the start would bend half of them beyond."""
+    task = getattr(dojo.learn, make)()
+    mech = task.sim.mechanism
+    states = task.starts([np.random.default_rng(k) for k in range(50)])
+    for joint in mech.joints:
+        if joint.nrot < 3:
+            q, (low, high) = states[:, mech.q_slice(joint.name)], np.transpose(joint.limits)
+            assert np.all((low <= q) & (q <= high)), joint.name
+            assert len(np.unique(q)) > 40, joint.name
+
+
 def _assets():
     from pathlib import Path
 
