@@ -1,8 +1,9 @@
 """Tasks of Gymnasium, version 5: its models, observations, rewards, ends and limits, in this simulator.
 
 The models are the MJCF files in Gymnasium's own package. Ground and limits of joints are hard here: a random first
-state below the ground is lifted onto it, and joints beyond their limits are as far within them. Ant and humanoid observe forces of contacts, and pay for them, only where they are asked to:
-these forces are those of contacts with the ground, in the last time step of an action.
+state below the ground is lifted onto it, and joints beyond their limits are as far within them. Ant and humanoid
+observe forces of contacts, and pay for them, only where they are asked to: these forces are those of contacts with the
+ground, in the last time step of an action.
 """
 
 from __future__ import annotations
@@ -62,7 +63,9 @@ COARSE = Randomisation(
 )
 # Of shac; an evaluation takes as long as several epochs.
 _RARELY: dict[str, Any] = {"environments": 32, "evaluations": 5, "episodes": 4}
-_CHEETAH = {**_RARELY, "epochs": 900, "episode": 128, "randomisation": TRANSFER, "evaluations": 6}
+_CHEETAH = {
+    **_RARELY, "epochs": 600, "episode": 128, "rate": 2e-3, "saturation": 0.01, "randomisation": TRANSFER,
+}  # fmt: skip
 _LEGGED = {**_RARELY, "epochs": 800, "horizon": 32, "gamma": 0.997, "randomisation": BALANCE}
 _ANT = {**_RARELY, "epochs": 2100, "episode": 128, "rate": 3e-3, "randomisation": COARSE}
 
@@ -79,7 +82,7 @@ def _coordinate_limits(mech: Mechanism) -> tuple[Floats, Floats]:
     """(lower, upper) limits of the coordinates, (nq,) each, infinite where there are none."""
     low, high = np.full(mech.nq, -np.inf), np.full(mech.nq, np.inf)
     for joint in mech.joints:
-        if joint.nrot < 3:
+        if joint.nrot < 3 and joint.limits is not None:
             low[mech.q_slice(joint.name)], high[mech.q_slice(joint.name)] = np.transpose(joint.limits)
     return low, high
 
@@ -142,14 +145,21 @@ def _task(mech: MjcfMechanism, substeps: int, time_step: float, **fields: Any) -
 def half_cheetah() -> Task:
     """HalfCheetah-v5: run forward; 17 observations, 6 actions, 0.05 s each.
 
+    Episodes go on where the robot lies on its back or drags its head, and many policies would learn to slide along like
+    that, at a third of the speed: `shac` takes a pitch of .8 rad and a torso 25 cm low for the end.
+
     Returns:
         The task.
     """
+
+    def survival_probability(x):  # type: ignore[no-untyped-def]
+        return within(x[2], -0.8, 0.8, 0.1) * within(x[1], -0.25, np.inf, 0.03)
+
     mech = _model("half_cheetah.xml")
     return _task(
         mech, 5, 0.01, observation=_tailed(1, mech.nq, np.inf), observations=17, reward=_runs(0.05, 0.1),
-        start=_starts(mech, 1, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)), name="HalfCheetah",
-        settings=_CHEETAH,
+        start=_starts(mech, 1, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)),
+        survival_probability=survival_probability, name="HalfCheetah", settings=_CHEETAH,
     )  # fmt: skip
 
 

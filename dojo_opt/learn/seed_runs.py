@@ -101,7 +101,7 @@ def best_of(
 
     Returns:
         The run to its end, the same to the last bit as that of its seed alone; its steps, unsolved steps and processor
-        time include those of the others.
+        time, also those in its history, include those of the others.
 
     Raises:
         TypeError: for an argument of the wrong kind.
@@ -118,12 +118,9 @@ def best_of(
         return chosen
     found = algorithm(task, seed=chosen.seed, resume=chosen, epochs=epochs, **options)
     others = [run for run in begun if run is not chosen]
-    return replace(
-        found,
-        steps=found.steps + sum(run.steps for run in others),
-        unsolved=found.unsolved + sum(run.unsolved for run in others),
-        seconds=found.seconds + sum(run.seconds for run in others),
-    )
+    more = {name: sum(getattr(run, name) for run in others) for name in ("steps", "unsolved", "seconds")}
+    history = [record | {name: record[name] + more[name] for name in more} for record in found.history]
+    return replace(found, history=history, **{name: getattr(found, name) + more[name] for name in more})
 
 
 def _earned(run: Learned) -> float:

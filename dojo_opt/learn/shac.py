@@ -5,7 +5,7 @@
 A row of the batch continues where the last epoch ended; the sums start anew where its episode ends. The end of an
 episode has no derivative, so that a policy would learn to lunge into it. Where a task tells a smooth
 `survival_probability` s(x), the discount of all that follows a state is gamma s(x) instead of gamma, and is
-differentiated.
+differentiated; a row starts anew where nothing that follows would count.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ __all__ = ["ShacOptions", "shac"]
 
 
 _KNOWN = 1e4  # observations that the scaling of a given policy counts for
+_LOST = 0.1  # survival probability below which a row starts anew
 
 
 @dataclass(frozen=True)
@@ -182,7 +183,8 @@ class _Shac(Training):
     def restart(self, t: int, terminated: Flags, unsolved: Flags, states: Floats) -> Flags:
         """Which rows start anew after step t; their states are replaced."""
         self.age += 1
-        anew = terminated | unsolved | (self.age >= self.limit)
+        lost = self.task.survives(states, terminated)[0] < _LOST
+        anew = terminated | unsolved | lost | (self.age >= self.limit)
         rows = np.flatnonzero(anew)
         if len(rows):
             states[rows] = self.task.starts([self.restarts] * len(rows))

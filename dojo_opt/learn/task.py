@@ -166,7 +166,8 @@ class Task:
         name: its name (default "task").
         survival_probability: function of x with a smooth probability, from 0 to 1, that the episode goes on there: near
             1 in safe states, small where `terminated` is true. The end of an episode is not differentiable: `shac`
-            multiplies the rewards after x by this probability instead (default None: 1 or 0).
+            multiplies the rewards after x by this probability instead, and begins another episode where it is below
+            10 % (default None: 1 or 0).
         commands: number of entries of a command (default 0).
         command: function of a generator that draws a command (commands,) (default None).
         touch: groups of names of contacts, whose forces end the state (default (): none).

@@ -121,6 +121,20 @@ def test_a_smooth_probability_of_survival_has_the_derivative_of_what_it_makes_le
     np.testing.assert_allclose(found.traced(1.0)[0], found.first())  # which the critic learns
 
 
+def test_rows_start_anew_where_their_survival_is_improbable(task):
+    """Where the pendulum turns backwards; its episodes go on."""
+
+    def survival_probability(x):
+        return 1.0 / (1.0 + np.exp(-(x[1] + 0.5) / 0.01))
+
+    forwards = replace(task, steps=1000, survival_probability=survival_probability)
+    options = {"epochs": 1, "environments": 16, "horizon": 20, "hidden": (4,), "evaluations": 1, "episodes": 1}
+    free, held = (dojo.learn.shac(t, **options) for t in (replace(forwards, survival_probability=None), forwards))
+    young = held.state["age"] < 20
+    assert young.sum() > free.state["age"][free.state["age"] < 20].size
+    assert dojo.learn.evaluate(held.policy, 2).lengths.tolist() == [1000, 1000]
+
+
 def test_saturated_outputs_cost_what_brings_them_back(task):
     policy, starts = _policy(task), np.array([[0.25, -1.0], [0.8, 1.5]])
     policy.weights[-1] = 4.0  # the bias of the output
@@ -314,6 +328,8 @@ def test_the_best_of_several_beginnings_goes_on(task):
     assert found.success and found.seed == max(after, key=after.get), after
     np.testing.assert_array_equal(found.policy.weights, whole[found.seed].policy.weights)
     assert found.best == whole[found.seed].best and found.steps == (20 + 2 * 5) * 64
+    assert [record["steps"] for record in found.history] == [(k + 1 + 2 * 5) * 64 for k in range(20)]
+    assert found.history[-1]["seconds"] <= found.seconds
     with pytest.raises(ValueError, match=r"best_of\(share=\.\.\.\)"):
         dojo.learn.best_of(dojo.learn.shac, task, epochs=20, share=2.0)
 
