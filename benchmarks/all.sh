@@ -65,6 +65,7 @@ measure adaptation "$python" "$here/benchmarks/adaptation.py" $quick --out "$out
 measure dexterous "$python" "$here/benchmarks/dexterous.py" $quick --out "$out"
 measure crisp "$python" "$here/benchmarks/crisp.py" $quick --out "$out"
 measure mpc_suites "$python" "$here/benchmarks/mpc_suites.py" $quick spinner acrobot free_gait_disturbed free_gait_fast --out "$out"  # the others take minutes
+measure humanoids "$python" "$here/benchmarks/humanoids.py" $quick --out "$out"
 measure environments "$python" "$here/benchmarks/environments.py" $quick --out "$out"
 if [ -z "$quick" ]; then  # needs gymnasium[mujoco]
     measure agreement "$python" "$here/benchmarks/agreement.py" --out "$out"

@@ -176,7 +176,10 @@ def test_the_module_runs_as_a_program() -> None:
 @pytest.mark.parametrize("flag", [["--perturb", "payload=1"], ["--seconds", "2"]])
 def test_a_plan_has_no_plant_to_perturb(flag: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["run", "hop", *flag]) == 2
-    assert "apply to closed loops (free_gait_mpc, hopper_mpc, quadruped_mpc); hop is a plan" in capsys.readouterr().err
+    assert (
+        "apply to closed loops (free_gait_mpc, hopper_mpc, humanoid_mpc, quadruped_mpc); hop is a plan"
+        in capsys.readouterr().err
+    )
 
 
 @pytest.mark.parametrize(

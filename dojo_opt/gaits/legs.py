@@ -99,6 +99,27 @@ class Legs:
         """
         return Simulator(self.mechanism, time_step=time_step, kappa=kappa)
 
+    def bends(self) -> Array:
+        """Changes of the stance that bend a leg: its foot rises below the hip, and stays level on an ankle.
+
+        Returns:
+            (k, nq) changes of the coordinates, by foot, for a bend of 1 rad at the hip and 2 rad at the knee [rad].
+        """
+        sim = self.simulator(0.01, 1e-6)
+        mech, x = sim.mechanism, sim.neutral()
+        kin, joints = Kinematics(sim), {joint.child: joint for joint in mech.joints}
+        out = []
+        for body in dict.fromkeys(contact.body for contact in mech.contacts):
+            hinges = _pitching(kin, joints, body, x[: sim.nq])
+            row, turns = np.zeros(sim.nq), kin.jacobian(body, x[: sim.nq])[4]
+            hip, knee = (_origin(sim, joints[name], x) for name in hinges[:2])
+            forward = 1.0 if knee[0] >= hip[0] else -1.0
+            for name, share in zip(hinges, (-1.0, 2.0, -1.0), strict=False):
+                joint = joints[name].name
+                row[mech.q_slice(joint)] = forward * share * np.sign(turns[mech.v_slice(joint)])
+            out.append(row)
+        return np.array(out)
+
 
 def _damped(joint: Joint, least: float) -> Joint:
     """The joint with a damper of at least this, where it has rotations."""

@@ -11,9 +11,21 @@ from dojo_opt.tasks.hopping import Hopping, hopper_mpc
 from dojo_opt.tasks.legged import legged_mpc
 from dojo_opt.tasks.plants import plant
 from dojo_opt.tasks.trotting import quadruped_mpc
+from dojo_opt.tasks.walking import humanoid_mpc
 from sim.mechanism.checks import nearest
 
-__all__ = ["Hopping", "crisp", "free_gait_mpc", "hopper_mpc", "idto", "jin", "legged_mpc", "plant", "quadruped_mpc"]
+__all__ = [
+    "Hopping",
+    "crisp",
+    "free_gait_mpc",
+    "hopper_mpc",
+    "humanoid_mpc",
+    "idto",
+    "jin",
+    "legged_mpc",
+    "plant",
+    "quadruped_mpc",
+]
 
 
 if not TYPE_CHECKING:
