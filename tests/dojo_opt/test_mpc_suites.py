@@ -103,6 +103,18 @@ def test_a_quadruped_finds_its_gait():
     assert task.outcome(loop).measures["tilt [rad]"] < 0.3
 
 
+@pytest.mark.slow
+def test_the_hopper_hops_to_its_goal():
+    """It has to leave the ground: one that only leans forward ends .3 m short, and far from its pitch."""
+    task = dojo.tasks.idto.hopper()
+    loop = task.run(seed=40)
+    outcome = task.outcome(loop)
+    assert outcome.success, outcome
+    assert outcome.penetration < 1e-4
+    flights = loop.contacts.gap.min(axis=1) > 5e-3
+    assert flights.sum() > 100  # of 5,000 steps of 1 ms
+
+
 def test_a_lead_moves_on_and_waits():
     """At its velocity in its own axes, and no further from the robot than allowed; a new run begins anew."""
     pose = dojo.Simulator(dojo.models.quadruped(), time_step=0.025).neutral()
