@@ -81,7 +81,7 @@ def judge_step(sim: dojo.Simulator, x: Vector) -> str:
         return str(result.status.name)
     if heights(sim, result.x).min() < -BELOW:
         return "below the ground"
-    if result.substeps == 1 and outside_cones(sim.mechanism, result.contacts) > 1e-6:
+    if result.parts == 1 and outside_cones(sim.mechanism, result.contacts) > 1e-6:
         return "outside its cone"
     if momentum_error(sim, x, result) > 1e-6:
         return "momentum"

@@ -56,7 +56,7 @@ def released(mechanism: dojo.Mechanism, time_step: float, seconds: float) -> Mot
     sim = dojo.Simulator(mechanism, time_step)
     q = np.zeros(sim.nq)
     q[0] = 0.5 * np.pi
-    return sim, sim.start(q, np.zeros(sim.nv)), np.zeros((round(seconds / time_step), sim.nu))
+    return sim, sim.state_from_velocity(q, np.zeros(sim.nv)), np.zeros((round(seconds / time_step), sim.nu))
 
 
 def spin(rate: float) -> Motion:
@@ -65,7 +65,7 @@ def spin(rate: float) -> Motion:
     sim = dojo.Simulator(dojo.Mechanism([body], [dojo.Joint("floating", None, "body")], gravity=(0, 0, 0)), 0.01)
     x = sim.neutral()
     x[-3:] = (0.1, rate, 0.2)
-    return sim, sim.start(x[: sim.nq], x[sim.nq :]), np.zeros((100, 0))
+    return sim, sim.state_from_velocity(x[: sim.nq], x[sim.nq :]), np.zeros((100, 0))
 
 
 def on_the_ground() -> Motion:
@@ -74,7 +74,7 @@ def on_the_ground() -> Motion:
 
     found = trial(0.01)
     sim = dojo.Simulator(found.mechanism, 0.01)
-    return sim, sim.start(found.q, found.v), np.zeros((200, sim.nu))
+    return sim, sim.state_from_velocity(found.q, found.v), np.zeros((200, sim.nu))
 
 
 def tower(kappa: float) -> Motion:
@@ -123,7 +123,7 @@ def clocked(sim: dojo.Simulator, x: Vector, us: Vector) -> tuple[dojo.Trajectory
     sim.rollout(x, us)  # compile the division too
     begin = time.process_time()
     motion = sim.rollout(x, us)
-    return motion, 1e6 * (time.process_time() - begin) / max(motion.knot, 1)
+    return motion, 1e6 * (time.process_time() - begin) / max(motion.solved_steps, 1)
 
 
 def run(args: argparse.Namespace) -> Report:
@@ -137,11 +137,18 @@ def run(args: argparse.Namespace) -> Report:
         whole, cost = clocked(sim.replace(divide=False), x, us)
         motion, divided_cost = clocked(sim, x, us)
         refused += not motion.success
-        ended = "end" if whole.success else f"{whole.knot * sim.time_step:.3g} s, {whole.status.name}"
-        reached = "end" if motion.success else f"{motion.knot * sim.time_step:.3g} s, {motion.status.name}"
-        parts = motion.substeps
+        ended = "end" if whole.success else f"{whole.solved_steps * sim.time_step:.3g} s, {whole.status.name}"
+        reached = "end" if motion.success else f"{motion.solved_steps * sim.time_step:.3g} s, {motion.status.name}"
+        parts = motion.parts
         lines.append(
-            [name, ended, reached, int((parts > 1).sum()), int(parts.max(initial=1)), int((motion.shares < 1.0).sum())]
+            [
+                name,
+                ended,
+                reached,
+                int((parts > 1).sum()),
+                int(parts.max(initial=1)),
+                int((motion.momentum_fractions < 1.0).sum()),
+            ]
             + [cost, divided_cost]
         )
     report.rows = [number("motions", len(lines)), number("motions that end early", refused, 0)]

@@ -65,7 +65,7 @@ def fixed(motion: ReferenceMotion, exact: Vector, steps: tuple[float, ...]) -> P
                 sim = dojo.Simulator(motion.mechanism, time_step=h, order=order)
             except ValueError:  # closed loops have order 2
                 continue
-            x, count = sim.start(motion.q, motion.v), round(motion.seconds / h)
+            x, count = sim.state_from_velocity(motion.q, motion.v), round(motion.seconds / h)
             sim.rollout(x, steps=1)  # compiles
             found, cost = clocked(partial(sim.rollout, x, steps=count))
             end = found.x[-1][: sim.nq] if found.success else None
@@ -135,7 +135,7 @@ def reference(motion: ReferenceMotion) -> tuple[Vector, float]:
         if loops:
             settings = {"tolerance": 1e-12}
         sim = dojo.Simulator(motion.mechanism, time_step=h, **settings)
-        x = sim.start(motion.q, motion.v)
+        x = sim.state_from_velocity(motion.q, motion.v)
         ends.append(np.asarray(sim.rollout(x, steps=round(motion.seconds / h), throw=True).x[-1][: sim.nq]))
     if loops:  # of order 2
         ends = [fine + (fine - coarse) / 3.0 for coarse, fine in pairwise(ends)]
@@ -168,7 +168,7 @@ def study(motion: ReferenceMotion, quick: bool) -> tuple[list[list[Any]], dict[s
     ours: Points = []
     for asked in _asked(motion, unsure, quick):
         sim = dojo.Simulator(motion.mechanism, time_step=motion.seconds, accuracy=asked)
-        x = sim.start(motion.q, motion.v)
+        x = sim.state_from_velocity(motion.q, motion.v)
         if not lines:
             sim.rollout(x, steps=1)  # compiles
         found, cost = clocked(partial(sim.rollout, x, steps=1))

@@ -37,16 +37,16 @@ SETTINGS: dict[str, dict[str, dict[str, Any]]] = {  # of shac, beside those of t
     "HalfCheetah": {
         "shac": {},
         "best_of": {"epochs": 620},
-        "ars": {"epochs": 30, "rate": 0.02, "randomisation": TRANSFER} | _RARELY,
-        "gradient_search": {"epochs": 60, "horizon": 80, "randomisation": TRANSFER} | _RARELY,
+        "ars": {"epochs": 30, "rate": 0.02, "randomization": TRANSFER} | _RARELY,
+        "gradient_search": {"epochs": 60, "horizon": 80, "randomization": TRANSFER} | _RARELY,
     },
     "Hopper": {
         "shac": {},
-        "ars": {"epochs": 100, "rate": 0.01, "noise": 0.025, "shift": 1.0, "randomisation": BALANCE} | _RARELY,
+        "ars": {"epochs": 100, "rate": 0.01, "noise": 0.025, "shift": 1.0, "randomization": BALANCE} | _RARELY,
     },
     "Walker2d": {
         "shac": {},
-        "ars": {"epochs": 100, "rate": 0.03, "noise": 0.025, "shift": 1.0, "randomisation": BALANCE} | _RARELY,
+        "ars": {"epochs": 100, "rate": 0.03, "noise": 0.025, "shift": 1.0, "randomization": BALANCE} | _RARELY,
     },
     "Ant": {
         "shac": {},

@@ -57,7 +57,7 @@ def seconds(sim: dojo.Simulator, x: np.ndarray, steps: int = 2000) -> float:
     sim.rollout(x, us[:10])
     begin = time.process_time()
     done = sim.rollout(x, us)
-    return (time.process_time() - begin) / max(1, done.knot)
+    return (time.process_time() - begin) / max(1, done.solved_steps)
 
 
 def gap(sim: dojo.Simulator, x: np.ndarray) -> float:
@@ -78,7 +78,7 @@ def motion(name: str, steps: int) -> tuple[int, float, float, float, float, str]
         worst = max(worst, *(gap(sim, y) for y in t.x[1::10]))
         energies.append(sim.energy(t.x[1:]))
         kinetic = max(kinetic, float(sim.kinetic_energy(t.x[1:]).max()))
-        x, done = t.x[-1], done + t.knot
+        x, done = t.x[-1], done + t.solved_steps
         if not t.success:
             end = str(t.message)
             break

@@ -94,7 +94,7 @@ def replayed(plan: Any) -> Any:
     sim, parts = plan.problem.sim, 5 * plan.problem.substeps
     fine = sim.replace(time_step=sim.time_step / 5)
     limits = plan.problem.control_limits
-    return fine.closed_loop(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=parts, limits=limits)
+    return fine.rollout_feedback(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=parts, limits=limits)
 
 
 def walked(robot: TestedRobot, task: str) -> list[Cell]:

@@ -126,7 +126,7 @@ def fall(out: ZooOutcome, mech: Any, time_step: float) -> ZooOutcome:
     out.depth = max(0.0, -float(t.contacts.gap.min(initial=0.0)))
     wrong = []
     if not t.success:
-        wrong.append(f"{t.status.name} at {t.knot * time_step:.2f} s")
+        wrong.append(f"{t.status.name} at {t.solved_steps * time_step:.2f} s")
     if not out.growth <= 1.0:
         wrong.append("energy grows")
     if not out.depth <= DEPTH:

@@ -26,6 +26,7 @@ def _homes() -> dict[str, str]:
     return {alias.name: str(node.module) for node in imports for alias in node.names}
 
 
+_RENAMED = {"Sampled": "SampledReference", "kernel": "jit"}  # old name -> new name, until version 0.2
 _HOME = _homes()
 __all__ = sorted(_HOME)  # noqa: PLE0605
 
@@ -59,6 +60,11 @@ except PackageNotFoundError:  # run from a source tree that is not installed
 
 def __getattr__(name: str) -> Any:
     """Import a public name on first use (PEP 562)."""
+    if name in _RENAMED:
+        from sim.mechanism.renamed import warn_renamed
+
+        warn_renamed(f"dojo.{name}", f"dojo.{_RENAMED[name]}")
+        return __getattr__(_RENAMED[name])
     if name not in _HOME:
         from difflib import get_close_matches
 

@@ -19,13 +19,16 @@ from dojo_opt.identification.parameter_space import ParameterSpace as ParameterS
 from dojo_opt.learn.environment import Environment as Environment
 from dojo_opt.mpc.adaptation import Adaptation as Adaptation
 from dojo_opt.mpc.controller import MPC as MPC
-from dojo_opt.mpc.moving_reference import Sampled as Sampled
+from dojo_opt.mpc.moving_reference import (
+    AnchoredReference as AnchoredReference,
+    SampledReference as SampledReference,
+)
 from dojo_opt.planning.ilqr import ilqr as ilqr
 from dojo_opt.planning.options import Options as Options, Stage as Stage
 from dojo_opt.planning.plan import Plan as Plan
 from dojo_opt.planning.plan_library import plan_library as plan_library
 from dojo_opt.planning.problem import Problem as Problem
-from dojo_opt.planning.residual import kernel as kernel
+from dojo_opt.planning.residual import jit as jit
 from dojo_opt.planning.tracking import tracking_gains as tracking_gains
 from dojo_opt.plant.disturbances import Disturbances as Disturbances
 from dojo_opt.plant.closed_loop import ClosedLoop as ClosedLoop, closed_loop as closed_loop
@@ -44,13 +47,21 @@ from sim.mechanism.input import Input as Input
 from sim.mechanism.joint import Joint as Joint
 from sim.mechanism.polytope import Polytope as Polytope
 from sim.simulator.reactions import Reactions as Reactions
-from sim.simulator.results import (
-    Interrupted as Interrupted,
+from sim.simulator.derivative_results import (
+    Gradient as Gradient,
+    Jacobian as Jacobian,
     Linearization as Linearization,
+)
+from sim.simulator.results import (
+    Contacts as Contacts,
+    FeedbackRollout as FeedbackRollout,
+    Interrupted as Interrupted,
+    RolloutBatch as RolloutBatch,
     SimulationError as SimulationError,
     StepResult as StepResult,
     Trajectory as Trajectory,
 )
+from sim.simulator.row_batch import StepBatch as StepBatch
 from sim.mechanism.shapes import (
     Box as Box,
     Capsule as Capsule,

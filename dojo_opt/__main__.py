@@ -215,7 +215,7 @@ def _plan_task(args: argparse.Namespace, task: PlanTask) -> int:
 
 
 def _models(args: argparse.Namespace) -> int:
-    entries = dojo.models.catalogue()
+    entries = dojo.models.catalog()
     if args.thumbnails:
         args.thumbnails.mkdir(parents=True, exist_ok=True)
         for entry in entries:

@@ -111,7 +111,7 @@ class Effort(Spec):
 
 @dataclass(frozen=True)
 class ResidualCost(Spec):
-    """scale * sum_t sum_i weight_ti r_i(x_t, u_t)^2 for a function of the user, which is compiled (see `dojo.kernel`).
+    """scale * sum_t sum_i weight_ti r_i(x_t, u_t)^2 for a function of the user, which is compiled (see `dojo.jit`).
 
         def residual(x, u, out): ...                          # writes all of out, (dimension,)
 

@@ -35,7 +35,7 @@ problem = dojo.Problem(
 plan = dojo.ilqr(problem, verbose=True)
 gains = dojo.tracking_gains(problem, plan)
 fine = sim.replace(time_step=sim.time_step / 5)
-replay = fine.closed_loop(problem.start, plan.u, xs=plan.x, Ks=gains, substeps=5)
+replay = fine.rollout_feedback(problem.start, plan.u, xs=plan.x, Ks=gains, substeps=5)
 
 feet = Feet(sim)
 planned, replayed = (np.abs(feet.positions(x[-1]) - reference.feet[-1]).max() for x in (plan.x, replay.x))

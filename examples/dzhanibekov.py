@@ -22,7 +22,7 @@ flips = {}
 for ax, (name, k) in zip(axes, (("smallest (y)", 1), ("middle (x)", 0), ("largest (z)", 2)), strict=True):
     spin = np.full(3, NUDGE)
     spin[k] = SPEED
-    start = sim.start(sim.neutral()[: sim.nq], np.concatenate([np.zeros(3), spin]))
+    start = sim.state_from_velocity(sim.neutral()[: sim.nq], np.concatenate([np.zeros(3), spin]))
     t = sim.rollout(start, np.zeros((len(time) - 1, 0)), throw=True)
     linear, angular = sim.momentum(t.x)
     drift = np.abs(angular - angular[0]).max()

@@ -23,7 +23,7 @@ angles = np.arange(8) * np.pi / 4 + np.pi / 16
 def ours(law, velocity):
     """Path of the block on the ground, (n, 2) [m]; at the end it is at rest."""
     sim = dojo.Simulator(dojo.models.block(edge=0.2, friction=FRICTION, law=law), time_step=H, kappa=1e-8)
-    t = sim.rollout(sim.start(sim.neutral()[:7], velocity), np.zeros((STEPS, sim.nu)), throw=True)
+    t = sim.rollout(sim.state_from_velocity(sim.neutral()[:7], velocity), np.zeros((STEPS, sim.nu)), throw=True)
     assert np.linalg.norm(t.x[-1, 7:9]) < 1e-3
     return t.x[:, :2]
 

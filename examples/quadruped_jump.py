@@ -17,7 +17,7 @@ plan = dojo.ilqr(problem, verbose=True)
 
 fine = problem.sim.replace(time_step=problem.knot_time / 20, kappa=1e-8)
 limits = problem.control_limits
-replay = fine.closed_loop(problem.start, plan.u, xs=plan.x, Ks=plan.K, substeps=20, limits=limits)
+replay = fine.rollout_feedback(problem.start, plan.u, xs=plan.x, Ks=plan.K, substeps=20, limits=limits)
 motion = [fine.rollout(x, np.tile(u, (20, 1))).contacts for x, u in zip(replay.x[:-1], replay.u, strict=True)]
 clearance = max(contacts.gap.min(axis=1).max() for contacts in motion)  # of the lowest foot, in the air
 landed = replay.x[-1, 0] - replay.x[0, 0]

@@ -23,10 +23,10 @@ def upright(x):
 
 fine = problem.sim.replace(time_step=problem.knot_time / 5)
 limits = problem.control_limits
-replay = fine.closed_loop(problem.start, plan.u, xs=plan.x, Ks=plan.K, substeps=5, limits=limits)
-travelled, drift = plan.x[-1, 0] - plan.x[0, 0], np.abs(replay.x[-1, :3] - plan.x[-1, :3]).max()
+replay = fine.rollout_feedback(problem.start, plan.u, xs=plan.x, Ks=plan.K, substeps=5, limits=limits)
+traveled, drift = plan.x[-1, 0] - plan.x[0, 0], np.abs(replay.x[-1, :3] - plan.x[-1, :3]).max()
 
-print(f"{plan.nit} iterations, {travelled:.3f} m, largest torque {np.abs(plan.u).max():.1f} N m of {limits[1][0]:.1f}")
+print(f"{plan.nit} iterations, {traveled:.3f} m, largest torque {np.abs(plan.u).max():.1f} N m of {limits[1][0]:.1f}")
 print(
     f"upright {upright(plan.x).min():.4f}; at a fifth of the time step {upright(replay.x).min():.4f}, {drift:.4f} m off"
 )
@@ -34,6 +34,6 @@ print(
 finish(dojo.plots.gait(plan), __file__)
 
 assert plan.success, plan.message
-assert abs(travelled - 0.2 * plan.time[-1]) < 5e-3, travelled
+assert abs(traveled - 0.2 * plan.time[-1]) < 5e-3, traveled
 assert min(upright(plan.x).min(), upright(replay.x).min()) > 0.99
 assert drift < 0.02, drift

@@ -18,7 +18,7 @@ sim = dojo.Simulator(top, time_step=5e-4, kappa=1e-9)
 x = sim.neutral()
 x[3:7] = np.cos(TILT / 2), np.sin(TILT / 2), 0.0, 0.0
 x[2] = RADIUS - 0.004 * np.cos(TILT)
-x = sim.start(x[: sim.nq], np.array([0.0, 0.0, 0.0, 0.0, SPIN * np.sin(TILT), SPIN * np.cos(TILT)]))
+x = sim.state_from_velocity(x[: sim.nq], np.array([0.0, 0.0, 0.0, 0.0, SPIN * np.sin(TILT), SPIN * np.cos(TILT)]))
 t = sim.rollout(x, np.zeros((round(DURATION / sim.time_step), 0)), throw=True)
 
 w, i, j, k = t.x[:, 3:7].T

@@ -42,9 +42,9 @@ class Quadratic(NamedTuple):
 class Regularization(NamedTuple):
     """Regularisation of the model for the gains; the value function stays exact."""
 
-    control: float  # times diag(damping), added to Q_uu
+    control: float  # times diag(unit), added to Q_uu
     value: float  # times I, added to V_xx inside Q_uu and Q_ux
-    damping: Vector  # (m,) unit of `control`
+    unit: Vector  # (m,) unit of `control`
 
 
 class PredictedChange(NamedTuple):
@@ -96,14 +96,14 @@ def _action_value(quad: Quadratic, t: int, V: Matrix, v: Vector, FV: Stack, Q: M
 
 @inlined
 def _regularize(reg: Regularization, F: Matrix, Q: Matrix, Huu: Matrix, Z: Matrix) -> None:
-    """Huu = Q_uu + control diag(damping) + value B^T B,  Z = -(Q_ux + value B^T A)."""
+    """Huu = Q_uu + control diag(unit) + value B^T B,  Z = -(Q_ux + value B^T A)."""
     m, n = Z.shape
     for i in range(m):
         for j in range(m):
             Huu[i, j] = Q[n + i, n + j]
         for j in range(n):
             Z[i, j] = -Q[n + i, j]
-        Huu[i, i] += reg.control * reg.damping[i]
+        Huu[i, i] += reg.control * reg.unit[i]
         if reg.value > 0.0:
             for k in range(n):
                 b = reg.value * F[k, n + i]

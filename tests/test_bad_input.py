@@ -126,7 +126,12 @@ CALLS = {
     "rollout nan": (lambda: dojo.Simulator(ball()).rollout(state(), np.full((4, 6), np.nan)), "rollout", "nan"),
     "linearize shape": (lambda: hopper().linearize(np.zeros(12), np.zeros(0)), "linearize", "(13,)", "(12,)"),
     "linearize kappa": (lambda: hopper().linearize(state(), np.zeros(0), kappa=0.0), "linearize", "kappa"),
-    "start shape": (lambda: hopper().start(np.zeros(7), np.zeros(5)), "start", "(6,)", "(5,)"),
+    "start shape": (
+        lambda: hopper().state_from_velocity(np.zeros(7), np.zeros(5)),
+        "state_from_velocity",
+        "(6,)",
+        "(5,)",
+    ),
     "maximal shape": (lambda: hopper().maximal(np.zeros(3)), "maximal", "(13,)", "(3,)"),
     "minimal shape": (lambda: hopper().minimal(np.zeros((2, 13))), "minimal", "(1, 13)", "(2, 13)"),
     "vjp of no trajectory": (lambda: hopper().vjp("run", np.zeros((2, 12))), "vjp(trajectory)", "'run'"),
@@ -223,7 +228,7 @@ def test_half_a_turn_per_step_is_refused(mech):
     result = sim.step(x, np.zeros(sim.nu))
     assert dojo.Status(result.status).name == "ANGULAR_STEP"
     trajectory = sim.rollout(x, np.zeros((3, sim.nu)))
-    assert trajectory.status == result.status and trajectory.knot == 0
+    assert trajectory.status == result.status and trajectory.solved_steps == 0
     with pytest.raises(Exception, match=re.compile("turn|angular", re.IGNORECASE)):
         sim.rollout(x, np.zeros((3, sim.nu)), throw=True)
 
@@ -259,8 +264,8 @@ def test_a_step_that_failed_is_not_used():
     """A rollout stops at the first step that did not meet its tolerance."""
     sim = dojo.Simulator(block(), time_step=0.01, max_iterations=1)
     trajectory = sim.rollout(state(_2=0.26, _9=-5.0), np.zeros((50, 0)))
-    assert trajectory.status != 0 and 0 <= trajectory.knot < 50
-    assert np.isfinite(trajectory.x[: trajectory.knot + 1]).all()
+    assert trajectory.status != 0 and 0 <= trajectory.solved_steps < 50
+    assert np.isfinite(trajectory.x[: trajectory.solved_steps + 1]).all()
 
 
 def test_pendulum_may_turn_by_any_angle():

@@ -40,7 +40,7 @@ COUNTS = {
     "rollout of inputs": (lambda: SIM.rollout(X, rows(N)), "Simulator.rollout(us)"),
     "rollout of no inputs": (lambda: BATCHED.rollout(BATCHED.neutral(), np.zeros((N, 0))), "Simulator.rollout(us)"),
     "batch": (lambda: SIM.rollout_batch(X[None], rows(N)[None]), "Simulator.rollout_batch(us)"),
-    "closed loop of inputs": (lambda: SIM.closed_loop(X, rows(N)), "Simulator.closed_loop(us)"),
+    "closed loop of inputs": (lambda: SIM.rollout_feedback(X, rows(N)), "Simulator.rollout_feedback(us)"),
     "derivatives": (lambda: SIM.linearize_rollout(X, rows(N)), "Simulator.linearize_rollout(us)"),
     "rows": (lambda: SIM.step_batch(np.broadcast_to(X, (N, 2)), rows(N)), "Simulator.step_batch(U)"),
     "substeps of rows": (lambda: SIM.step_batch(X[None], ZERO[None], N), "Simulator.step_batch(substeps=...)"),
@@ -58,7 +58,7 @@ COUNTS = {
     "fits": (lambda: dojo.identify(SIM, [MOTION], ["mass"], starts=N), "identify(starts=...)"),
     "environments": (lambda: dojo.learn.shac(task(), environments=N), "shac(environments=..., horizon=...)"),
     "directions": (lambda: dojo.learn.ars(task(), directions=N), "ars(directions=..., horizon=...)"),
-    "models": (lambda: dojo.learn.Randomisation(models=N), "Randomisation(models=...)"),
+    "models": (lambda: dojo.learn.Randomization(models=N), "Randomization(models=...)"),
     "a wide layer": (lambda: dojo.learn.shac(task(), hidden=(N,)), "Network(sizes)"),
     "episodes": (lambda: dojo.learn.evaluate(policy(), episodes=N), "evaluate(episodes)"),
 }

@@ -22,7 +22,7 @@ import dojo_opt as dojo
 from benchmarks import compare
 from dojo_opt import __main__ as cli
 from dojo_opt.gaits.feet import Feet
-from dojo_opt.models.catalogue import Entry
+from dojo_opt.models.catalog import Entry
 from dojo_opt.mpc.moving_reference import References
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.mpc.settings import MPCSettings
@@ -30,7 +30,6 @@ from dojo_opt.plant import monte_carlo, tick
 from dojo_opt.viewer.motion import Motion
 from sim.io.mjcf import report as mjcf_report
 from sim.io.urdf import report as urdf_report
-from sim.simulator import results
 from support.programs import HOME, PACKAGES, python
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -154,7 +153,7 @@ def test_prose_has_nouns_for_clauses(package: str) -> None:
     assert 1000 * sum(len(re.findall(r"\bwhat\b", text, re.IGNORECASE)) for text in texts) <= 1.6 * lines
 
 
-KERNEL_MARKS = ("kernel", "inner_kernel", "parallel_kernel", "local_kernel", "inlined", "optional")
+KERNEL_MARKS = ("kernel", "jit", "inner_kernel", "parallel_kernel", "local_kernel", "inlined", "optional")
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -205,7 +204,6 @@ def test_examples_are_short() -> None:
 REACHED = (
     *(Entry, Feet, MPCSettings, Motion, Policy, References, tick.Tick),
     *(monte_carlo.MonteCarlo, monte_carlo.MonteCarloRun),
-    *(results.Batch, results.Contacts, results.Gradient, results.Jacobian, results.Shot),
     *(mjcf_report.MjcfReport, urdf_report.UrdfReport, urdf_report.LinkFrame, urdf_report.Note),
 )
 UNDOCUMENTED = ("dojo.Environment",)  # its methods are Gymnasium's, with the arguments that are described there

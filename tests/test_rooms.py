@@ -12,6 +12,8 @@ import pytest
 from support.modules import ROOT, circles, imports, module_name, modules
 from support.programs import PACKAGES
 
+PLACES = ("benchmarks", "dojo_opt", "examples", "sim", "solvers", "tests")
+
 
 def test_a_circle_is_found() -> None:
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
@@ -34,8 +36,7 @@ def test_every_room_says_its_purpose() -> None:
 
 
 def test_no_file_name_is_used_more_than_twice() -> None:
-    places = ("benchmarks", "dojo_opt", "examples", "sim", "solvers", "tests")
-    names = Counter(file.name for place in places for file in (ROOT / place).rglob("*.py"))
+    names = Counter(file.name for place in PLACES for file in (ROOT / place).rglob("*.py"))
     assert [name for name, count in names.items() if count > 2 and name != "__init__.py"] == []
 
 
@@ -47,6 +48,33 @@ def test_no_class_name_is_used_twice() -> None:
             if isinstance(node, ast.ClassDef):
                 classes[node.name].append(module_name(file))
     assert {name: where for name, where in classes.items() if len(where) > 1} == {}
+
+
+VERBS = "|".join(
+    "custom discret factor general global ideal initial linear local maxim minim normal optim organ parallel parametr "
+    "penal quant random real regular serial special stabil summar symmetr synchron util vector visual".split()
+)
+BRITISH = re.compile(
+    rf"(?:{VERBS})is(?:e|ed|es|er|ing|ation|ations)(?![a-z])|colour|behaviour|neighbour|favour|catalogue|grey"
+    r"|centre|metre(?!ic)|(?:travel|label|model|cancel|tunnel|signal|level)l(?:ed|ing|er)(?![a-z])"
+)
+
+
+def test_identifiers_have_american_spelling() -> None:
+    """Those of Python and NumPy have: one spelling, so that nobody has to remember which. Prose may be British."""
+    british = {"normalise", "_centre_of_mass", "Randomisation", "travelled", "catalogue", "optimised_twice"}
+    assert all(BRITISH.search(name.lower()) for name in british)
+    assert not any(
+        BRITISH.search(name) for name in ("noise", "precise", "symmetric", "otherwise", "parametric", "level")
+    )
+    files = [file for place in PLACES for file in (ROOT / place).rglob("*.py*") if "__pycache__" not in file.parts]
+    found = {file.name for file in files if BRITISH.search(file.name)}
+    for file in files:
+        if BRITISH.search(file.read_text().lower()):
+            with open(file, "rb") as lines:
+                names = (token.string for token in tokenize.tokenize(lines.readline) if token.type == tokenize.NAME)
+                found |= {f"{file.relative_to(ROOT)}: {name}" for name in names if BRITISH.search(name.lower())}
+    assert found == set()
 
 
 PARTS_OF_TUPLES = {"_replace", "_asdict", "_fields", "_field_defaults", "_make"}  # public, by Python's documentation

@@ -31,7 +31,7 @@ def objects():
     atlas = dojo.models.atlas()
     return [
         *(sim, run, run.contacts, sim.step(x, us[0]), sim.linearize_trajectory(run.x, us), sim.reactions(x, us[0])),
-        *(sim.rollout_batch(np.tile(x, (20, 1)), np.tile(us, (20, 1, 1))), sim.closed_loop(x, us, run.x)),
+        *(sim.rollout_batch(np.tile(x, (20, 1)), np.tile(us, (20, 1, 1))), sim.rollout_feedback(x, us, run.x)),
         *(atlas, *atlas.bodies, *atlas.joints, *atlas.contacts, *atlas.inputs),
         *(mpc, mpc.settings, mpc.policy, mpc.references, plant, loop, loop.log[-1], study, study.outcomes[0]),
         *(plan, plan.problem, *plan.problem.specs[0], *plan.problem.specs[1], dojo.Options(), space),
@@ -39,7 +39,7 @@ def objects():
         *(dojo.cost.Tracking(run.x, np.ones((51, 36))), dojo.cost.Effort(np.ones((50, 12)))),
         *(dojo.constraint.Goal(run.x), dojo.constraint.StateBounds(run.x, run.x)),
         *(dojo.Polytope(np.random.default_rng(0).normal(size=(400, 3))), dojo.Terrain(np.zeros((200, 200)))),
-        dojo.Sampled(run.time, run.x, sim),
+        dojo.SampledReference(run.time, run.x, sim),
     ]
 
 
@@ -64,7 +64,19 @@ def test_tables_for_notebooks_are_short_and_escaped(objects):
 
 
 FIXED = {  # a few numbers each, however large the robot; or nothing that a user gets
-    *("Body", "Contact", "Input", "Joint", "Push", "Link", "Mount", "Touch", "Choices", "UrdfJoint", "UrdfLink"),
+    *(
+        "Body",
+        "Contact",
+        "Input",
+        "Joint",
+        "Push",
+        "Link",
+        "Mount",
+        "ContactCandidate",
+        "Choices",
+        "UrdfJoint",
+        "UrdfLink",
+    ),
     *("Solid", "Box", "Capsule", "Cylinder", "Ellipsoid", "HalfSpace", "Sphere", "String"),
 }
 ARRAYS = ("Floats", "Vector", "Matrix", "Stack", "ArrayLike", "NDArray")

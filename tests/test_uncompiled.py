@@ -12,7 +12,7 @@ import json, warnings, numpy as np, dojo_opt as dojo
 warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's, of divisions by zero that kernels mean
 found = {}
 
-@dojo.kernel
+@dojo.jit
 def error(x):
     return x[1] - 2.0
 

@@ -36,7 +36,7 @@ class MujocoSettings(NamedTuple):
     """How MuJoCo is used."""
 
     step: float = STEP  # [s] longest time step
-    centred: bool = False  # differences
+    centered: bool = False  # differences
     smooth: bool = False  # solimp[0] = 0: a contact that begins has no force yet
 
 
@@ -173,7 +173,7 @@ class MujocoIlqr:
         for t in range(T):
             self._set(xs[t], us[t])
             for i in range(self.substeps):
-                self._mujoco.mjd_transitionFD(model, data, FD_STEP, self._settings.centred, step_A, step_B, None, None)
+                self._mujoco.mjd_transitionFD(model, data, FD_STEP, self._settings.centered, step_A, step_B, None, None)
                 self._mujoco.mj_step(model, data)
                 A[t] = step_A @ A[t] if i else step_A
                 B[t] = step_A @ B[t] + step_B if i else step_B

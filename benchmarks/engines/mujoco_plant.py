@@ -99,8 +99,8 @@ def _scene(sim: Simulator, options: dict[str, str]) -> tuple[Any, dict[frozenset
     spec = mujoco.MjSpec.from_string(mjcf(bare.model, sim.time_step, hinges=False, **options))
     names = sim.mechanism.body_names
     first: dict[str, int] = {}  # number of the first contact point of a collision
-    for k, touch in enumerate(sim.mechanism.touches):
-        first.setdefault(touch.collision, len(sim.mechanism.contacts) + k)
+    for k, candidate in enumerate(sim.mechanism.contact_candidates):
+        first.setdefault(candidate.collision, len(sim.mechanism.contacts) + k)
     pairs = {}
     for k, collision in enumerate(sim.mechanism.collisions):
         geoms = []

@@ -146,8 +146,8 @@ def balanced(feet: Feet, x: Array, path: Array, goal: Array) -> Array:
     x = np.array(x)
     for _ in range(_CORRECTIONS):
         x = feet.place(x, path)
-        centre = np.einsum("b,nbk->nk", mass / mass.sum(), sim.maximal(x)[..., :2])
-        if np.abs(goal - centre).max() < _CLOSE:
+        center = np.einsum("b,nbk->nk", mass / mass.sum(), sim.maximal(x)[..., :2])
+        if np.abs(goal - center).max() < _CLOSE:
             break
-        x[:, :2] += goal - centre
+        x[:, :2] += goal - center
     return np.asarray(x[:, BaseState.POSE])

@@ -84,7 +84,7 @@ class Gait:
             ValueError: the reference cannot be followed at a step.
         """
         sim = self.simulator
-        tau = self._generalised_forces(iterations)
+        tau = self._generalized_forces(iterations)
         feet, B = Feet(sim, self.foot_names), input_map(sim)
         J = feet.jacobian(self.x[1:])  # the forces of a step act at its end
         base = ~B.any(axis=1)
@@ -99,7 +99,7 @@ class Gait:
             us[t] = np.linalg.lstsq(B, left, rcond=None)[0]
         return us
 
-    def _generalised_forces(self, iterations: int) -> Array:
+    def _generalized_forces(self, iterations: int) -> Array:
         """(T, nv) forces that lead from each state to the velocity of the next, without the ground."""
         mech = passive(self.simulator.mechanism)
         joints = [_with_far_stops(j) for j in mech.joints]

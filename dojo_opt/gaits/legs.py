@@ -144,7 +144,7 @@ def _feet_of(mech: Mechanism, given: Any) -> list[Contact]:
             low[contact.body] = min(low.get(contact.body, np.inf), float(at[2]) - contact.radius)
     if not low:
         raise ValueError(f"Legs(robot): no body at the end of the tree of {mech.name!r} has a contact; give feet=...")
-    floor, top = min(low.values()), float(sim.bodies(x[: sim.nq], np.zeros(sim.nv))[0, 2])
+    floor, top = min(low.values()), float(sim.body_states(x[: sim.nq], np.zeros(sim.nv))[0, 2])
     soles = [body for body, height in low.items() if height <= floor + _LOW * max(top - floor, 0.0)]
     out: list[Contact] = []
     for body in soles:
@@ -243,7 +243,7 @@ def _pitching(kin: Kinematics, bodies: dict[str, Joint], body: str, q: Array) ->
 def _origin(sim: Simulator, joint: Joint, x: Array) -> Array:
     """Place of the joint point on the child of a joint."""
     i = sim.mechanism.body_names.index(joint.child)
-    z = sim.bodies(x[: sim.nq], np.zeros(sim.nv))[i]
+    z = sim.body_states(x[: sim.nq], np.zeros(sim.nv))[i]
     w, v = z[BodyState.SCALAR], z[BodyState.VECTOR]
     point = np.asarray(joint.child_point, dtype=float)
     side = np.cross(v, point)

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from dojo_opt.planning.manifold import tangent_layout
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
-from sim.simulator.results import Linearization, Trajectory, path_of
+from sim.simulator.derivative_results import Linearization
+from sim.simulator.results import Trajectory, path_of
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
 

@@ -4,6 +4,7 @@ If Gymnasium is installed, registration.py registers the tasks with it: `gymnasi
 """
 
 from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
 
 from dojo_opt.learn.dojo_tasks import ant_ars, quadruped_sampling, sampled_gait
 from dojo_opt.learn.evaluation import Evaluation, evaluate
@@ -12,7 +13,7 @@ from dojo_opt.learn.imitate import ImitationOptions, imitate
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import PolicyGradient, PolicyRollout, roll_policy_batch
 from dojo_opt.learn.policy_search import GradientSearchOptions, RandomSearchOptions, ars, gradient_search
-from dojo_opt.learn.randomisation import Randomisation
+from dojo_opt.learn.randomization import Randomization
 from dojo_opt.learn.seed_runs import best_of, seeds
 from dojo_opt.learn.shac import ShacOptions, shac
 from dojo_opt.learn.swimmer_task import swimmer
@@ -20,6 +21,17 @@ from dojo_opt.learn.task import Task
 from dojo_opt.learn.training_result import Learned
 from dojo_opt.learn.velocity_task import go2, quadruped, velocity_error
 from dojo_opt.learn.waypoint_tasks import quadrotor, uuv, youbot
+from sim.mechanism.renamed import warn_renamed
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """The old name of a member, until version 0.2."""
+        if name == "Randomisation":
+            warn_renamed("dojo.learn.Randomisation", "dojo.learn.Randomization")
+            return Randomization
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 if find_spec("gymnasium") is not None:
     from dojo_opt.learn.registration import register
@@ -35,7 +47,7 @@ __all__ = [
     "PolicyGradient",
     "PolicyRollout",
     "RandomSearchOptions",
-    "Randomisation",
+    "Randomization",
     "ShacOptions",
     "Task",
     "ant",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from dojo_opt.learn.network import ACTIVATIONS
-from dojo_opt.learn.randomisation import Randomisation
+from dojo_opt.learn.randomization import Randomization
 from sim.mechanism import checks
 
 __all__ = ["check_common"]
@@ -41,5 +41,5 @@ def check_common(call: str, options: Any) -> None:
         raise TypeError(f"{call}(callback=...): expected a function or None, got {checks.shown(o.callback)}")
     if not (o.stream is None or hasattr(o.stream, "write")):
         raise TypeError(f"{call}(stream=...): expected a file or None, got {checks.shown(o.stream)}")
-    if not isinstance(getattr(o, "randomisation", Randomisation()), Randomisation):
-        raise TypeError(f"{call}(randomisation=...): expected a Randomisation, got {checks.shown(o.randomisation)}")
+    if not isinstance(getattr(o, "randomization", Randomization()), Randomization):
+        raise TypeError(f"{call}(randomization=...): expected a Randomization, got {checks.shown(o.randomization)}")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from dojo_opt.planning.residual import kernel
+from dojo_opt.planning.residual import jit
 from sim.io.mjcf.report import MjcfMechanism
 from sim.mechanism import checks
 
@@ -36,7 +36,7 @@ def _touching(seen: Callable[..., Any], size: int, begin: int, groups: int, most
     """An observation of so many numbers, then of the wrenches of so many groups, which are x[begin:]: torques first, as
     MuJoCo's `cfrc_ext`, clipped.
     """
-    seen = kernel(seen)
+    seen = jit(seen)
 
     def observation(x, out):  # type: ignore[no-untyped-def]
         seen(x[:begin], out[:size])
@@ -50,7 +50,7 @@ def _touching(seen: Callable[..., Any], size: int, begin: int, groups: int, most
 
 def _presses(reward: Callable[..., Any], begin: int, weight: float, most: float, limit: float) -> Callable[..., Any]:
     """A reward, minus that of the squares of the clipped wrenches at the end of x', up to a limit."""
-    reward = kernel(reward)
+    reward = jit(reward)
 
     def with_contacts(x, a, after):  # type: ignore[no-untyped-def]
         total = 0.0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.learn.randomisation import Drawn
+from dojo_opt.learn.randomization import Drawn
 from dojo_opt.learn.task import Task
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.monte_carlo import Sampler

@@ -12,6 +12,7 @@ from dojo_opt.learn.task import Task
 from dojo_opt.learn.training_result import Learned, LearningProgress
 from dojo_opt.planning.executors import check_executor
 from sim.mechanism import checks
+from sim.mechanism.renamed import renamed_keywords
 from solvers.status import Status
 
 __all__ = ["learn"]
@@ -30,6 +31,7 @@ def learn(
     name = search.algorithm
     if not isinstance(task, Task):
         raise TypeError(f"{name}(task): expected a Task, got {task!r}")
+    renamed_keywords(name, given, {"randomisation": "randomization"})
     checks.keywords(f"{name}(...)", given, [f.name for f in fields(settings)])
     check_executor(name, executor)
     if not (resume is None or isinstance(resume, Learned)):

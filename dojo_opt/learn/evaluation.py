@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.policy import LearnedPolicy
-from dojo_opt.learn.randomisation import Drawn
+from dojo_opt.learn.randomization import Drawn
 from sim.mechanism.checks import whole_number
 from sim.mechanism.memory_limit import room_for
 from solvers.status import Status

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.learn.contact_observation import contact_fields, model_path
-from dojo_opt.learn.randomisation import Randomisation
+from dojo_opt.learn.randomization import Randomization
 from dojo_opt.learn.survival import within
 from dojo_opt.learn.task import Task, never
 from sim.io.mjcf.load import load_mjcf
@@ -37,7 +37,7 @@ _KAPPA = 1e-4  # [N s m]
 _FASTEST = 10.0  # [m/s, rad/s] observed velocity of hopper and walker
 
 # Models on which policies of the half-cheetah learn to run in other simulators, too.
-TRANSFER = Randomisation(
+TRANSFER = Randomization(
     values={"friction:*": (0.3, 0.5)},
     factors={"spring": (0.8, 1.2), "damper": (0.6, 1.4), "armature": (0.85, 1.15), "mass": (0.9, 1.1)},
     substeps=(2, 2, 3, 5),
@@ -47,14 +47,14 @@ TRANSFER = Randomisation(
 )
 
 # The same for robots that fall: steps of milliseconds carry small impulses, which ask for a small kappa.
-BALANCE = Randomisation(
+BALANCE = Randomization(
     factors={"friction": (0.6, 1.2), "damper": (0.7, 1.3), "armature": (0.9, 1.1), "mass": (0.9, 1.1)},
     substeps=(2, 2, 4),
     kappa=(2e-5, 1e-3),
     noise=0.02,
     by_row=False,
 )
-COARSE = Randomisation(
+COARSE = Randomization(
     factors={"friction": (0.6, 1.2), "damper": (0.7, 1.3), "mass": (0.9, 1.1)},
     substeps=(2, 2, 3),
     kappa=(10.0**-3.5, 1e-2),
@@ -64,10 +64,10 @@ COARSE = Randomisation(
 # Of shac; an evaluation takes as long as several epochs.
 _RARELY: dict[str, Any] = {"environments": 32, "evaluations": 5, "episodes": 4}
 _CHEETAH = {
-    **_RARELY, "epochs": 600, "episode": 128, "rate": 2e-3, "saturation": 0.01, "randomisation": TRANSFER,
+    **_RARELY, "epochs": 600, "episode": 128, "rate": 2e-3, "saturation": 0.01, "randomization": TRANSFER,
 }  # fmt: skip
-_LEGGED = {**_RARELY, "epochs": 800, "horizon": 32, "gamma": 0.997, "randomisation": BALANCE}
-_ANT = {**_RARELY, "epochs": 2100, "episode": 128, "rate": 3e-3, "randomisation": COARSE}
+_LEGGED = {**_RARELY, "epochs": 800, "horizon": 32, "gamma": 0.997, "randomization": BALANCE}
+_ANT = {**_RARELY, "epochs": 2100, "episode": 128, "rate": 3e-3, "randomization": COARSE}
 
 
 def _model(file: str) -> MjcfMechanism:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
-from dojo_opt.learn.randomisation import Drawn, Randomisation
+from dojo_opt.learn.randomization import Drawn, Randomization
 from dojo_opt.learn.task import Task
 from sim.mechanism.short_repr import short_repr
 from solvers.status import Status
@@ -37,7 +37,7 @@ class Noise:
 
     @classmethod
     def draw(
-        cls, rng: np.random.Generator, task: Task, shape: tuple[int, int], deviation: float, given: Randomisation
+        cls, rng: np.random.Generator, task: Task, shape: tuple[int, int], deviation: float, given: Randomization
     ) -> Noise:
         """Normal noise of actions with a deviation, of observations and pushes with those of a randomisation."""
         actions = deviation * rng.standard_normal((*shape, task.sim.nu))

@@ -25,7 +25,7 @@ from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.pair_returns import PairInputs, PairReturns, pair_returns
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import roll_policy_batch
-from dojo_opt.learn.randomisation import Drawn, Models, Randomisation
+from dojo_opt.learn.randomization import Drawn, Models, Randomization
 from dojo_opt.learn.shared_object import Shared
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.training import Training
@@ -54,7 +54,7 @@ class RandomSearchOptions:
         hidden: sizes of hidden layers (default (): a linear policy).
         activation: "tanh" or "elu" (default "tanh").
         shift: number that is subtracted from the reward of every step, to offset the reward of survival (default 0).
-        randomisation: models that the policy learns on (default: that of the task).
+        randomization: models that the policy learns on (default: that of the task).
         evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
         episodes: of an evaluation (default 8).
         time_limit: of the processor time [s] (default inf).
@@ -72,7 +72,7 @@ class RandomSearchOptions:
     hidden: tuple[int, ...] = ()
     activation: str = "tanh"
     shift: float = 0.0
-    randomisation: Randomisation = Randomisation()
+    randomization: Randomization = Randomization()
     evaluations: int = 10
     episodes: int = 8
     time_limit: float = float("inf")
@@ -103,7 +103,7 @@ class GradientSearchOptions:
         activation: "tanh" or "elu" (default "tanh").
         costate: largest length of the costate of a row; longer ones are shortened and counted (default 1e3).
         kappa_grad: smoothing of the derivatives [N s m] (default None: that of the motion).
-        randomisation: models that the policy learns on (default: that of the task).
+        randomization: models that the policy learns on (default: that of the task).
         evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
         episodes: of an evaluation (default 8).
         time_limit: of the processor time [s] (default inf).
@@ -120,7 +120,7 @@ class GradientSearchOptions:
     activation: str = "tanh"
     costate: float = 1e3
     kappa_grad: float | None = None
-    randomisation: Randomisation = Randomisation()
+    randomization: Randomization = Randomization()
     evaluations: int = 10
     episodes: int = 8
     time_limit: float = float("inf")
@@ -140,7 +140,7 @@ class WeightSearch(Training):
 
     def __init__(self, task: Task, options: Any, seed: int) -> None:
         super().__init__(task, options, seed)
-        self.models = Models(task, options.randomisation, np.random.default_rng((seed, 3)))
+        self.models = Models(task, options.randomization, np.random.default_rng((seed, 3)))
         network = Network((task.observations, *options.hidden, task.sim.nu), options.activation)
         n = task.observations
         weights = network.start(np.random.default_rng((seed, 0)), 0.1) if options.hidden else np.zeros(network.count)

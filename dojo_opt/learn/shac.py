@@ -25,7 +25,7 @@ from dojo_opt.learn.network import Adam, Network, clipped
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import Noise, PolicyRollout, roll_policy_batch, value_network
-from dojo_opt.learn.randomisation import Models, Randomisation
+from dojo_opt.learn.randomization import Models, Randomization
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.training import Training
 from dojo_opt.learn.training_result import Learned
@@ -60,14 +60,13 @@ class ShacOptions:
         betas: of Adam (default (0.7, 0.95)).
         norm: largest length of the gradient (default 1).
         costate: largest length of the costate of a row; longer ones are shortened and counted (default 100).
-        saturation: cost of outputs y of the network beyond 1.5, this times (|y| - 1.5)^2 in each step: squashed to
-            actions of nearly 1, they have hardly a derivative, and a policy cannot unlearn an action there
-            (default 0).
+        saturation: cost of outputs y of the network beyond 1.5, this times (|y| - 1.5)^2 in each step: near
+            saturation the gradient of the squashed action vanishes, and the policy cannot recover (default 0).
         deviation: first and last standard deviation of the noise of actions, before they are squashed (default .4, .3).
         passes: passes of the critic over the data of an epoch (default 4).
         batches: minibatches per pass (default 4).
         blend: share of the critic in its target network after an epoch (default 0.3).
-        randomisation: models that the policy learns on (default: that of the task).
+        randomization: models that the policy learns on (default: that of the task).
         kappa_grad: smoothing of the derivatives [N s m] (default None: that of the motion).
         start: policy to begin with, of `imitate` or another run; it brings its network and scaling (default None).
         evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
@@ -96,7 +95,7 @@ class ShacOptions:
     passes: int = 4
     batches: int = 4
     blend: float = 0.3
-    randomisation: Randomisation = Randomisation()
+    randomization: Randomization = Randomization()
     kappa_grad: float | None = None
     start: LearnedPolicy | None = None
     evaluations: int = 10
@@ -136,7 +135,7 @@ class _Shac(Training):
         super().__init__(task, options, seed)
         o, rng = options, np.random.default_rng((seed, 0))
         self.restarts = np.random.default_rng((seed, 2))
-        self.models = Models(task, o.randomisation, np.random.default_rng((seed, 3)))
+        self.models = Models(task, o.randomization, np.random.default_rng((seed, 3)))
         network = Network((task.observations, *o.hidden, task.sim.nu), o.activation)
         self.critic = value_network(task, o.hidden, o.activation)
         self.policy = LearnedPolicy(network, network.start(rng, 0.1), *self._scale(None), task)
@@ -152,7 +151,7 @@ class _Shac(Training):
             self.statistics.sums[2] = _KNOWN
             self.policy.mean, self.policy.deviation = self._scale(self.statistics)
         self.x = task.starts([self.restarts] * o.environments)
-        self.delays = ActionDelay(max(o.randomisation.delays, default=0), o.environments, task.sim.nu)
+        self.delays = ActionDelay(max(o.randomization.delays, default=0), o.environments, task.sim.nu)
         self.limit = task.steps if o.episode is None else min(o.episode, task.steps)
         self.age = self.restarts.integers(self.limit, size=o.environments)
         self.running, self.known = np.zeros(o.environments), np.zeros(o.environments, dtype=np.bool_)
@@ -199,7 +198,7 @@ class _Shac(Training):
         share = self.epoch / o.epochs
         deviation = o.deviation[0] + share * (o.deviation[1] - o.deviation[0])
         drawn = self.models.draw(self.rng, n)
-        noise = Noise.draw(self.rng, self.task, (o.horizon, n), deviation, o.randomisation)
+        noise = Noise.draw(self.rng, self.task, (o.horizon, n), deviation, o.randomization)
         roll = roll_policy_batch(
             self.policy, self.x, o.horizon, drawn=drawn, noise=noise, slopes=True,
             kappa_grad=o.kappa_grad, delays=self.delays, restart=self.restart,

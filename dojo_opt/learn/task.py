@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.planning.function_fingerprint import fingerprint
 from dojo_opt.planning.manifold import displace, tangent_layout
-from dojo_opt.planning.residual import kernel
+from dojo_opt.planning.residual import jit
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.contact_groups import ContactGroups
@@ -134,7 +134,7 @@ def _loop(make: Callable[..., Any], *functions: Callable[..., Any]) -> Any:
     """The loop around functions; those that compile to the same code share it."""
     key = make, tuple(fingerprint(function) for function in functions)
     if key not in _loops:
-        _loops[key] = make(*(kernel(function) for function in functions))
+        _loops[key] = make(*(jit(function) for function in functions))
         if len(_loops) > _KEPT:
             _loops.popitem(last=False)
     _loops.move_to_end(key)
@@ -145,7 +145,7 @@ def _loop(make: Callable[..., Any], *functions: Callable[..., Any]) -> Any:
 class Task:
     """The observations and the reward of a policy, and the ends of episodes. Actions are in [-1, 1].
 
-    The functions are compiled, as by `dojo.kernel`, and differentiated by central differences on the manifold of
+    The functions are compiled, as by `dojo.jit`, and differentiated by central differences on the manifold of
     states; they must not write into their arguments other than `out`. With a command, such as a velocity to keep, the
     state x of the task is that of the simulator, followed by the command: x[sim.nx:]. The forces of contacts come last:
     for each of the `touch` groups (6,), force [N] and torque about the centre of mass [N m], world axes, in the time

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.learn.randomisation import Drawn
+from dojo_opt.learn.randomization import Drawn
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
 from sim.mechanism.memory_limit import room_for

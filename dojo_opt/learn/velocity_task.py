@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.learn.randomisation import Randomisation
+from dojo_opt.learn.randomization import Randomization
 from dojo_opt.learn.task import Task
 from dojo_opt.models.quadruped import quadruped as default_quadruped
-from dojo_opt.planning.residual import kernel
+from dojo_opt.planning.residual import jit
 from sim.io.urdf.load import load_urdf
 from sim.mechanism import checks
 from sim.mechanism.contact import Contact
@@ -38,7 +38,7 @@ _GO2_FOOT = 0.022  # radius of Go2's feet [m], which its file has as meshes
 _GO2_STANCE = {"hip": 0.0, "thigh": 0.8, "calf": -1.5}  # [rad]
 
 # Models on which policies of quadrupeds learn: slippery and rough ground, heavier and lighter bodies, pushes.
-WALKING = Randomisation(
+WALKING = Randomization(
     values={"friction:*": (0.4, 1.0)},
     factors={"mass": (0.9, 1.2), "damper": (0.8, 1.2)},
     substeps=(2, 2, 3),
@@ -49,7 +49,7 @@ WALKING = Randomisation(
 )
 
 
-@kernel
+@jit
 def in_body(q, x, y, z):  # type: ignore[no-untyped-def]
     """R(q)^T (x, y, z) of a unit quaternion (w, x, y, z), as three numbers: arrays would be allocated."""
     w, a, b, c = q[0], -q[1], -q[2], -q[3]
@@ -57,14 +57,14 @@ def in_body(q, x, y, z):  # type: ignore[no-untyped-def]
     return x + w * tx + b * tz - c * ty, y + w * ty + c * tx - a * tz, z + w * tz + a * ty - b * tx
 
 
-@kernel
+@jit
 def upright(x):  # type: ignore[no-untyped-def]
     """Cosine of the angle between the vertical axis of a floating base and the vertical."""
     q = x[_TURN:_JOINTS]
     return 1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2)
 
 
-@kernel
+@jit
 def distance(error, width):  # type: ignore[no-untyped-def]
     """|error|, smooth within the width, and 0 at 0."""
     return np.sqrt(error * error + width * width) - width
@@ -198,7 +198,7 @@ def quadruped(
         command=lambda rng: rng.uniform(-limits, limits), hold=_HOLD,
         settings={
             "epochs": 1400, "environments": 32, "horizon": 24, "rate": 2e-3, "evaluations": 5, "episodes": 16,
-            "randomisation": WALKING,
+            "randomization": WALKING,
         },
     )  # fmt: skip
 

@@ -14,7 +14,7 @@ from dojo_opt.learn.velocity_task import distance, in_body, upright
 from dojo_opt.models.quadrotor import quadrotor as quadrotor_model
 from dojo_opt.models.uuv import uuv as uuv_model
 from dojo_opt.models.youbot import youbot as youbot_model
-from dojo_opt.planning.residual import kernel
+from dojo_opt.planning.residual import jit
 from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
@@ -32,13 +32,13 @@ _QUICK: dict[str, Any] = {
 }  # fmt: skip
 
 
-@kernel
+@jit
 def way(x, y, z):  # type: ignore[no-untyped-def]
     """Length of a vector."""
     return np.sqrt(x * x + y * y + z * z)
 
 
-@kernel
+@jit
 def _rest_of_way(x):  # type: ignore[no-untyped-def]
     """Distance of a rigid body from its waypoint."""
     goal = x[_GOAL:]

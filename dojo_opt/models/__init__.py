@@ -1,6 +1,6 @@
 """Ready-made mechanisms, under the names that Dojo uses: one builder per file, keyword parameters with defaults.
 
-`catalogue()` lists them with their sizes. `box` and `box2d` are older names of `block` and `block2d`.
+`catalog()` lists them with their sizes. `box` and `box2d` are older names of `block` and `block2d`.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,7 @@ from dojo_opt.models.atlas import atlas
 from dojo_opt.models.block import block
 from dojo_opt.models.block2d import block2d
 from dojo_opt.models.cartpole import cartpole
-from dojo_opt.models.catalogue import Entry, entry
+from dojo_opt.models.catalog import Entry, entry
 from dojo_opt.models.delta import delta
 from dojo_opt.models.double_pendulum import double_pendulum
 from dojo_opt.models.dzhanibekov import dzhanibekov
@@ -42,6 +42,7 @@ from dojo_opt.models.uuv import uuv
 from dojo_opt.models.walker import walker
 from dojo_opt.models.youbot import youbot
 from sim.mechanism.checks import nearest
+from sim.mechanism.renamed import warn_renamed
 
 __all__ = [
     "acrobot",
@@ -84,7 +85,7 @@ __all__ = [
 box, box2d = block, block2d
 
 
-def catalogue() -> list[Entry]:
+def catalog() -> list[Entry]:
     """All models with their sizes, sorted by name.
 
     Returns:
@@ -96,5 +97,8 @@ def catalogue() -> list[Entry]:
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
-        """A name that is not there, with the ones that are."""
+        """A model that is not there, with the ones that are, or an old name, until version 0.2."""
+        if name == "catalogue":
+            warn_renamed("dojo.models.catalogue", "dojo.models.catalog")
+            return catalog
         raise AttributeError(f"dojo_opt.models has no {name!r}; there are {', '.join(__all__)}{nearest(name, __all__)}")

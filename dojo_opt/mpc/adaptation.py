@@ -1,6 +1,7 @@
 """Adaptation: parameters of the model, estimated from measurements while the controller runs.
 
-An extended Kalman filter of the parameters theta. It measures the states x and x+ at both ends of an interval:
+An extended Kalman filter of the parameters theta. Its measurement is the pair of states x and x+ at both ends of an
+interval:
 
     theta+ = theta + w,    w ~ N(0, P0 dt/memory)
     r = x+ (-) f(x, u; theta) = J (theta+ - theta) + e,    e ~ N(0, R + A R A')
@@ -25,6 +26,7 @@ from dojo_opt.identification.windows import slopes_along
 from dojo_opt.mpc.ground_estimate import Ground
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
+from sim.simulator.adjustable_simulator import AdjustableSimulator
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -90,7 +92,9 @@ class ParameterEstimator:
         ValueError: for an unknown parameter, or noise of the wrong shape.
     """
 
-    def __init__(self, nominal: Simulator, planner: Simulator, settings: Adaptation, friction: float = np.inf) -> None:
+    def __init__(
+        self, nominal: Simulator, planner: AdjustableSimulator, settings: Adaptation, friction: float = np.inf
+    ) -> None:
         self._nominal, self._planner, self._settings, self._friction = nominal, planner, settings, friction
         self.space = ParameterSpace(nominal, settings.parameters, bounds=settings.bounds)
         noise = checks.array("Adaptation(noise=...)", settings.noise, (None,))
@@ -101,7 +105,7 @@ class ParameterEstimator:
         self._noise = np.maximum(noise, _ROUND_OFF) ** 2
         self._near = max(_CLOSE, _NEAR * float(noise[: nominal.nv].max()))
         self._prior = self._spread() ** 2
-        self._fine: Simulator | None = None  # with steps of the length of the samples
+        self._fine: AdjustableSimulator | None = None  # with steps of the length of the samples
         self._written = self.space.values.copy()  # the values of the models
         self.forget()
 
@@ -154,14 +158,14 @@ class ParameterEstimator:
             self._update(ground)
             del samples[:-1]
 
-    def _model(self) -> Simulator | None:
+    def _model(self) -> AdjustableSimulator | None:
         """The model with steps of the length of the samples; None where they come at uneven times."""
         times = np.diff([time for time, *_ in self._samples])
         h = float(times.mean())
         if np.abs(times - h).max() > _ROUNDING:
             return None
         if self._fine is None or abs(self._fine.time_step - h) > _ROUNDING:
-            self._fine = self._nominal.replace(time_step=h, kappa=None)
+            self._fine = AdjustableSimulator.like(self._nominal.replace(time_step=h, kappa=None))
             self._fine.set_parameters(self.space.named(self._written))
         return self._fine
 
@@ -179,13 +183,13 @@ class ParameterEstimator:
             return
         end, A, J = found
         innovation, inflation = fine.difference(self._samples[-1][1], end), _CURVED
-        size = self._normalised(innovation, A, J)
+        size = self._normalized(innovation, A, J)
         if size > _OUTLIER:  # a foot that sticks in the model says nothing of friction
             smooth = self._planner.kappa * fine.time_step / self._planner.time_step
             found = self._predict(fine, x, us, smooth)
             if found is not None:
                 J, inflation = found[2], 1.0
-                size = self._normalised(innovation, A, J)
+                size = self._normalized(innovation, A, J)
         self._correct(innovation, A, J, size, inflation)
         if np.any(np.abs(self.theta - self._written) > _MOVED * np.sqrt(self._prior)):
             self._write()
@@ -209,7 +213,7 @@ class ParameterEstimator:
         """Its two parts: R + A R A' of the measured states, and J P J' of the parameters."""
         return np.diag(self._noise) + (A * self._noise) @ A.T, J @ self.covariance @ J.T
 
-    def _normalised(self, innovation: Vector, A: Matrix, J: Matrix) -> float:
+    def _normalized(self, innovation: Vector, A: Matrix, J: Matrix) -> float:
         """Root mean square of an innovation in standard deviations."""
         r = self._at_estimate(innovation, J)
         return float(np.sqrt(r @ np.linalg.solve(sum(self._innovation_covariance(A, J)), r) / len(r)))
@@ -218,7 +222,7 @@ class ParameterEstimator:
         """Update estimate and covariance.
 
         innovation: measured (-) predicted state
-        size: `_normalised` of it
+        size: `_normalized` of it
         inflation: share of the change of the estimate that is added to its standard deviation, as J is the derivative
             at another point, or of smoothed contact
         """
@@ -240,7 +244,7 @@ class ParameterEstimator:
         after = ground.gaps(ground.points(np.stack(ends)))
         return bool(np.any((gaps > self._near) & (after < self._near)))
 
-    def _stand(self, fine: Simulator, ground: Ground, gaps: Vector) -> None:
+    def _stand(self, fine: AdjustableSimulator, ground: Ground, gaps: Vector) -> None:
         """Put the ground of the model under every contact that stands: its gap is that of a noisy state."""
         if ground.normal is not None:
             fine.turn_ground(ground.normal)

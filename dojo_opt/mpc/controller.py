@@ -18,7 +18,8 @@ from dojo_opt.mpc.policy import Policy
 from dojo_opt.mpc.receding_horizon import shift_multipliers, tail
 from dojo_opt.mpc.servo import ModelServo, Servo
 from dojo_opt.mpc.settings import MPCSettings
-from dojo_opt.planning.ilqr import Iterate, Iteration, Solver
+from dojo_opt.planning.ilqr import Solver
+from dojo_opt.planning.iterate import Iterate, Iteration
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.term import StateTerm
@@ -28,6 +29,7 @@ from dojo_opt.plant.tick import Tick
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
+from sim.simulator.adjustable_simulator import AdjustableSimulator
 from solvers.status import Status
 
 Vector = NDArray[np.float64]
@@ -80,8 +82,8 @@ class MPC:
         self._again = partial(MPC, problem, iterations, reference=reference, plan=plan, **settings)
         friction = {} if self.settings.friction is None else {"friction": self.settings.friction}
         self.nominal = problem.sim  # the simulator that plants are made from
-        self.problem = problem.with_own_terms(**friction)
-        self.sim = self.problem.sim  # the model that plans are made with
+        self.sim = AdjustableSimulator.like(problem.sim.replace(**friction))  # the model that plans are made with
+        self.problem = problem.with_own_terms(self.sim)
         self.start = problem.start.copy()  # (nx,) where the problem starts, and a plant may
         self.period = float(self.settings.period or self.problem.knot_time)
         self._solver = Solver(self.problem, self.settings.planner(iterations))
@@ -250,7 +252,7 @@ class MPC:
         if after is not None and after.gaps is None:  # the violations of an inconsistent trajectory say little
             solver.update_multipliers(after)
         taken = after is not None
-        if after is None and result.status in (Status.SOLVED, Status.LINE_SEARCH):
+        if after is None and (result.success or result.status == Status.LINE_SEARCH):
             after = self._rolled(guess, result.K)
         if after is not None:
             made = self._policy(now, after.x, after.u, result.K.copy())
@@ -277,7 +279,7 @@ class MPC:
 
         Without an accepted step it is a rollout of the guess, which may have fallen.
         """
-        ended = result.status in (Status.SOLVED, Status.LINE_SEARCH, Status.TIME_LIMIT)
+        ended = result.success or result.status in (Status.LINE_SEARCH, Status.TIME_LIMIT)
         stepped = any(record["alpha"] > 0.0 for record in result.history)
         near = stepped or _near(result.now, guess)
         return ended and bool(np.isfinite(result.now.merit)) and result.consistent and near

@@ -9,7 +9,7 @@ from dojo_opt.mpc.policy import Policy
 from dojo_opt.planning.manifold import cross
 from dojo_opt.plant.ground_plane import GroundPlane
 from sim.model.state_columns import BodyState
-from sim.simulator.simulator import Simulator
+from sim.simulator.adjustable_simulator import AdjustableSimulator
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -36,10 +36,10 @@ class Ground:
 
         min  sum_i w_i (z_i - z(p_i))^2 + s |slope - slope before|^2,   w_i = exp(-age/.5 s)
 
-    It writes into the model of this simulator, so give it one of its own (`sim.replace()`).
+    It writes into the model of this simulator.
 
     Args:
-        sim: the simulator.
+        sim: the simulator, of its own.
         kappa: smoothing of the plans, if the contacts are on one plane whose slope is to be learnt, too: a foot that
             stands in a plan floats at kappa over its impulse [N s m] (default None: only heights are learnt).
 
@@ -47,7 +47,7 @@ class Ground:
         ValueError: the slope is to be learnt of a robot that does not float, or on ground that is no level plane.
     """
 
-    def __init__(self, sim: Simulator, kappa: float | None = None) -> None:
+    def __init__(self, sim: AdjustableSimulator, kappa: float | None = None) -> None:
         self._sim = sim
         contacts = sim.mechanism.contacts
         names = sim.mechanism.body_names
@@ -127,8 +127,8 @@ class Ground:
         """Distances of the points (..., ncontact, 3) of the contacts from their ground, (..., ncontact) [m]."""
         out = np.asarray((self._normal * points).sum(axis=-1) - self.height)
         for k, surface in self._surfaces:  # vertically: the height that is learnt is added to it
-            centres = points[..., k, :] + self._radius[k] * self._normal[k]
-            out[..., k] = centres[..., 2] - surface.height(centres[..., 0], centres[..., 1]) - self.height[k]
+            centers = points[..., k, :] + self._radius[k] * self._normal[k]
+            out[..., k] = centers[..., 2] - surface.height(centers[..., 0], centers[..., 1]) - self.height[k]
         return out
 
     def touching(self, x: Vector) -> tuple[str, ...]:

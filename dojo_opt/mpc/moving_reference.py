@@ -22,10 +22,10 @@ Moving = Callable[[Any], ArrayLike]  # times (n,) [s] -> rows (n, nx) or (n, nu)
 
 _ROUNDING = 1e-9  # laps: times are sums of floating-point steps
 
-__all__ = ["Onward", "References", "Sampled"]
+__all__ = ["AnchoredReference", "References", "SampledReference"]
 
 
-class Sampled:
+class SampledReference:
     """A trajectory as a function of time: interpolated between its rows, constant after the last one.
 
     Rows that are states of a simulator are interpolated on their manifold. With a `cycle`, the trajectory is periodic:
@@ -45,15 +45,15 @@ class Sampled:
     def __init__(
         self, time: ArrayLike, rows: ArrayLike, sim: Simulator | None = None, cycle: ArrayLike | None = None
     ) -> None:
-        self.time = checks.array("Sampled(time)", time, (None,))
+        self.time = checks.array("SampledReference(time)", time, (None,))
         width = None if sim is None else sim.nx
-        self.rows = checks.array("Sampled(rows)", rows, (len(self.time), width))
+        self.rows = checks.array("SampledReference(rows)", rows, (len(self.time), width))
         if len(self.time) < 2 or np.any(np.diff(self.time) <= 0.0):
-            raise ValueError("Sampled(time): expected at least two increasing times")
+            raise ValueError("SampledReference(time): expected at least two increasing times")
         self._sim = sim
         self._steps = np.diff(self.rows, axis=0) if sim is None else sim.difference(self.rows[1:], self.rows[:-1])
         size = self.rows.shape[1] if sim is None else sim.ndx
-        self.cycle = None if cycle is None else checks.array("Sampled(cycle=...)", cycle, (size,))
+        self.cycle = None if cycle is None else checks.array("SampledReference(cycle=...)", cycle, (size,))
         self._one_move = sim is not None and self.cycle is not None and self._commutes(sim, self.cycle)
 
     def _commutes(self, sim: Simulator, cycle: Vector) -> bool:
@@ -89,7 +89,7 @@ class Sampled:
             return self._sim.integrate(before, step + laps[:, None] * self.cycle)
         return self._sim.integrate(self._sim.integrate(before, step), laps[:, None] * self.cycle)
 
-    def over(self, interval: float) -> Sampled:
+    def with_mean_velocities(self, interval: float) -> SampledReference:
         """The same states with their mean velocities over an interval, such as the time step of a model.
 
         A finely sampled gait has exact touchdowns, but the velocities of its own short steps.
@@ -105,16 +105,17 @@ class Sampled:
         """
         if self._sim is None or self.cycle is None:
             raise ValueError(
-                "Sampled.over: expected states (sim=...) and a cycle, which give the state before the first row"
+                "SampledReference.with_mean_velocities: expected states (sim=...) and a cycle, which give the state "
+                "before the first row"
             )
-        sim, h = self._sim, checks.number("Sampled.over(interval)", interval, above=0.0)
+        sim, h = self._sim, checks.number("SampledReference.with_mean_velocities(interval)", interval, above=0.0)
         then = self(self.time - h)
         rows = self.rows.copy()
         rows[:, sim.nq :] = sim.difference(rows, then)[:, : sim.nv] / h
-        return Sampled(self.time, rows, sim, self.cycle)
+        return SampledReference(self.time, rows, sim, self.cycle)
 
 
-class Onward:
+class AnchoredReference:
     """A reference anchored at the measured state: a constant velocity, or a ramp that restarts with every plan.
 
         x(t) = begin + (end - begin) min(s, 1),  s = (t - t0) / duration,  on the manifold
@@ -137,13 +138,13 @@ class Onward:
     def __init__(
         self, sim: Simulator, begin: ArrayLike, end: ArrayLike | None = None, duration: float = 1.0, anchored: Any = ()
     ) -> None:
-        self.begin = checks.array("Onward(begin)", begin, (sim.nx,))
-        self._end = self.begin if end is None else checks.array("Onward(end=...)", end, (sim.nx,))
-        self._duration = checks.number("Onward(duration=...)", duration, above=0.0)
+        self.begin = checks.array("AnchoredReference(begin)", begin, (sim.nx,))
+        self._end = self.begin if end is None else checks.array("AnchoredReference(end=...)", end, (sim.nx,))
+        self._duration = checks.number("AnchoredReference(duration=...)", duration, above=0.0)
         self._step = sim.difference(self._end, self.begin)
         self._on = np.zeros(sim.ndx, dtype=bool)
         if np.size(anchored):
-            self._on[chosen_components("Onward(anchored=...)", anchored, sim)] = True
+            self._on[chosen_components("AnchoredReference(anchored=...)", anchored, sim)] = True
         self._sim = sim
         self.anchor(0.0, self.begin)
 
@@ -177,7 +178,8 @@ class References:
 
     A function takes times (n,) [s] and returns rows (n, nx) or (n, nu). A trajectory is an array of rows one knot
     apart, or an object with `x` (n, nx) and `time` (n,), such as a plan. Both start at time zero. If a function has a
-    method anchor(time, x), as `Onward` has, it is called with the beginning of each horizon and the state there.
+    method anchor(time, x), as `AnchoredReference` has, it is called with the beginning of each horizon and the state
+    there.
 
     Args:
         problem: the problem; the references of its terms are overwritten.
@@ -221,9 +223,9 @@ class References:
         if callable(value):
             return value
         if hasattr(value, "x") and hasattr(value, "time"):
-            return Sampled(value.time, value.x, self._sim)
+            return SampledReference(value.time, value.x, self._sim)
         rows = checks.array(call, value, (None, self._sim.nx if of_states else self._sim.nu))
-        return Sampled(self._h * np.arange(len(rows)), rows, self._sim if of_states else None)
+        return SampledReference(self._h * np.arange(len(rows)), rows, self._sim if of_states else None)
 
     def _call_checked(self, time: float) -> None:
         """Check once that every function returns rows of the shape of its reference."""

@@ -14,7 +14,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.short_repr import short_repr
 
 # penalties that grew with every tick would never stop; a second line search would take its time
-OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6, shooting=0.0)
+OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6, multiple_shooting_below=0.0)
 GUESSES = ("states", "feedback", "open loop")
 
 __all__ = ["GUESSES", "OPTIONS", "MPCSettings"]

@@ -21,41 +21,44 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.planning.executors import check_executor
-from dojo_opt.planning.ilqr_search import Iterate, Search
+from dojo_opt.planning.ilqr_search import Search
 from dojo_opt.planning.ilqr_start import FreeStart, at_rest, fitting_stage, periodic_gains
+from dojo_opt.planning.iterate import Iterate, Iteration
 from dojo_opt.planning.multi_start import multi_start
 from dojo_opt.planning.objective import Objective
-from dojo_opt.planning.options import Options, Stage
+from dojo_opt.planning.options import RENAMED, Options, Stage
 from dojo_opt.planning.plan import History, Plan
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.subproblem import Subproblem
 from sim.mechanism import checks
-from sim.simulator.results import Interrupted, Linearization
+from sim.mechanism.renamed import renamed_keywords
+from sim.simulator.derivative_results import Linearization
+from sim.simulator.results import Interrupted
 from solvers.riccati import PredictedChange
 from solvers.status import MESSAGES, Status
 
 Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
 
-__all__ = ["Iteration", "Iterate", "Solver", "ilqr"]
+__all__ = ["Solver", "ilqr"]
 
 # ends of an attempt after which another first stage may lead further; all others end the solve
 FAILED = (Status.SIMULATION_FAILED, Status.INFEASIBLE, Status.LINE_SEARCH, Status.MAX_REGULARIZATION, Status.NOT_FINITE)
 
-_LESS = 0.9  # share of the least violation so far that counts as progress
+_PROGRESS = 0.9  # share of the least violation so far that counts as progress
 _STALLED = 5  # multiplier updates of the last stage without progress
 _SOFTEN = 3  # times that a stuck last stage may go back to the one before it
 _GOOD_STEP = 0.5  # a step at least this long lowers the regularisation
 _POOR_STEP = 0.1  # one shorter than this raises it
-_LIGHT = 1.0  # regularisation up to the control weight: a small prediction then means an optimum
-_SLOW = 2  # short steps in a row with next to no decrease end a stage
-_SLOW_OPEN = 6  # the same with open gaps and a model that predicts more: standing still is a poor guess of a trot
+_MU_OF_AN_OPTIMUM = 1.0  # regularisation up to the control weight: a small prediction then means an optimum
+_MAX_SLOW_STEPS = 2  # short steps in a row with next to no decrease end a stage
+_MAX_SLOW_STEPS_OPEN = 6  # likewise with open gaps if more is predicted, as from a standing guess of a trot
 _SHARPER = 0.1  # factor of kappa_grad when its derivatives lead nowhere
 _PATIENCE = 3  # times the rejections allowed where only regularisation is left to try
-_CREEPING = 15  # short or rejected steps in a row: of 116 planned gaits and hops, none takes more than 11
-_FIRM = 10.0  # regularisation above which short steps no longer raise it while gaps are open
-_FALLEN = 3.0  # times the merit: a rollout that closes gaps at this price has lost the trajectory
-_SMALL = 1e-9  # merit below which changes are judged absolutely
+_MAX_SHORT_STEPS = 15  # short or rejected steps in a row: of 116 planned gaits and hops, none takes more than 11
+_MAX_MU_WITH_OPEN_GAPS = 10.0  # regularisation above which short steps no longer raise it while gaps are open
+_LOST = 3.0  # times the merit: a rollout that closes gaps at this price has lost the trajectory
+_LEAST_MERIT = 1e-9  # merit below which changes are judged absolutely
 
 
 def ilqr(
@@ -102,6 +105,7 @@ def ilqr(
         ValueError: for a guess of the wrong shape, or with numbers that are not finite.
         Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the Plan of the last iteration, INTERRUPTED.
     """
+    renamed_keywords("ilqr", settings, RENAMED)
     checks.keywords("ilqr(...)", settings, Options.__dataclass_fields__)
     if options is not None and not isinstance(options, Options):
         raise TypeError(f"ilqr(options=...): expected Options, got {options!r}")
@@ -126,32 +130,6 @@ def ilqr(
     both = replace(last, nit=plan.nit + last.nit, history=history, seconds=seconds)
     options.say(f"{plan.nit} + {last.nit} iterations, {1e3 * seconds:.1f} ms in all")
     return both
-
-
-class Iteration(NamedTuple):
-    """Result of `Solver.iterate`."""
-
-    status: Status  # SOLVED: the stage converged or used all its iterations; LINE_SEARCH: stuck
-    message: str
-    now: Iterate  # the trajectory that was reached
-    K: Stack  # (T, nu, ndx) gains of the last backward pass
-    k: Matrix  # (T, nu) step that it proposes
-    history: list[dict[str, Any]]  # one record per iteration, as in `Plan.history`
-
-    @property
-    def success(self) -> bool:
-        """Whether the stage was not cut short."""
-        return self.status == Status.SOLVED
-
-    @property
-    def alpha(self) -> float:
-        """Last step size; 0 after a rejected step, 1 when no iteration was needed."""
-        return float(self.history[-1]["alpha"]) if self.history else 1.0
-
-    @property
-    def consistent(self) -> bool:
-        """Whether a step was accepted, or the trajectory has no gaps: not a guess handed back."""
-        return self.now.gaps is None or any(record["alpha"] > 0.0 for record in self.history)
 
 
 class _Attempt(NamedTuple):
@@ -185,6 +163,7 @@ class Solver:
         self._subproblem = Subproblem(problem, self._horizon, self.objective, self.options, start)
         self._history = History(self.options)
         self._begun = False  # whether `now` belongs to the present solve
+        self._converged = False  # whether the last stage ended by its decrease, not by its number of iterations
 
     # ---- single iterations ------------------------------------------------------------------------------------------
 
@@ -201,7 +180,7 @@ class Solver:
     @property
     def regularization(self) -> float:
         """The present regularisation, in units of the mean control weight."""
-        return self._subproblem.damping.mu
+        return self._subproblem.schedule.mu
 
     def states(self, call: str, xs: ArrayLike) -> Matrix:
         """A copy of the states xs (..., nx) with unit quaternions; a ValueError names the call."""
@@ -220,7 +199,7 @@ class Solver:
         """
         kappa = self.options.stages[0].kappa_eval
         shot = self._search.rollout(now, K, kappa)
-        return self._search.iterate(shot, None, kappa) if shot.status == Status.SOLVED else None
+        return self._search.iterate_of(shot, None, kappa) if shot.status == Status.SOLVED else None
 
     def iterate(self, now: Iterate, K: Stack | None = None, *, began: float | None = None) -> Iteration:
         """Iterate from a trajectory, as often as the first stage of the options allows.
@@ -240,7 +219,7 @@ class Solver:
         local.k.fill(0.0)
         local.detail = ""
         self._begin(now)
-        status = self._iterate(self.options.stages[0])
+        status = self._converged_or_used_up(self._iterate(self.options.stages[0]))
         message = MESSAGES[status] + ("" if status == Status.SOLVED else local.detail)
         return Iteration(status, message, self.now, local.K, local.k, self._history.records)
 
@@ -286,8 +265,8 @@ class Solver:
         if shot.status != Status.SOLVED:
             self._begin(idle._replace(kappa=kappa))
             reason = Status(int(shot.status))
-            return Status.SIMULATION_FAILED, f" Knot {int(shot.knot)}, {reason.name}: {MESSAGES[reason]}"
-        self._begin(self._search.iterate(shot, None, kappa))
+            return Status.SIMULATION_FAILED, f" Knot {int(shot.solved_knots)}, {reason.name}: {MESSAGES[reason]}"
+        self._begin(self._search.iterate_of(shot, None, kappa))
         return self._attempts(duals)
 
     def _begin(self, now: Iterate) -> None:
@@ -315,7 +294,7 @@ class Solver:
                 self._history.note(f"k_eval {skipped} skipped: the guess of states fits {kappas[first]} best")
             status = self._descend(first)
             ends.append(self._ended(status))
-            if status not in FAILED or ends[-1].mismatch <= self.options.violation:
+            if status not in FAILED or ends[-1].mismatch <= self.options.violation_tolerance:
                 return status, "" if status == Status.SOLVED else self._subproblem.detail
         best = min(ends, key=lambda end: end.mismatch)
         if best is not ends[-1]:
@@ -367,9 +346,9 @@ class Solver:
             now = self.now
             if index == last:
                 mismatch = self.objective.mismatch(now.x, now.u)
-                if mismatch <= options.violation and now.gap <= options.gap:
-                    return status
-                stalled = 0 if mismatch < _LESS * least else stalled + 1
+                if mismatch <= options.violation_tolerance and now.gap <= options.gap_tolerance:
+                    return self._converged_or_used_up(status)
+                stalled = 0 if mismatch < _PROGRESS * least else stalled + 1
                 least = min(least, mismatch)
                 if stalled >= _STALLED:
                     return Status.INFEASIBLE
@@ -389,7 +368,7 @@ class Solver:
     def _stage(self, stage: Stage, bisections: int) -> Status:
         """One stage; when the trajectory does not survive the step of kappa, by way of the geometric mean."""
         kappa = self.now.kappa
-        if self.options.reopen == "feedback" and bisections > 0 and kappa is not None:
+        if self.options.on_kappa_change == "feedback" and bisections > 0 and kappa is not None:
             if not self._follow(stage.kappa_eval):
                 middle = (kappa * stage.kappa_eval) ** 0.5
                 status = self._stage(Stage(middle, max(middle, stage.kappa_grad), stage.decrease), bisections - 1)
@@ -402,7 +381,7 @@ class Solver:
         now, kappa = self.now, stage.kappa_eval
         if now.kappa == kappa:
             return Status.SOLVED
-        if self.options.reopen == "feedback" and now.kappa is not None and self._follow(kappa):
+        if self.options.on_kappa_change == "feedback" and now.kappa is not None and self._follow(kappa):
             return Status.SOLVED
         linear = self._horizon.linearize(now.x, now.u, kappa)
         if np.any(linear.status):
@@ -413,7 +392,7 @@ class Solver:
     def _open_gaps(self, stage: Stage, linear: Linearization) -> None:
         """Keep the states at the smoothing of `stage`, where their derivatives are `linear`."""
         gaps = self._horizon.gaps(linear, self.now.x)
-        closed = float(np.abs(gaps).max()) <= self.options.gap
+        closed = float(np.abs(gaps).max()) <= self.options.gap_tolerance
         self.now = self.now._replace(gaps=None if closed else gaps, kappa=stage.kappa_eval)
         if stage.kappa_grad == stage.kappa_eval:
             self._subproblem.expand(self.now, linear)
@@ -422,7 +401,7 @@ class Solver:
         """Replace the trajectory by its own closed-loop rollout at `kappa`; False when the simulator cannot."""
         shot = self._search.rollout(self.now, self._subproblem.K, kappa)
         if shot.status == Status.SOLVED:
-            self.now = self._search.iterate(shot, None, kappa)
+            self.now = self._search.iterate_of(shot, None, kappa)
         return bool(shot.status == Status.SOLVED)
 
     def _follow(self, kappa: float) -> bool:
@@ -432,7 +411,7 @@ class Solver:
             return True
         if not self._roll_out(kappa):
             return False
-        if self.now.merit - before.merit <= self.options.follow * abs(before.merit):
+        if self.now.merit - before.merit <= self.options.max_merit_increase * abs(before.merit):
             return True
         self.now = before
         return False
@@ -448,20 +427,20 @@ class Solver:
         last = stage is self.options.stages[-1]  # it must not leave gaps; others leave them to the stages to come
         rejected = slow = short = 0
         self._search.restart()
+        self._converged = True
         for _ in range(stage.iterations):
             before = self.now
             if not local.is_at(before) and local.linearize(before, kappa_grad, stage.kappa_eval) != Status.SOLVED:
                 return Status.SIMULATION_FAILED
-            predicted, mu = local.gains(before), local.damping.mu
+            predicted, mu = local.gains(before), local.schedule.mu
             if predicted.status != Status.SOLVED:
                 return local.fault(before, predicted)
-            small = (stage.decrease or 0.0) * (abs(before.merit) + _SMALL)  # Options fills it in
+            small = (stage.decrease or 0.0) * (abs(before.merit) + _LEAST_MERIT)  # Options fills it in
             expected = -(predicted.d0 + 0.5 * predicted.d1)
-            if before.gaps is None and mu <= _LIGHT and expected <= small:
+            if before.gaps is None and mu <= _MU_OF_AN_OPTIMUM and expected <= small:
                 return Status.SOLVED
-            status = self._history.budget()
-            if status != Status.SOLVED:
-                return status
+            if (spent := self._history.budget()) is not None:
+                return spent
             alpha = self._step(predicted, stage, kappa_grad)
             if self._record(predicted, stage, kappa_grad, mu, alpha):
                 return Status.STOPPED
@@ -470,7 +449,7 @@ class Solver:
             patience = _PATIENCE if self.now.gaps is None or last else 1
             if rejected >= rejections and (sharper := self._recover(stage, kappa_grad)) is not None:
                 rejected, kappa_grad = 0, sharper
-            elif rejected >= patience * rejections or short >= _CREEPING:
+            elif rejected >= patience * rejections or short >= _MAX_SHORT_STEPS:
                 return Status.LINE_SEARCH
             if alpha > 0.0:
                 slow = slow + 1 if abs(before.merit - self.now.merit) <= small else 0
@@ -479,26 +458,31 @@ class Solver:
                         return Status.SOLVED
                     self._close_gaps(stage)
                     slow = 0
+        self._converged = False
         return Status.SOLVED
+
+    def _converged_or_used_up(self, status: Status) -> Status:
+        """The status of a stage, MAX_ITERATIONS in place of SOLVED if it used all its iterations."""
+        return Status.MAX_ITERATIONS if status == Status.SOLVED and not self._converged else status
 
     def _step(self, predicted: PredictedChange, stage: Stage, kappa_grad: float) -> float:
         """Search along the gains, and adapt the regularisation to the step size, which is 0 if none is accepted."""
-        before, damping, kappa = self.now, self._subproblem.damping, stage.kappa_eval
+        before, schedule, kappa = self.now, self._subproblem.schedule, stage.kappa_eval
         direction = self._subproblem.direction(predicted)
-        alpha, self.now = self._search.rollouts(before, direction, kappa)
+        alpha, self.now = self._search.single_shooting(before, direction, kappa)
         linear = None
-        if alpha < self.options.shooting and before.gaps is not None:
-            shot, there, beside = self._search.states(before, direction, kappa)
+        if alpha < self.options.multiple_shooting_below and before.gaps is not None:
+            shot, there, beside = self._search.multiple_shooting(before, direction, kappa)
             if shot > alpha:
                 alpha, self.now, linear = shot, there, beside
         if alpha >= _GOOD_STEP:
-            damping.decrease()
+            schedule.decrease()
         elif (
             alpha < _POOR_STEP
             # while contacts are discovered, gaps close only if the gains keep the robot upright: at 1e6 none are left
-            and (self.now.gaps is None or damping.mu < _FIRM or stage is self.options.stages[-1])
+            and (self.now.gaps is None or schedule.mu < _MAX_MU_WITH_OPEN_GAPS or stage is self.options.stages[-1])
         ):
-            damping.increase()
+            schedule.increase()
         if linear is not None and kappa == kappa_grad:
             self._subproblem.expand(self.now, linear)
         return alpha
@@ -520,18 +504,18 @@ class Solver:
             return kappa_grad if self._close_gaps(stage) else None
         if kappa_grad <= 1.01 * stage.kappa_eval:  # rounding of the factors is not a level of its own
             return None
-        self._subproblem.damping.reset()
+        self._subproblem.schedule.reset()
         self._subproblem.forget()
         return max(_SHARPER * kappa_grad, stage.kappa_eval)
 
     def _close_gaps(self, stage: Stage) -> bool:
         """Close the gaps by a rollout; False where that falls over, but the last stage must not leave gaps."""
         # gains without the regularisation of the failures, which leads to open-loop rollouts
-        self._subproblem.damping.reset()
+        self._subproblem.schedule.reset()
         before = self.now
         if self._subproblem.gains(before).status != Status.SOLVED or not self._roll_out(stage.kappa_eval):
             return False
-        if stage is self.options.stages[-1] or self.now.merit <= _FALLEN * before.merit:
+        if stage is self.options.stages[-1] or self.now.merit <= _LOST * before.merit:
             return True
         self.now = before
         return False
@@ -548,7 +532,7 @@ class Solver:
             self._roll_out(stage.kappa_eval)
         local, now = self._subproblem, self.now
         if local.is_at(now) or local.linearize(now, stage.kappa_grad, stage.kappa_eval) == Status.SOLVED:
-            local.damping.reset(0.0)
+            local.schedule.reset(0.0)
             local.gains(now)
 
     def _plan(self, status: Status, detail: str) -> Plan:
@@ -565,7 +549,7 @@ class Solver:
             else:
                 local.K[:] = repeated
         violation, culprit = self.objective.worst(now.x, now.u)
-        if status != Status.SOLVED and violation > options.violation:
+        if status != Status.SOLVED and violation > options.violation_tolerance:
             detail += "" if status == Status.INFEASIBLE else " Constraints are not met."
             detail += f" Largest violation: {violation:.2g}, {culprit}."
         plan = Plan(
@@ -596,5 +580,5 @@ class Solver:
 def _slow_steps(alpha: float, before: Iterate, expecting: bool) -> int:
     """How many steps in a row with next to no decrease end the stage."""
     if before.gaps is None:
-        return 1 if alpha >= _GOOD_STEP else _SLOW
-    return _SLOW_OPEN if expecting else _SLOW
+        return 1 if alpha >= _GOOD_STEP else _MAX_SLOW_STEPS
+    return _MAX_SLOW_STEPS_OPEN if expecting else _MAX_SLOW_STEPS

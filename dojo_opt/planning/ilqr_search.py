@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.planning.iterate import Iterate
 from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import Options
 from dojo_opt.planning.problem import Problem
@@ -17,29 +18,12 @@ from solvers.status import Status
 Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
 
-__all__ = ["Direction", "Iterate", "Search"]
+__all__ = ["Direction", "Search"]
 
 _LENGTHEN = 4.0  # first trial relative to the last accepted step: a rollout costs as much as a linearisation
 # iterations of a time step in the first trials of a search, which may fail: a wild motion is refused after 500, at the
 # price of ten trials; those of less than _FIRST_TRIALS of the first step size have as many as the simulator
 _FEW_ITERATIONS, _FIRST_TRIALS = 60, 0.5
-
-
-class Iterate(NamedTuple):
-    """A trajectory and its cost."""
-
-    x: Matrix  # (T + 1, nx) states
-    u: Matrix  # (T, nu) inputs
-    gaps: Matrix | None = None  # (T + 1, ndx) f(x_t, u_t) (-) x_{t+1}; None when consistent
-    cost: float = np.inf  # without the terms of the constraints
-    merit: float = np.inf  # cost + augmented Lagrangian
-    kappa: float | None = None  # smoothing [N s m] of the motion to which the gaps belong; None: gaps not known yet
-    steps: Any = None  # cone variables of the steps, the starting points of a rollout nearby (sim/simulator/horizon.py)
-
-    @property
-    def gap(self) -> float:
-        """Largest entry of the gaps."""
-        return 0.0 if self.gaps is None else float(np.abs(self.gaps).max())
 
 
 class Direction(NamedTuple):
@@ -60,7 +44,7 @@ class Search:
     """Step sizes 1, 1/2, 1/4, ... along a direction, or powers of another `backtracking`.
 
     Trials that the simulator cannot step do not count.
-    `rollouts` is single shooting, the usual line search of iLQR. `states` is multiple shooting, for unstable robots
+    `single_shooting` is the usual line search of iLQR. `multiple_shooting` is for unstable robots
     whose rollouts fall before the horizon ends. The derivation is in docs/theory/ilqr.md.
     """
 
@@ -113,16 +97,17 @@ class Search:
             max_iterations=max_iterations,
         )
 
-    def iterate(self, shot: Any, gaps: Matrix | None, kappa: float) -> Iterate:
+    def iterate_of(self, shot: Any, gaps: Matrix | None, kappa: float) -> Iterate:
         """A rollout with its cost."""
         self._objective.at_kappa(kappa)
         return Iterate(shot.x, shot.u, gaps, *self._objective.evaluate(shot.x, shot.u), kappa, shot.steps)
 
-    def rollouts(self, now: Iterate, direction: Direction, kappa: float) -> tuple[float, Iterate]:
+    def single_shooting(self, now: Iterate, direction: Direction, kappa: float) -> tuple[float, Iterate]:
         """(step size, new iterate) of the first rollout that is good enough; (0, now) without one.
 
         With d the predicted change of merit, a step is taken when merit - merit_old <= armijo d for d < 0. With open
-        gaps, closing them may cost: d > 0 allows an increase up to ascent d.   Mastalli et al. 2020, "Crocoddyl".
+        gaps, closing them may cost: d > 0 allows an increase up to max_increase_ratio d
+        (Mastalli et al. 2020, "Crocoddyl").
         """
         options, alpha = self._options, self._first
         while alpha >= 0.5**options.halvings:
@@ -130,11 +115,11 @@ class Search:
             shot = self.rollout(now, direction.K, kappa, direction, alpha, few)
             if shot.status == Status.SOLVED:
                 gaps = None if now.gaps is None or alpha == 1.0 else (1.0 - alpha) * now.gaps
-                there, predicted = self.iterate(shot, gaps, kappa), direction.predicted(alpha)
+                there, predicted = self.iterate_of(shot, gaps, kappa), direction.predicted(alpha)
                 if predicted < 0.0:
                     good = there.merit - now.merit <= options.armijo * predicted
                 else:
-                    good = now.gaps is not None and there.merit - now.merit <= options.ascent * predicted
+                    good = now.gaps is not None and there.merit - now.merit <= options.max_increase_ratio * predicted
                 if good:
                     self._first = min(1.0, _LENGTHEN * alpha)
                     return alpha, there
@@ -142,7 +127,7 @@ class Search:
         self.restart()
         return 0.0, now
 
-    def states(self, now: Iterate, direction: Direction, kappa: float) -> tuple[float, Iterate, Any]:
+    def multiple_shooting(self, now: Iterate, direction: Direction, kappa: float) -> tuple[float, Iterate, Any]:
         """(step size, new iterate, derivatives there); (0, now, None) when no step size is good enough.
 
         All states move along the linear model, and its errors become gaps:

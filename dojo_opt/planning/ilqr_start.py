@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.planning.ilqr_search import Iterate
+from dojo_opt.planning.iterate import Iterate
 from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import Stage
 from dojo_opt.planning.problem import Problem
@@ -92,7 +92,7 @@ class FreeStart:
         return next((term.shift for term in ties if term.mask.all()), None)
 
     def solve(
-        self, model: Quadratic, K: Array, k: Array, mu: float, damping: Array, xs: Array, us: Array
+        self, model: Quadratic, K: Array, k: Array, mu: float, unit: Array, xs: Array, us: Array
     ) -> tuple[Array, float, float]:
         """(k + S s, d0 and d1 of the step with s); `step` is s, in tangent coordinates at the present start."""
         T, m, n = K.shape
@@ -108,7 +108,7 @@ class FreeStart:
             held = (k[t] <= model.lo[t]) | (k[t] >= model.hi[t])
             free = np.flatnonzero(~held)
             if free.size:
-                firm = (Quu + mu * np.diag(damping))[np.ix_(free, free)]
+                firm = (Quu + mu * np.diag(unit))[np.ix_(free, free)]
                 S[t, free] = -np.linalg.solve(firm, R[n + free])
             W = W + S[t].T @ Quu @ S[t] + S[t].T @ R[n:] + R[n:].T @ S[t]
             w = w + S[t].T @ (Quu @ k[t] + q[n:]) + R[n:].T @ k[t]

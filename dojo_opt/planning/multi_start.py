@@ -24,7 +24,7 @@ __all__ = ["multi_start", "of_problem", "planned"]
 
 _POINTS = 6  # of the splines that are added to a guess
 _SHARE = 0.25  # of the range of a limited input: standard deviation of a point
-_LESS = 0.3  # times the largest input of a guess: it solves 10 of 12 hops, the whole of it 4 of 8
+_INPUT_SHARE = 0.3  # times the largest input of a guess: it solves 10 of 12 hops, the whole of it 4 of 8
 _GRAVITY = 9.81  # [m/s^2]
 
 # controls, states and warm start
@@ -85,7 +85,7 @@ def _spread(problem: Problem, center: Matrix) -> Vector:
     For guesses that are zero it is a share of the robot's weight [N, N m].
     """
     limits, largest = problem.control_limits, float(np.abs(center).max(initial=0.0))
-    free = _LESS * (largest or _GRAVITY * sum(float(body.mass) for body in problem.sim.mechanism.bodies))
+    free = _INPUT_SHARE * (largest or _GRAVITY * sum(float(body.mass) for body in problem.sim.mechanism.bodies))
     if limits is None:
         return np.full(problem.sim.nu, free)
     wide = limits[1] - limits[0]
@@ -102,8 +102,7 @@ def _changed(problem: Problem, center: Matrix, spread: Vector, seed: np.random.S
 
 def planned(planner: Planner, problem: Problem, guess: Guess, settings: dict[str, Any]) -> Plan:
     """One plan, without its problem, which the caller has; at module level, so that other processes can import it."""
-    own = problem.with_own_terms()
-    own.free_start = problem.free_start
+    own = problem.with_own_terms(fixed_start=False)
     controls, states, warm_start = guess
     plan = planner(own, controls, states, warm_start=warm_start, **settings)
     return replace(plan, problem=None, simulator=None)

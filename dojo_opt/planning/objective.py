@@ -29,6 +29,7 @@ class Objective:
         self.g = np.zeros((problem.horizon + 1, size))
         self.H = np.zeros((problem.horizon + 1, size, size))
         self._options = options
+        self._refined = len(problem.refined_constraints)
         self._last: list[Matrix] = []
         terms = (*self.costs, *self.constraints)
         self._forces = [term for term in terms if type(term).at_kappa is not Term.at_kappa]
@@ -36,13 +37,14 @@ class Objective:
     def reset(self, multipliers: Sequence[Matrix] = (), penalties: Sequence[Matrix] = ()) -> None:
         """Start with zero multipliers and the first penalty, or with those of an earlier plan of the same problem.
 
-        Constraints that this problem has more than that one, after the others, start anew; those it has less are left
-        out: a refined problem has more of them than the one that it comes from.
+        Constraints that this problem has more than that one, after the others, start anew. That one may have more only
+        if it is this problem refined, which has additional constraints; their multipliers are not used.
         """
         shapes = [term.slope.shape for term in self.constraints]
         for given in (multipliers, penalties):
             common = min(len(given), len(shapes))
-            if [a.shape for a in given[:common]] != shapes[:common]:
+            surplus = len(given) - len(shapes) > self._refined
+            if surplus or [a.shape for a in given[:common]] != shapes[:common]:
                 raise ValueError(
                     f"ilqr(warm_start=...): expected multipliers of shapes {shapes}, got {[a.shape for a in given]}"
                 )
@@ -124,6 +126,8 @@ class Objective:
                 np.maximum(term.slope, 0.0, out=term.slope)
             now.append(violation)
             if self._last:
-                slow = (violation > options.sufficient * self._last[i]) & (violation > 0.1 * options.violation)
+                slow = violation > np.maximum(
+                    options.violation_ratio * self._last[i], 0.1 * options.violation_tolerance
+                )
                 term.weight[slow] = np.minimum(term.weight[slow] * options.penalty_growth, 0.5 * options.penalty_max)
         self._last = now

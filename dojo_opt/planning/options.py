@@ -11,7 +11,18 @@ import numpy as np
 
 from sim.mechanism import checks
 
-__all__ = ["CONTINUATION", "PLANNED", "Options", "Stage"]
+__all__ = ["CONTINUATION", "PLANNED", "RENAMED", "Options", "Stage"]
+
+# old names of fields as keywords of `ilqr`, until version 0.2
+RENAMED = {
+    "violation": "violation_tolerance",
+    "gap": "gap_tolerance",
+    "follow": "max_merit_increase",
+    "ascent": "max_increase_ratio",
+    "sufficient": "violation_ratio",
+    "shooting": "multiple_shooting_below",
+    "reopen": "on_kappa_change",
+}
 
 
 class Stage(NamedTuple):
@@ -53,36 +64,36 @@ class Options:
     Attributes:
         stages: the continuation, from smooth to hard contact: `Stage`s, or pairs (kappa_eval, kappa_grad) [N s m]
             (default 3e-2, 3e-3, 1e-4, 1e-6).
-        reopen: at a change of kappa, "feedback" rolls out with the gains, "gaps" keeps the states and opens the gaps
-            (default "feedback").
-        follow: share of the merit; a rollout at the next kappa that raises the merit by more counts as lost (default
-            1).
+        on_kappa_change: "feedback" rolls out with the gains, "gaps" keeps the states and opens the gaps (default
+            "feedback").
+        max_merit_increase: share of the merit; a rollout at the next kappa that raises the merit by more counts as lost
+            (default 1).
         bisections: number of times that a step of kappa is halved, on a logarithmic scale, if its rollout is lost
             (default 3).
         tolerance: share of the merit; the last stage ends when an iteration lowers the merit by less, unless it has a
             `decrease` of its own (default 1e-3).
         max_iterations: limit of all iterations, rejected ones included (default 300).
         max_updates: multiplier updates before the constraints count as infeasible (default 20).
-        violation: largest violation of a constraint in a plan that counts as solved [unit of the residual]
+        violation_tolerance: largest violation of a constraint in a plan that counts as solved [unit of the residual]
             (default 1e-3).
-        gap: largest gap, an entry of f(x_t, u_t) (-) x_t+1, of a trajectory that counts as consistent [m, rad, m/s,
-            rad/s] (default 1e-8).
+        gap_tolerance: largest gap, an entry of f(x_t, u_t) (-) x_t+1, of a trajectory that counts as consistent [m,
+            rad, m/s, rad/s] (default 1e-8).
         penalty: first penalty of the constraints [curvature of the costs] (default 100: a goal is worth its effort).
         penalty_growth: factor of a penalty that grows (default 10).
         penalty_max: limit of the penalties [1 / square of the residual's unit] (default 1e8).
-        sufficient: the penalty of an entry grows unless its violation fell below this share of the one before
+        violation_ratio: the penalty of an entry grows unless its violation fell below this share of the one before
             (default 0.25).
         regularization: first regularisation of the backward pass [mean control weight] (default 0).
         regularization_max: limit of the regularisation [mean control weight] (default 1e6).
         value_regularization: multiple of the regularisation that is added to the Hessian V_xx of the value (default 0).
         armijo: share of the predicted decrease that a step must achieve (default 0.01).
-        ascent: allowed multiple of a predicted increase, which only open gaps cause (default 2).
+        max_increase_ratio: allowed multiple of a predicted increase, which only open gaps cause (default 2).
         halvings: number of times that the line search may halve the step size (default 6).
         backtracking: factor from one step size of the line search to the next (default 0.5); 0.25 tries half as many.
         rejections: failed line searches in a row before gaps are closed by a rollout, or kappa_grad is reduced (default
             2).
-        shooting: with open gaps, a step shorter than this is compared with one of multiple shooting; 0 for single
-            shooting only (default 1).
+        multiple_shooting_below: with open gaps, a step size below this is compared with a step of multiple shooting; 0
+            for single shooting only (default 1).
         time_limit: limit of the wall time, checked before each iteration [s] (default inf).
         callback: function of the record of each iteration; it may raise StopIteration to end the solve (default None).
         verbose: whether to print one line per iteration (default False).
@@ -90,35 +101,35 @@ class Options:
     """
 
     stages: tuple[Stage, ...] = CONTINUATION
-    reopen: str = "feedback"
-    follow: float = 1.0
+    on_kappa_change: str = "feedback"
+    max_merit_increase: float = 1.0
     bisections: int = 3
     tolerance: float = 1e-3
     max_iterations: int = 300
     max_updates: int = 20
-    violation: float = 1e-3
-    gap: float = 1e-8
+    violation_tolerance: float = 1e-3
+    gap_tolerance: float = 1e-8
     penalty: float = 100.0
     penalty_growth: float = 10.0
     penalty_max: float = 1e8
-    sufficient: float = 0.25
+    violation_ratio: float = 0.25
     regularization: float = 0.0
     regularization_max: float = 1e6
     value_regularization: float = 0.0
     armijo: float = 1e-2
-    ascent: float = 2.0
+    max_increase_ratio: float = 2.0
     halvings: int = 6
     backtracking: float = 0.5
     rejections: int = 2
-    shooting: float = 1.0
+    multiple_shooting_below: float = 1.0
     time_limit: float = float("inf")
     callback: Callable[[dict[str, Any]], None] | None = None
     verbose: bool = False
     stream: Any = None
 
     def __post_init__(self) -> None:
-        if self.reopen not in ("feedback", "gaps"):
-            raise ValueError(f'ilqr(reopen=...): expected "feedback" or "gaps", got {self.reopen!r}')
+        if self.on_kappa_change not in ("feedback", "gaps"):
+            raise ValueError(f'ilqr(on_kappa_change=...): expected "feedback" or "gaps", got {self.on_kappa_change!r}')
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(field.default, int | float) and not isinstance(field.default, bool):

@@ -16,7 +16,7 @@ from sim.mechanism.checks import whole_number
 from sim.mechanism.short_repr import drawn, short_table
 from sim.simulator.motion_file import archived, export, opened, restored
 from sim.simulator.npz_file import check_head, check_shapes, reading, write_npz
-from sim.simulator.results import Shot
+from sim.simulator.results import FeedbackRollout
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
 
@@ -162,7 +162,7 @@ class Plan:
         x, fun = np.concatenate(cycles), n * self.fun
         return replace(self, x=x, u=u, K=K, k=k, stride=n * self.stride, fun=fun, multipliers=[], penalties=[])
 
-    def replay(self, *, accuracy: float = 1e-5, kappa: float | None = None) -> Shot:
+    def replay(self, *, accuracy: float = 1e-5, kappa: float | None = None) -> FeedbackRollout:
         """The plan under its own gains, each knot simulated to an accuracy, its input held.
 
         Impacts happen at their own times, not at those of the plan's steps. States of such a simulator have the
@@ -174,7 +174,7 @@ class Plan:
                 needs it).
 
         Returns:
-            Shot with the solved knots, one state per knot, with velocities at the nodes.
+            FeedbackRollout with the solved knots, one state per knot, with velocities at the nodes.
 
         Raises:
             ValueError: for a plan without a simulator, or an accuracy that its mechanism does not have.
@@ -186,7 +186,7 @@ class Plan:
         exact = sim.replace(time_step=self.time_step * self.substeps, order=2, accuracy=accuracy, **smoothing)
         nodes = np.concatenate([self.x[:, : sim.nq], sim.velocity(self.x)], axis=1)
         limits = sim.mechanism.input_limits if problem is None else problem.control_limits
-        return cast(Shot, exact.closed_loop(nodes[0], self.u, xs=nodes, Ks=self.K, limits=limits))
+        return cast(FeedbackRollout, exact.rollout_feedback(nodes[0], self.u, xs=nodes, Ks=self.K, limits=limits))
 
     def summary(self) -> str:
         """The table of iterations and a closing line.
@@ -284,13 +284,13 @@ class History:
         self._note = ""
         self._headed = False
 
-    def budget(self) -> Status:
-        """SOLVED while there is some left."""
+    def budget(self) -> Status | None:
+        """The limit that was reached; None while iterations and time are left."""
         if len(self.records) >= self._options.max_iterations:
             return Status.MAX_ITERATIONS
         if time.perf_counter() - self.began >= self._options.time_limit:
             return Status.TIME_LIMIT
-        return Status.SOLVED
+        return None
 
     def note(self, text: str) -> None:
         """Put a line of text into the table, before the next iteration."""

@@ -160,21 +160,19 @@ class Problem:
         finer.bind()
         return finer
 
-    def with_own_terms(self, **settings: Any) -> Problem:
-        """The same problem with a fixed start, and a simulator and terms of its own, for loops that write into them.
+    def with_own_terms(self, sim: Simulator | None = None, *, fixed_start: bool = True) -> Problem:
+        """The same problem with a simulator and terms of its own, for loops that write into them.
 
         Args:
-            **settings: settings of `Simulator.replace`.
+            sim: the simulator; by default a copy of the one that the problem has.
+            fixed_start: whether a free start becomes a fixed one.
 
         Returns:
             The new problem.
-
-        Raises:
-            ValueError: for an unknown setting, or one out of range.
         """
         own = copy.copy(self)
-        own.sim = self.sim.replace(**settings)
-        own.free_start = None
+        own.sim = self.sim.replace() if sim is None else sim
+        own.free_start = None if fixed_start else self.free_start
         own.bind()
         return own
 

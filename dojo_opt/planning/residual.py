@@ -21,7 +21,7 @@ Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-__all__ = ["ResidualKernels", "kernel"]
+__all__ = ["ResidualKernels", "jit"]
 
 _STEP = float(np.cbrt(np.finfo(float).eps))
 _NOISE = re.compile(r"Failed in|During:|File \"|<source|def evaluate|\^|$")  # of Numba's messages
@@ -33,17 +33,17 @@ _NO_ROWS = np.zeros((0, 0, 0))
 _POISON = (3.0e7, -5.0e7)  # in outputs before they are written
 
 
-def kernel(func: Callable[..., Any] | None = None, *, boundscheck: bool = True) -> Any:
+def jit(func: Callable[..., Any] | None = None, *, boundscheck: bool = True) -> Any:
     """Compile a residual r(x, u, out), its Jacobian, or a function that these call; as a decorator:
 
-        @dojo.kernel
+        @dojo.jit
         def keep_away(x, u, out):
             out[0] = 0.3 - np.hypot(x[0] - 1.0, x[1])
 
-    Costs and constraints also take plain functions, and compile them. Other functions that those call have to be
-    kernels. Everything that Numba supports of Python and NumPy is allowed, except writing into x and u. Functions with
-    the same text and the same captured values are compiled once per process. Numba never frees code: each new text or
-    captured value keeps about 2 MiB until the process ends.
+    Costs and constraints also take plain functions, and compile them. Other functions that those call need the
+    decorator. Everything that Numba supports of Python and NumPy is allowed, except writing into x and u. Functions
+    with the same text and the same captured values are compiled once per process. Numba never frees code: each new text
+    or captured value keeps about 2 MiB until the process ends.
 
     Args:
         func: function of (x (nx,), u (nu,), out (dimension,)).
@@ -151,7 +151,7 @@ def _loop(make: Callable[[Any], Any], function: Callable[..., Any]) -> Any:
     """The loop around a function, the same one for functions that compile to the same code."""
     key = make, fingerprint(function)
     if key not in _loops:
-        _loops[key] = make(kernel(function))
+        _loops[key] = make(jit(function))
         if len(_loops) > _KEPT:
             _loops.popitem(last=False)
     _loops.move_to_end(key)

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.planning.ilqr_search import Direction, Iterate
+from dojo_opt.planning.ilqr_search import Direction
 from dojo_opt.planning.ilqr_start import FreeStart
+from dojo_opt.planning.iterate import Iterate
 from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import Options
 from dojo_opt.planning.problem import Problem
-from dojo_opt.planning.regularisation import Damping
+from dojo_opt.planning.regularization import RegularizationSchedule
 from sim.simulator.horizon import Horizon
 from solvers.riccati import PredictedChange, Quadratic, Regularization, backward, value_hessian, work_size
 from solvers.status import MESSAGES, Status
@@ -35,7 +36,7 @@ class Subproblem:
         sim, T = problem.sim, problem.horizon
         self._problem, self._horizon, self._objective, self._options = problem, horizon, objective, options
         self.start = start
-        self.damping = Damping(options)
+        self.schedule = RegularizationSchedule(options)
         self.detail = ""  # place and cause of a failure, in addition to the status
         self.K, self.k = np.zeros((T, sim.nu, sim.ndx)), np.zeros((T, sim.nu))
         self.linear: Any = None  # derivatives of the dynamics
@@ -48,7 +49,7 @@ class Subproblem:
 
     def reset(self) -> None:
         """Forget gains and regularisation."""
-        self.damping.reset()
+        self.schedule.reset()
         self.detail = ""
         self.K.fill(0.0)
         self.k.fill(0.0)
@@ -101,22 +102,22 @@ class Subproblem:
 
     def gains(self, now: Iterate) -> PredictedChange:
         """K and k at the first regularisation, from the present one upwards, with all Q_uu positive definite."""
-        model, damping, options = self.model(now), self.damping, self._options
+        model, schedule, options = self.model(now), self.schedule, self._options
         while True:
-            added = Regularization(damping.mu, damping.mu * options.value_regularization, self._unit)
+            added = Regularization(schedule.mu, schedule.mu * options.value_regularization, self._unit)
             predicted = backward(model, added, self.K, self.k, self._free, self._buffer)
             if predicted.status == Status.SOLVED and self.start is not None:
                 predicted = self._free_the_start(self.start, now, model, predicted)
-            if predicted.status == Status.SOLVED or damping.mu >= options.regularization_max:
+            if predicted.status == Status.SOLVED or schedule.mu >= options.regularization_max:
                 return predicted
-            damping.increase()
+            schedule.increase()
 
     def _free_the_start(
         self, start: FreeStart, now: Iterate, model: Quadratic, predicted: PredictedChange
     ) -> PredictedChange:
         """Add the step of a free start, once the gaps are closed: before, both together would lead too far."""
         if now.gaps is None:
-            k, d0, d1 = start.solve(model, self.K, self.k, self.damping.mu, self._unit, now.x, now.u)
+            k, d0, d1 = start.solve(model, self.K, self.k, self.schedule.mu, self._unit, now.x, now.u)
             if d0 + 0.5 * d1 < predicted.d0 + 0.5 * predicted.d1:  # rounding: a fixed start may predict more
                 self.k[:] = k
                 return predicted._replace(d0=d0, d1=d1)

@@ -209,8 +209,8 @@ def wilson_interval(successes: int, runs: int, confidence: float = 0.95) -> tupl
         raise ValueError(f"wilson_interval: expected 0 <= successes <= runs and runs >= 1, got {successes} of {runs}")
     z = NormalDist().inv_cdf(0.5 + 0.5 * confidence)
     p, n = successes / runs, float(runs)
-    centre = p + z * z / (2.0 * n)
+    center = p + z * z / (2.0 * n)
     spread = z * np.sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n))
     scale = 1.0 + z * z / n
-    lo, hi = float((centre - spread) / scale), float((centre + spread) / scale)
+    lo, hi = float((center - spread) / scale), float((center + spread) / scale)
     return (lo if successes else 0.0), (hi if successes < runs else 1.0)  # exactly, whatever the rounding

@@ -96,20 +96,20 @@ def label_lines(ax: Axes) -> None:
     gap = _LINE * (high - low) / height
     ends = []
     for k, (artist, label) in enumerate(curves):
-        colour, style = f"C{k % 10}", _STYLES[(k // 10) % len(_STYLES)]
+        color, style = f"C{k % 10}", _STYLES[(k // 10) % len(_STYLES)]
         data = artist.get_data()
         value = float(data.values[-1] if hasattr(data, "values") else data[1][-1])
         if hasattr(data, "values"):
-            artist.set_edgecolor(colour)
+            artist.set_edgecolor(color)
         else:
-            artist.set_color(colour)
+            artist.set_color(color)
         artist.set_linestyle(style)
         rows = np.asarray(data.values if hasattr(data, "values") else data[1], dtype=np.float64)
         value = value if low <= value <= high else 0.5 * (low + high)
-        ends.append((round(value / gap), float(np.nan_to_num(rows).mean()), value, label, colour))
+        ends.append((round(value / gap), float(np.nan_to_num(rows).mean()), value, label, color))
     ends.sort()  # of those that end together, by their means
     places = _apart([value for _, _, value, _, _ in ends], gap, low, high)
-    for (_, _, value, label, colour), place in zip(ends, places, strict=True):
+    for (_, _, value, label, color), place in zip(ends, places, strict=True):
         ax.annotate(
             _short(label),
             (1.0, value),
@@ -117,11 +117,11 @@ def label_lines(ax: Axes) -> None:
             xycoords=ax.get_yaxis_transform(),
             textcoords=ax.get_yaxis_transform(),
             fontsize="small",
-            color=colour,
+            color=color,
             va="center",
             parse_math=False,
             annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.6, "shrinkA": 0.0, "shrinkB": 0.0},
+            arrowprops={"arrowstyle": "-", "color": color, "linewidth": 0.6, "shrinkA": 0.0, "shrinkB": 0.0},
         )
 
 

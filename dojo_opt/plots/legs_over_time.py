@@ -122,10 +122,10 @@ def draw_limits(ax: Axes, limits: Any) -> None:
     """
     low, high = ax.get_ylim()
     room = 0.5 * (high - low)
-    colours: dict[float, str] = {}
+    colors: dict[float, str] = {}
     for k, pair in enumerate(limits):
         for bound in {round(float(b), 9) for b in pair if np.isfinite(b)}:
-            colours[bound] = "0.3" if bound in colours else f"C{k % 10}"
-    for bound, colour in colours.items():
+            colors[bound] = "0.3" if bound in colors else f"C{k % 10}"
+    for bound, color in colors.items():
         if low - room <= bound <= high + room:
-            ax.axhline(bound, color=colour, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
+            ax.axhline(bound, color=color, linewidth=1, linestyle=(0, (4, 3)), zorder=1)

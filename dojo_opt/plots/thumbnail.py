@@ -50,10 +50,10 @@ def thumbnail(mechanism: Mechanism, q: ArrayLike | None = None, *, size: float =
         ax.add_patch(Polygon(outline, facecolor=_FILL, edgecolor=_EDGE, linewidth=0.8, zorder=2))
         drawn.append(outline)
     for contact in mechanism.contacts:
-        centre = np.array([right, up]) @ at[contact.body].at(np.asarray(contact.point))
-        drawn.append(centre + contact.radius * np.array([[-1.0, -1.0], [1.0, 1.0]]))
-        ax.add_patch(Circle(tuple(centre), contact.radius, fill=False, edgecolor=_CONTACT, linewidth=0.6, zorder=3))
-        ax.plot(*centre, ".", color=_CONTACT, markersize=3, zorder=3)
+        center = np.array([right, up]) @ at[contact.body].at(np.asarray(contact.point))
+        drawn.append(center + contact.radius * np.array([[-1.0, -1.0], [1.0, 1.0]]))
+        ax.add_patch(Circle(tuple(center), contact.radius, fill=False, edgecolor=_CONTACT, linewidth=0.6, zorder=3))
+        ax.plot(*center, ".", color=_CONTACT, markersize=3, zorder=3)
     if mechanism.contacts:
         ax.axhline(0.0, color=_GROUND, linewidth=3, zorder=0)
     _frame(ax, np.concatenate(drawn))

@@ -129,9 +129,9 @@ def contact_forces(m: Motion, ax: Axes) -> Axes:
     edges = np.concatenate([[0.0], m.contact_time])
     peak = m.normal_force.max(axis=0, initial=0.0)
     for i, k in enumerate(np.flatnonzero(peak > 1e-3 * peak.max(initial=0.0))):
-        name, colour = m.mechanism.contact_names[k], f"C{i % 10}"
-        ax.stairs(m.normal_force[:, k], edges, baseline=None, label=name, color=colour)
-        ax.stairs(m.friction_force[:, k], edges, baseline=None, linestyle=":", color=colour)
+        name, color = m.mechanism.contact_names[k], f"C{i % 10}"
+        ax.stairs(m.normal_force[:, k], edges, baseline=None, label=name, color=color)
+        ax.stairs(m.friction_force[:, k], edges, baseline=None, linestyle=":", color=color)
     return _finish(ax, "contact forces [N] (dotted: friction)", "time [s]", at_lines=True)
 
 

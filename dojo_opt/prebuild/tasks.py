@@ -43,8 +43,8 @@ def states(sim: Simulator) -> None:
     sim.minimal(z)
     sim.difference(sim.integrate(x, np.zeros(sim.ndx)), x)
     sim.difference(np.stack([x, x]), np.stack([x, x]))
-    sim.start(x[: sim.nq], x[sim.nq :])
-    sim.bodies(x[: sim.nq], x[sim.nq :])
+    sim.state_from_velocity(x[: sim.nq], x[sim.nq :])
+    sim.body_states(x[: sim.nq], x[sim.nq :])
     sim.energy(x), sim.kinetic_energy(x), sim.momentum(x), sim.inactive_contacts(x)
     sim.loop_gaps(x)
     if sim.mechanism.loops:
@@ -61,7 +61,7 @@ def motions(sim: Simulator) -> None:
     sim.rollout(x, us, wrenches=wrenches)
     sim.rollout_batch(np.stack([x] * 4), np.zeros((4, 2, sim.nu)))
     k, K = np.zeros((2, sim.nu)), np.zeros((2, sim.nu, sim.ndx))
-    sim.closed_loop(x, us, np.stack([x] * 3), ks=k, Ks=K)
+    sim.rollout_feedback(x, us, np.stack([x] * 3), ks=k, Ks=K)
 
 
 def derivatives(sim: Simulator) -> None:
@@ -126,7 +126,7 @@ def _learning() -> None:
 
 
 def _models() -> None:
-    for entry in dojo.models.catalogue():
+    for entry in dojo.models.catalog():
         sim = dojo.Simulator(entry.build(), time_step=0.01)
         sim.linearize_maximal(sim.maximal(sim.neutral()))
         for calls in (states, motions, derivatives):

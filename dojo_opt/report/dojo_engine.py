@@ -50,7 +50,7 @@ class Ours:
         if sim.second_order:  # a point of its curve would be one of order 2
             raise ValueError(f"order {self.order}: {sim.second_order}")
         try:
-            x = sim.start(q, v)
+            x = sim.state_from_velocity(q, v)
         except SimulationError as error:
             q, v = np.asarray(q, dtype=np.float64), np.asarray(v, dtype=np.float64)
             return observe(sim, np.zeros(1), q[None], v[None], 0.0, 0, str(error))
@@ -71,9 +71,9 @@ def _steps(sim: Simulator, x: Floats, u: Floats, marks: NDArray[np.int64]) -> tu
         count = min(_PIECE, total - done)
         us = np.broadcast_to(u, (count, sim.nu)) if len(u) == 1 else u[done : done + count]
         piece = sim.rollout(x, us)
-        inside = marks[(marks > done) & (marks <= done + piece.knot)] - done
+        inside = marks[(marks > done) & (marks <= done + piece.solved_steps)] - done
         kept.append(piece.x[inside])
-        done += piece.knot
+        done += piece.solved_steps
         if not piece.success:
             return np.concatenate(kept), done, piece.message
         x = piece.x[-1]

@@ -118,7 +118,7 @@ def observe(sim: Simulator, times: Floats, q: Floats, v: Floats, seconds: float,
 
     sim: of the mechanism, with any time step.
     """
-    z = sim.bodies(q, v)
+    z = sim.body_states(q, v)
     return observe_bodies(sim, times, z, potential(sim, q), seconds, steps, message)
 
 

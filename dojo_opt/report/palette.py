@@ -14,8 +14,8 @@ def palette(names: Iterable[str]) -> dict[str, str]:
     """A colour for each name."""
     out: dict[str, str] = {}
     for name in dict.fromkeys(names):
-        colours = _OURS if is_ours(name) else _OTHERS
-        out[name] = colours[sum(is_ours(other) == is_ours(name) for other in out) % len(colours)]
+        colors = _OURS if is_ours(name) else _OTHERS
+        out[name] = colors[sum(is_ours(other) == is_ours(name) for other in out) % len(colors)]
     return out
 
 

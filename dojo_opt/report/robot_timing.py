@@ -64,19 +64,19 @@ def _times(mechanism: Mechanism, rounds: int) -> list[StepTime]:
     paths = []
     for h in TIME_STEPS:
         sim = Simulator(mechanism, time_step=h)
-        x = sim.start(q, v)
+        x = sim.state_from_velocity(q, v)
         path = sim.rollout(x, np.zeros((STEPS, sim.nu)))
         paths.append(path)
-        if path.knot:
-            us = np.zeros((path.knot, sim.nu))
+        if path.solved_steps:
+            us = np.zeros((path.solved_steps, sim.nu))
             cases[f"step {h}"] = lambda sim=sim, x=x, us=us: sim.rollout(x, us)  # type: ignore[misc]
             cases[f"both {h}"] = lambda sim=sim, x=x, us=us: sim.linearize_rollout(x, us)  # type: ignore[misc]
     seconds = interleave(cases, rounds)
     nothing = np.full(rounds, np.nan)
     out = []
     for h, path in zip(TIME_STEPS, paths, strict=True):
-        step, both = (seconds.get(f"{part} {h}", nothing) / max(path.knot, 1) for part in ("step", "both"))
-        iterations = float(np.mean(path.iterations)) if path.knot else float("nan")
+        step, both = (seconds.get(f"{part} {h}", nothing) / max(path.solved_steps, 1) for part in ("step", "both"))
+        iterations = float(np.mean(path.iterations)) if path.solved_steps else float("nan")
         out.append(StepTime(h, iterations, step, both - step, "" if path.success else path.message))
     return out
 

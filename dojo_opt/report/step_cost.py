@@ -60,21 +60,23 @@ def costs(scenes: Sequence[CostScene], rounds: int) -> list[Cost]:
         sim, x = scene.simulator, scene.state
         path = sim.rollout(x, np.zeros((KNOTS, sim.nu)))
         paths.append(path)
-        if path.knot:
-            us, xs = np.zeros((path.knot, sim.nu)), path.x
-            cases[f"step {k}"] = lambda sim=sim, x=x, us=us: sim.closed_loop(x, us)  # type: ignore[misc]
-            cases[f"known {k}"] = lambda sim=sim, x=x, us=us, xs=xs: sim.closed_loop(x, us, xs)  # type: ignore[misc]
+        if path.solved_steps:
+            us, xs = np.zeros((path.solved_steps, sim.nu)), path.x
+            cases[f"step {k}"] = lambda sim=sim, x=x, us=us: sim.rollout_feedback(x, us)  # type: ignore[misc]
+            cases[f"known {k}"] = lambda sim=sim, x=x, us=us, xs=xs: sim.rollout_feedback(x, us, xs)  # type: ignore[misc]
             cases[f"knot {k}"] = lambda sim=sim, us=us, xs=xs: sim.linearize_trajectory(xs, us)  # type: ignore[misc]
     seconds = interleave(cases, rounds)
     out = []
     for k, (scene, path) in enumerate(zip(scenes, paths, strict=True)):
         nothing = np.full(rounds, np.nan)
         step, known, knot = (
-            seconds.get(f"{part} {k}", nothing) / max(path.knot, 1) for part in ("step", "known", "knot")
+            seconds.get(f"{part} {k}", nothing) / max(path.solved_steps, 1) for part in ("step", "known", "knot")
         )
-        iterations = float(np.mean(path.iterations)) if path.knot else float("nan")
+        iterations = float(np.mean(path.iterations)) if path.solved_steps else float("nan")
         message = "" if path.success else path.message
-        out.append(Cost(scene.name, *_sizes(scene, path.knot > 0), iterations, step, knot, knot - known, message))
+        out.append(
+            Cost(scene.name, *_sizes(scene, path.solved_steps > 0), iterations, step, knot, knot - known, message)
+        )
     return out
 
 

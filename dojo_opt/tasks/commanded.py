@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.gaits.gait import Gait
-from dojo_opt.mpc.moving_reference import Sampled
+from dojo_opt.mpc.moving_reference import SampledReference
 from sim.mechanism import checks
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
@@ -32,10 +32,10 @@ class _Stride:
         self.period = float(fine.time[-1])
         self.move = _Place.of(fine.x[-1]).seen_from(_Place.of(fine.x[0]))
         self._sim = sim
-        self._rows = Sampled(fine.time, _Place.of(fine.x[0]).back().carry(sim, fine.x), sim)
+        self._rows = SampledReference(fine.time, _Place.of(fine.x[0]).back().carry(sim, fine.x), sim)
         torque = make(sim, command).torques()
         held = np.vstack([torque, torque[:1]])
-        self.torque = Sampled(sim.time_step * np.arange(len(held)), held, cycle=np.zeros(sim.nu))
+        self.torque = SampledReference(sim.time_step * np.arange(len(held)), held, cycle=np.zeros(sim.nu))
 
     def place(self, phase: float) -> _Place:
         """Where the base is at a time of the period."""

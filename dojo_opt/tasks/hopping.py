@@ -27,7 +27,9 @@ __all__ = ["Hopping", "hopper_mpc"]
 _GRAVITY = 9.81  # [m/s^2]
 _LEG = BaseState.JOINTS  # its length
 _ACROSS, _UPWARD, _SPIN, _LEG_RATE = slice(8, 10), 10, slice(11, 14), 14  # columns of velocities
-_HOPPER = replace(OPTIONS, shooting=1.0)  # after a push most rollouts are lost, and gaps would stay open for ticks
+_HOPPER = replace(
+    OPTIONS, multiple_shooting_below=1.0
+)  # after a push most rollouts are lost, and gaps would stay open for ticks
 
 
 class Hopping:

@@ -11,7 +11,7 @@ from dojo_opt import gaits, models
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.mpc.controller import MPC
-from dojo_opt.mpc.moving_reference import Sampled
+from dojo_opt.mpc.moving_reference import SampledReference
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from sim.mechanism.checks import whole_number
@@ -66,11 +66,13 @@ def quadruped_mpc(
     fine = gaits.trot(level.replace(time_step=knot / 8), speed=speed, period=period, cycles=1, step_height=step_height)
     advance = sim.difference(fine.x[-1], fine.x[0])
     advance[6:] = 0.0  # joints and velocities come round
-    reference: Any = Sampled(fine.time, fine.x, sim, advance).over(sim.time_step)
+    reference: Any = SampledReference(fine.time, fine.x, sim, advance).with_mean_velocities(sim.time_step)
     if terrain is not None:
         sim, reference = sim.replace(mechanism=sim.mechanism.on(terrain)), _OnTerrain(reference, terrain)
     torque = gaits.trot(level, speed=speed, period=period, cycles=1, step_height=step_height).torques()
-    held = Sampled(sim.time_step * np.arange(len(torque) + 1), np.vstack([torque, torque[:1]]), cycle=np.zeros(sim.nu))
+    held = SampledReference(
+        sim.time_step * np.arange(len(torque) + 1), np.vstack([torque, torque[:1]]), cycle=np.zeros(sim.nu)
+    )
     weight = np.array([10.0] * 6 + [1.0] * 12 + [0.1] * 6 + [0.01] * 12)
     times = knot * np.arange(horizon + 1)
     start = reference([0.0])[0]
@@ -90,7 +92,7 @@ def quadruped_mpc(
 class _OnTerrain:
     """A reference of states on level ground, raised by the height of the terrain under its base."""
 
-    def __init__(self, level: Sampled, terrain: Terrain) -> None:
+    def __init__(self, level: SampledReference, terrain: Terrain) -> None:
         self._level, self._terrain = level, terrain
 
     def __call__(self, times: ArrayLike) -> Matrix:

@@ -13,7 +13,7 @@ from solvers.types import Cube, Integers, Matrix, Vector
 
 
 @kernel
-def centre_of_mass(model: Model, data: Data, q: Vector) -> tuple[float, float, float]:
+def center_of_mass(model: Model, data: Data, q: Vector) -> tuple[float, float, float]:
     """Centre of mass of all bodies at the coordinates q [m]; writes configuration 2."""
     place_origin(model, data, q)
     tree_poses(model, data, q)
@@ -35,7 +35,7 @@ def group_wrenches(
     model, data = model_view(model_at), data_view(data_at)
     nq = data.theta1.shape[0]
     for r in range(xs.shape[0]):
-        x, y, z = centre_of_mass(model, data, xs[r, :nq])
+        x, y, z = center_of_mass(model, data, xs[r, :nq])
         for g in range(out.shape[1]):
             for k in range(6):
                 out[r, g, k] = 0.0

@@ -67,7 +67,7 @@ def cluster_gap(model: Model, data: Data, c: int, height: float, third: bool) ->
     rot = data.rot3 if third else data.rot2
     n = model.contact_frame[c]
     p = model.cluster[c]
-    x, y, z = rotate(rot, i, *three(p, Cluster.CENTRE))
+    x, y, z = rotate(rot, i, *three(p, Cluster.CENTER))
     return n[0] * (pos[i, 0] + x) + n[1] * (pos[i, 1] + y) + n[2] * (pos[i, 2] + z) - height - p[Cluster.RADIUS]
 
 

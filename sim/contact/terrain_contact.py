@@ -37,7 +37,7 @@ def upright_frame(x: float, y: float, z: float, out: Vector) -> None:
 
 
 @kernel
-def centre(model: Model, c: int, pos: Matrix, rot: Matrix) -> Vec3:
+def center(model: Model, c: int, pos: Matrix, rot: Matrix) -> Vec3:
     """Centre of the ball of contact c, world axes, at the poses pos (nbody, 3), rot (nbody, 9) of bodies."""
     i = model.contact_body[c]
     p = model.contact_point[c]
@@ -48,7 +48,7 @@ def centre(model: Model, c: int, pos: Matrix, rot: Matrix) -> Vec3:
 @optional(Slot.PLACE_ON_TERRAIN)
 def place_on_terrain(model: Model, data: Data, c: int) -> None:
     """Gap and contact_frame of contact c at configuration 3."""
-    x, y, z = centre(model, c, data.pos3, data.rot3)
+    x, y, z = center(model, c, data.pos3, data.rot3)
     F, Fx, Fy, _xx, _xy, _yy = height_field(model, model.contact_terrain[c] - 1, x, y)
     i = 1.0 / sqrt(1.0 + Fx * Fx + Fy * Fy)
     upright_frame(-i * Fx, -i * Fy, i, data.contact_frame[c])
@@ -59,7 +59,7 @@ def place_on_terrain(model: Model, data: Data, c: int) -> None:
 def terrain_gap(model: Model, data: Data, c: int, third: bool) -> float:
     """Lower bound of the distance of contact c at configuration 3 or 2."""
     k = model.contact_terrain[c] - 1
-    x, y, z = centre(model, c, data.pos3, data.rot3) if third else centre(model, c, data.pos2, data.rot2)
+    x, y, z = center(model, c, data.pos3, data.rot3) if third else center(model, c, data.pos2, data.rot2)
     F = height_field(model, k, x, y)[0]
     return (z - F - model.contact_height[c]) / model.terrain_place[k, Grid.SLOPE]
 
@@ -92,7 +92,7 @@ def turn_on_terrain(model: Model, data: Data, h: float, c: int) -> None:
     i = model.contact_body[c]
     k = data.contact_kin[c]
     f = data.contact_frame[c]
-    x, y, z = centre(model, c, data.pos3, data.rot3)
+    x, y, z = center(model, c, data.pos3, data.rot3)
     _F, Fx, Fy, Fxx, Fxy, Fyy = height_field(model, model.contact_terrain[c] - 1, x, y)
     e1, e2 = turn_columns(f[:3], Fxx, Fxy, Fyy)
     ax, ay, az = x - data.origin[0], y - data.origin[1], z - data.origin[2]

@@ -11,7 +11,7 @@ from __future__ import annotations
 from sim.contact.contact_law import contact_impulse
 from sim.contact.pairs.pair_contact import is_absent, pair_force
 from sim.contact.pairs.pair_stiffness import add_earlier_slip
-from sim.contact.pairs.wrench_columns import centre_shift
+from sim.contact.pairs.wrench_columns import center_shift
 from sim.derivatives.loop_stiffness import loop_stiffness
 from sim.dynamics.loops.constraint_rows import is_loop
 from sim.dynamics.loops.gears import gear_derivatives
@@ -69,7 +69,7 @@ def _take_back(model: Model, data: Data, k: int, f: Vec3) -> None:
         if i < 0:
             continue
         for c in range(6):
-            x = centre_shift(data, data.pos2, i, c)
+            x = center_shift(data, data.pos2, i, c)
             m = cross(x[0], x[1], x[2], sign * f[0], sign * f[1], sign * f[2])
             for r in range(3):
                 data.A2[i, 18 + 6 * r + c] += m[r]

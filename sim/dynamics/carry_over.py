@@ -11,7 +11,7 @@ from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, quat_exp, quat_matrix, rotate, rows_of, times
 from solvers.types import Matrix, Vector
 
-_HANDED_ON = 16  # steps until poses are computed from coordinates
+_MAX_CARRIED_STEPS = 16  # steps until poses are computed from coordinates
 
 
 @kernel
@@ -110,6 +110,6 @@ def advance(model: Model, data: Data, h: float, q: Vector, v: Vector, before: Ve
                 _axis(model, data, i, d + k, a, data.pos1, data.rot1, data.S1)
                 a = (data.rot2[i, k], data.rot2[i, 3 + k], data.rot2[i, 6 + k])
                 _axis(model, data, i, d + k, a, data.pos2, data.rot2, data.S2)
-    if data.carry.steps[0] % _HANDED_ON == 0:
+    if data.carry.steps[0] % _MAX_CARRIED_STEPS == 0:
         tree_poses(model, data, q)
     arriving_momenta(data)

@@ -74,7 +74,7 @@ def state_differences(model_at: Table, x0s: Matrix, x1s: Matrix, out: Matrix) ->
 
 
 @kernel
-def normalise_state(model: Model, x: Vector, tolerance: float) -> int:
+def normalize_state(model: Model, x: Vector, tolerance: float) -> int:
     """`normalise_quaternions` of one state: -1, or the body."""
     for i in range(model.body_parent.shape[0]):
         if model.joint_nrot[i] == 3:
@@ -89,14 +89,14 @@ def normalise_state(model: Model, x: Vector, tolerance: float) -> int:
 
 
 @kernel
-def normalise_quaternions(model_at: Table, xs: Matrix, tolerance: float) -> int:
+def normalize_quaternions(model_at: Table, xs: Matrix, tolerance: float) -> int:
     """Scale the quaternions of every row to length one, in place, unless they are so to 1e-12 already.
 
     Returns -1, or row * nbody + body of the first one that is off by more than the tolerance.   xs: (n, nx).
     """
     model = model_view(model_at)
     for t in range(xs.shape[0]):
-        body = normalise_state(model, xs[t], tolerance)
+        body = normalize_state(model, xs[t], tolerance)
         if body >= 0:
             return t * model.body_parent.shape[0] + body
     return -1

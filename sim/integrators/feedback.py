@@ -32,7 +32,7 @@ class FeedbackLaw(NamedTuple):
     bounds: Cube  # (T, nlimit, 2)
 
 
-class Following(NamedTuple):
+class FeedbackRun(NamedTuple):
     """A motion that follows a FeedbackLaw, with inputs held over the steps of a knot:
 
     u_t = clamp(us_t + alpha ks_t + Ks_t (x_t (-) xs_t)),   x_t+1 = f(x_t, u_t) (+) (alpha - 1) gaps_t+1
@@ -74,7 +74,7 @@ def _expected_velocity(policy: FeedbackLaw, t: int, dx: Vector, u: Vector, out: 
 
 
 @inlined
-def begin_knot(model: Model, data: Data, motion: Following, x: Vector, u: Vector, t: int) -> None:
+def begin_knot(model: Model, data: Data, motion: FeedbackRun, x: Vector, u: Vector, t: int) -> None:
     """u of knot t from the state x there, and where its step looks first: data.step_x[1], data.cone."""
     law = motion.law
     dx = data.chain[0][: law.gaps.shape[1]]
@@ -89,7 +89,7 @@ def begin_knot(model: Model, data: Data, motion: Following, x: Vector, u: Vector
 
 
 @inlined
-def end_knot(model: Model, data: Data, motion: Following, x: Vector, t: int) -> None:
+def end_knot(model: Model, data: Data, motion: FeedbackRun, x: Vector, t: int) -> None:
     """Keep the cone variables where that is wanted, and close the gap of the plan in part, in the next state x."""
     if motion.cones.shape[0] > 0:
         copy(data.cone, motion.cones[t])

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from sim.dynamics.energy import node_velocity
 from sim.dynamics.external_forces import set_external
-from sim.dynamics.state_manifold import normalise_state
+from sim.dynamics.state_manifold import normalize_state
 from sim.integrators import rollout, runge_kutta
 from sim.integrators.phases import NEAR, fly
 from sim.integrators.rollout import UNIT, MotionBuffers, options_of, report_step
@@ -58,7 +58,7 @@ def _begin_near(model: Model, data: Data, work: Data, h: float, path: Phases, t:
     status = _SOLVED
     if _interval(model, work, h, path, x) == h:
         status = start_state(model, work, h, x[data.theta1.shape[0] :], mean)
-    return _NOT_FINITE if status == _SOLVED and normalise_state(model, mean, UNIT) >= 0 else status
+    return _NOT_FINITE if status == _SOLVED and normalize_state(model, mean, UNIT) >= 0 else status
 
 
 @kernel

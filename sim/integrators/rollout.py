@@ -20,8 +20,8 @@ from sim.derivatives.parameters.directions import At
 from sim.derivatives.parameters.parameter_jacobian import parameter_jacobian
 from sim.derivatives.step_gradient import gradient
 from sim.dynamics.external_forces import set_external
-from sim.dynamics.state_manifold import normalise_state
-from sim.integrators.feedback import Following, begin_knot, end_knot
+from sim.dynamics.state_manifold import normalize_state
+from sim.integrators.feedback import FeedbackRun, begin_knot, end_knot
 from sim.model.data import Data
 from sim.model.interruptible_loops import is_due, note_deadline
 from sim.model.layout import data_view, model_view
@@ -132,7 +132,7 @@ def is_finite_matrix(M: Matrix) -> bool:
 @kernel
 def accept(model: Model, motion: MotionBuffers) -> bool:
     """Whether a motion begins at a state, with quaternions of length one to UNIT, under inputs that are numbers."""
-    if not is_finite(motion.xs[0]) or normalise_state(model, motion.xs[0], UNIT) >= 0:
+    if not is_finite(motion.xs[0]) or normalize_state(model, motion.xs[0], UNIT) >= 0:
         return False
     for t in range(motion.us.shape[0]):
         if not is_finite(motion.us[t]):
@@ -148,7 +148,7 @@ def roll(
     motion: MotionBuffers,
     first: int,
     columns: ParameterColumns | None,
-    following: Following | None,
+    following: FeedbackRun | None,
 ) -> int:
     """xs[t + 1] = step(xs[t], us[t]) from the step `first` on; returns how many are solved, those before included.
 

@@ -20,8 +20,8 @@ def translation_axes(ntrans: int, axis: ArrayLike) -> Floats:
         out[0] = unit
     elif ntrans == 2:
         first, second = (e for k, e in enumerate(np.eye(3)) if k != np.argmax(np.abs(unit)))
-        out[0] = _normalised(first - unit * (unit @ first))
-        out[1] = _normalised(second - unit * (unit @ second) - out[0] * (out[0] @ second))
+        out[0] = _normalized(first - unit * (unit @ first))
+        out[1] = _normalized(second - unit * (unit @ second) - out[0] * (out[0] @ second))
     return out
 
 
@@ -35,9 +35,9 @@ def contact_frame(normal: ArrayLike) -> Floats:
     """Rows n, t1, t2 of a right-handed frame: t1 along x (along y for a normal near x), t2 = n x t1."""
     n = np.asarray(normal, dtype=np.float64)
     along = np.array([1.0, 0.0, 0.0]) if abs(n[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    t1 = _normalised(along - n * (n @ along))
+    t1 = _normalized(along - n * (n @ along))
     return np.array([n, t1, np.cross(n, t1)])
 
 
-def _normalised(a: Floats) -> Floats:
+def _normalized(a: Floats) -> Floats:
     return np.asarray(a / np.linalg.norm(a))

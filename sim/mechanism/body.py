@@ -114,10 +114,10 @@ def inertia_of_shapes(call: str, body: Body) -> NDArray[np.float64]:
         if np.any(np.asarray(body.shapes[0].center)):
             raise ValueError(f"{call}): give inertia=...; the shape is not centred at the centre of mass")
         return body.shapes[0].inertia(body.mass)
-    centre, matrix = composite(body.shapes, body.mass)
+    center, matrix = composite(body.shapes, body.mass)
     size = max(float(np.linalg.norm(shape.center)) + shape.bounding_radius() for shape in body.shapes)
-    if not np.abs(centre).max() <= 1e-9 * size:
-        at = np.round(centre, 9).tolist()
+    if not np.abs(center).max() <= 1e-9 * size:
+        at = np.round(center, 9).tolist()
         raise ValueError(
             f"{call}): the centre of mass of its shapes is at {at}; a body has its origin there: move the centers of "
             "the shapes by the negative of that, or give inertia=..."

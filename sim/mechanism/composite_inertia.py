@@ -28,10 +28,10 @@ def composite(shapes: Sequence[Solid], mass: float) -> tuple[Floats, Floats]:
     """
     volumes = np.array([shape.volume() for shape in shapes])
     masses = mass * volumes / volumes.sum()
-    centres = np.array([shape.mass_centre() for shape in shapes])
-    centre = masses @ centres / mass
+    centers = np.array([shape.mass_center() for shape in shapes])
+    center = masses @ centers / mass
     inertia = np.zeros((3, 3))
-    for shape, own, at in zip(shapes, masses, centres, strict=True):
-        d = at - centre
+    for shape, own, at in zip(shapes, masses, centers, strict=True):
+        d = at - center
         inertia += shape.central_inertia(float(own)) + own * (d @ d * np.eye(3) - np.outer(d, d))
-    return centre, inertia
+    return center, inertia

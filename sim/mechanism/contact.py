@@ -76,33 +76,33 @@ class Contact:
             object.__setattr__(self, "height", height + self.height * normal[2])
             object.__setattr__(self, "terrain", None)
 
-    def gap(self, centres: ArrayLike) -> NDArray[np.float64]:
+    def gap(self, centers: ArrayLike) -> NDArray[np.float64]:
         """Distance of the ball from the ground.
 
         Above terrain it is the height over the surface times the vertical part of the normal, right to first order.
 
         Args:
-            centres: (..., 3) centres of the ball, world axes [m].
+            centers: (..., 3) centres of the ball, world axes [m].
 
         Returns:
             (...,) distances [m], negative below the ground.
         """
-        at = np.asarray(centres, dtype=np.float64)
+        at = np.asarray(centers, dtype=np.float64)
         if self.terrain is None:
             return np.asarray(at @ np.asarray(self.normal) - self.radius - self.height)
         surface = self.terrain.surface(float(self.radius))
         return (at[..., 2] - surface.height(at[..., 0], at[..., 1]) - self.height) * self.normal_at(at)[..., 2]
 
-    def normal_at(self, centres: ArrayLike) -> NDArray[np.float64]:
+    def normal_at(self, centers: ArrayLike) -> NDArray[np.float64]:
         """Outward normal of the ground at the ball.
 
         Args:
-            centres: (..., 3) centres of the ball, world axes [m].
+            centers: (..., 3) centres of the ball, world axes [m].
 
         Returns:
             (..., 3) unit normals, world axes.
         """
-        at = np.asarray(centres, dtype=np.float64)
+        at = np.asarray(centers, dtype=np.float64)
         if self.terrain is None:
             return np.array(np.broadcast_to(np.asarray(self.normal), at.shape))
         return self.terrain.surface(float(self.radius)).normal(at[..., 0], at[..., 1])

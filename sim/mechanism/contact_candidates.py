@@ -1,4 +1,4 @@
-"""Touch: a contact point that a collision may have, as kernels need it."""
+"""ContactCandidate: a contact point that a collision may have, as kernels need it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ End = tuple[int, Solid]  # body, -1 for the world, and shape
 
 
 @dataclass(frozen=True)
-class Touch:
+class ContactCandidate:
     """One contact point that a collision may have, as kernels need it: a and b in the order of `collide`."""
 
     name: str
@@ -41,17 +41,19 @@ class Touch:
     reach: float  # infinite where there is none
 
 
-def touches(call: str, bodies: Sequence[Body], joints: Sequence[Joint], collisions: Sequence[Collision]) -> list[Touch]:
+def contact_candidates(
+    call: str, bodies: Sequence[Body], joints: Sequence[Joint], collisions: Sequence[Collision]
+) -> list[ContactCandidate]:
     """All contact points that collisions may have; those of the same two bodies follow one another.
 
     Parts fixed to one another cannot collide: no motion changes the gap, and the impulse is undetermined.
     """
     index = {body.name: i for i, body in enumerate(bodies)} | {WORLD: -1}
     holder = _holders(index, joints)
-    found = [touch for collision in collisions for touch in _touches(call, bodies, index, collision)]
-    found = [touch for touch in found if holder[touch.bodies[0]] != holder[touch.bodies[1]]]
-    order = list(dict.fromkeys(touch.bodies for touch in found))
-    return sorted(found, key=lambda touch: order.index(touch.bodies))
+    found = [candidate for collision in collisions for candidate in _candidates(call, bodies, index, collision)]
+    found = [candidate for candidate in found if holder[candidate.bodies[0]] != holder[candidate.bodies[1]]]
+    order = list(dict.fromkeys(candidate.bodies for candidate in found))
+    return sorted(found, key=lambda candidate: order.index(candidate.bodies))
 
 
 def _holders(index: dict[str, int], joints: Sequence[Joint]) -> dict[int, int]:
@@ -62,7 +64,9 @@ def _holders(index: dict[str, int], joints: Sequence[Joint]) -> dict[int, int]:
     return holder
 
 
-def _touches(call: str, bodies: Sequence[Body], index: dict[str, int], collision: Collision) -> list[Touch]:
+def _candidates(
+    call: str, bodies: Sequence[Body], index: dict[str, int], collision: Collision
+) -> list[ContactCandidate]:
     call = f"{call}: collision {collision.name!r}"
     solids: list[End] = []
     for body, given in ((collision.a, collision.shape_a), (collision.b or WORLD, collision.shape_b)):
@@ -88,7 +92,7 @@ def _touches(call: str, bodies: Sequence[Body], index: dict[str, int], collision
     return _points(collision, kind, solids[::-1] if swapped else solids)
 
 
-def _points(collision: Collision, kind: shape_kinds.Pair, ends: list[End]) -> list[Touch]:
+def _points(collision: Collision, kind: shape_kinds.Pair, ends: list[End]) -> list[ContactCandidate]:
     """The contact points of two shapes in the order of their pair."""
     rope = isinstance(ends[0][1], String)  # which pulls along itself, and does not rub
     sizes = np.zeros(8)
@@ -114,7 +118,7 @@ def _points(collision: Collision, kind: shape_kinds.Pair, ends: list[End]) -> li
         ends, around, code = ends[::-1], around[::-1], code + shape_kinds.SWAPPED
     places = np.array([_place(shape) for _, shape in ends])
     return [
-        Touch(
+        ContactCandidate(
             collision.name if number == 1 else f"{collision.name}_{feature}",
             (ends[0][0], ends[1][0]),
             code,
@@ -140,7 +144,7 @@ _REASON = (
 )
 
 
-def _corners(collision: Collision, solid: tuple[int, Polytope | SignedDistance], ground: End) -> list[Touch]:
+def _corners(collision: Collision, solid: tuple[int, Polytope | SignedDistance], ground: End) -> list[ContactCandidate]:
     """A polytope above a half-space touches it with its corners: points, each a ball without radius; a signed distance
     with the points of its stance, each with the offset around it.
     """
@@ -156,7 +160,7 @@ def _corners(collision: Collision, solid: tuple[int, Polytope | SignedDistance],
         law = (collision.friction or 0.0, collision.law, collision.restitution or 0.0, collision.name)
         reach = inf if collision.reach is None else collision.reach
         out.append(
-            Touch(
+            ContactCandidate(
                 f"{collision.name}_{k}", bodies, kind, 0, sizes.copy(), (), (stance.radius, np.inf), where, *law, reach
             )
         )
@@ -168,6 +172,6 @@ def _place(shape: Solid) -> Floats:
     return np.concatenate([np.asarray(shape.center), rotation_matrix(shape.orientation).ravel()])
 
 
-def couples(found: Sequence[Touch]) -> list[tuple[int, int]]:
-    """The pairs of bodies, in the order of their touches."""
-    return [bodies for bodies, _ in groupby(found, key=lambda touch: touch.bodies)]
+def couples(found: Sequence[ContactCandidate]) -> list[tuple[int, int]]:
+    """The pairs of bodies, in the order of their candidates."""
+    return [bodies for bodies, _ in groupby(found, key=lambda candidate: candidate.bodies)]

@@ -31,7 +31,7 @@ class Bent(NamedTuple):
     """A mechanism with its hinges at BEND: positions [m] and directions in the world."""
 
     rotation: Floats  # (nbody, 3, 3)
-    centre: Floats  # (nbody, 3) centres of mass
+    center: Floats  # (nbody, 3) centres of mass
     joint: Floats  # (nbody, 3) joint points on the parents
     frame: Floats  # (nbody, 3, 3) orientations of the joint frames on the parents
     columns: Floats  # (nv, 6) velocity at the origin of the world and angular velocity per unit of a rate
@@ -42,24 +42,24 @@ def bent(model: Model) -> Bent:
     """The mechanism with its hinges at BEND."""
     n = len(model.body_mass)
     rotation, frame = np.empty((n, 3, 3)), np.empty((n, 3, 3))
-    centre, joint = np.empty((n, 3)), np.empty((n, 3))
+    center, joint = np.empty((n, 3)), np.empty((n, 3))
     columns, inertia = np.zeros((len(model.dof_body), 6)), np.empty((n, 6, 6))
     for i in range(n):
         p, offset = int(model.body_parent[i]), rotation_matrix(model.joint_offset[i])
         frame[i] = offset if p < 0 else rotation[p] @ offset
-        joint[i] = model.joint_parent_point[i] if p < 0 else centre[p] + rotation[p] @ model.joint_parent_point[i]
-        rotation[i], centre[i] = frame[i], joint[i].copy()
+        joint[i] = model.joint_parent_point[i] if p < 0 else center[p] + rotation[p] @ model.joint_parent_point[i]
+        rotation[i], center[i] = frame[i], joint[i].copy()
         if model.joint_nrot[i] == 1:
             rotation[i] = frame[i] @ turn(model.joint_axis[i], BEND)
-            centre[i] += BEND * model.joint_lead[i] * (frame[i] @ model.joint_axis[i])
-        centre[i] -= rotation[i] @ model.joint_child_point[i]
+            center[i] += BEND * model.joint_lead[i] * (frame[i] @ model.joint_axis[i])
+        center[i] -= rotation[i] @ model.joint_child_point[i]
         dofs = slice(int(model.body_vadr[i]), int(model.body_vadr[i + 1]))
         local = joint_columns(model, i)
         columns[dofs, 3:] = local[:, 3:] @ frame[i].T
         columns[dofs, :3] = local[:, :3] @ frame[i].T - columns[dofs, 3:] @ _skew(joint[i])
         J = rotation[i] @ model.body_inertia[i].reshape(3, 3) @ rotation[i].T
-        inertia[i] = _about_origin(float(model.body_mass[i]), J, centre[i])
-    return Bent(rotation, centre, joint, frame, columns, inertia)
+        inertia[i] = _about_origin(float(model.body_mass[i]), J, center[i])
+    return Bent(rotation, center, joint, frame, columns, inertia)
 
 
 def joint_columns(model: Model, i: int) -> Floats:

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _ROUNDS = 40  # of the search for a nearest point
-_NEAR = 3.0  # [cells] from the surface, where distances are to the level set itself, and not to its triangles
+_NARROW_BAND = 3.0  # [cells] from the surface, where distances are to the level set itself, and not to its triangles
 _FEW, _MANY = 8, 64  # triangles with the nearest centres
 _CHUNK = 5_000
 
@@ -30,7 +30,7 @@ def distances_to_level(solid: LevelSet) -> Floats:
     vertices, faces = solid.surface
     corners: Floats = vertices[faces]
     out, start = to_triangles(points, corners, 2.0 * solid.spacing)
-    near = out < _NEAR * solid.spacing
+    near = out < _NARROW_BAND * solid.spacing
     c, x = points[near], start[near]
     for _ in range(_ROUNDS):
         f, g = solid.field(x)
@@ -62,7 +62,7 @@ def to_triangles(points: Floats, corners: Floats, spacing: float) -> tuple[Float
     for start in range(0, len(points), _CHUNK):
         some = points[start : start + _CHUNK]
         d, y = _nearest(some, corners[_candidates(tree, some, _FEW)])
-        near = np.flatnonzero(d < _NEAR * spacing)
+        near = np.flatnonzero(d < _NARROW_BAND * spacing)
         if len(near):
             d[near], y[near] = _nearest(some[near], corners[_candidates(tree, some[near], _MANY)])
         out[start : start + len(some)], nearest[start : start + len(some)] = d, y

@@ -129,9 +129,9 @@ class LevelSet:
         near = binary_dilation(self.mixed, np.ones((3, 3, 3)), iterations=1 + int(np.ceil(offset / h)))
         low = [slice(0, -1), slice(1, None)]
         full = ~near & (self.values[low[0], low[0], low[0]] < 0.0)
-        centres = self.origin + h * (np.argwhere(full) + 0.5)
-        volume, first = h**3 * len(centres), h**3 * centres.sum(axis=0)
-        second = h**3 * (centres.T @ centres + len(centres) * h**2 / 12.0 * np.eye(3))
+        centers = self.origin + h * (np.argwhere(full) + 0.5)
+        volume, first = h**3 * len(centers), h**3 * centers.sum(axis=0)
+        second = h**3 * (centers.T @ centers + len(centers) * h**2 / 12.0 * np.eye(3))
         small = h / _PARTS
         for x in self._parts(np.argwhere(near)):
             f, g = self.field(x)

@@ -14,7 +14,7 @@ from sim.mechanism import checks
 from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision, shape_by_shape
 from sim.mechanism.contact import Contact
-from sim.mechanism.contact_candidates import Touch, touches
+from sim.mechanism.contact_candidates import ContactCandidate, contact_candidates
 from sim.mechanism.dofs import components, dof_names
 from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.gear import Gear, check_gears
@@ -145,12 +145,12 @@ class Mechanism:
     @cached_property
     def contact_names(self) -> tuple[str, ...]:
         """Names of the contacts: those with the ground, then the contact points of the collisions."""
-        return (*(c.name for c in self.contacts), *(touch.name for touch in self.touches))
+        return (*(c.name for c in self.contacts), *(candidate.name for candidate in self.contact_candidates))
 
     @cached_property
-    def touches(self) -> tuple[Touch, ...]:
+    def contact_candidates(self) -> tuple[ContactCandidate, ...]:
         """The contact points that the collisions may have."""
-        return tuple(touches(f"Mechanism({self.name!r})", self.bodies, self.joints, self.collisions))
+        return tuple(contact_candidates(f"Mechanism({self.name!r})", self.bodies, self.joints, self.collisions))
 
     @cached_property
     def contact_normals(self) -> NDArray[np.float64]:
@@ -466,15 +466,15 @@ def _moved_obstacle(collision: Collision, point: Floats, quat: Floats) -> Collis
     shape = collision.shape_b
     if collision.b != WORLD or shape is None:
         return collision
-    centre = point + rotation_matrix(quat) @ np.asarray(shape.center)
-    return replace(collision, shape_b=replace(shape, center=centre, orientation=_product(quat, shape.orientation)))
+    center = point + rotation_matrix(quat) @ np.asarray(shape.center)
+    return replace(collision, shape_b=replace(shape, center=center, orientation=_product(quat, shape.orientation)))
 
 
 def _moved_visual(visual: Visual, point: Floats, quat: Floats) -> Visual:
     """The pictures of the world move with the scene that they belong to."""
     part: Any = visual if visual.shape is None else visual.shape
-    centre = point + rotation_matrix(quat) @ np.asarray(part.center)
-    moved = replace(part, center=centre, orientation=_product(quat, part.orientation))
+    center = point + rotation_matrix(quat) @ np.asarray(part.center)
+    moved = replace(part, center=center, orientation=_product(quat, part.orientation))
     return moved if visual.shape is None else replace(visual, shape=moved)
 
 
@@ -534,10 +534,10 @@ def _standing(mech: Mechanism) -> Floats:
         first = mech.q_slice(joint.name).start
         rises = []
         for c in mech.contacts:
-            centre = at[c.body].at(c.point)
-            slope = float(c.normal_at(centre)[2])
+            center = at[c.body].at(c.point)
+            slope = float(c.normal_at(center)[2])
             if c.body in hanging and slope > 0.0:
-                rises.append((_CLEAR - float(c.gap(centre))) / slope)
+                rises.append((_CLEAR - float(c.gap(center))) / slope)
         if rises:
             q[first : first + 3] += max(rises) * rotation_matrix(joint.orientation)[2]
     return q

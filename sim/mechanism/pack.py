@@ -30,7 +30,7 @@ _CONE = 0.0  # instead of the sign of a bound
 def mechanism_sizes(mech: Mechanism) -> Sizes:
     """Counts of a mechanism; a limit is one bound of one degree of freedom."""
     nlimit = sum(len(_bounds(j)) for j in mech.joints)
-    npair, npairs = len(mech.touches), len(couples(mech.touches))
+    npair, npairs = len(mech.contact_candidates), len(couples(mech.contact_candidates))
     fields = list(height_fields(mech).values())
     return Sizes(
         nbody=mech.nbody,
@@ -43,7 +43,7 @@ def mechanism_sizes(mech: Mechanism) -> Sizes:
         ncoupling=npairs + len(mech.loops),
         nrow=6 * npairs + sum(6 - j.nv for j in mech.loops) + len(mech.gears),
         nloop=len(mech.loops),
-        nhull=max(1, sum(len(table) for table in tables_of(mech.touches))),
+        nhull=max(1, sum(len(table) for table in tables_of(mech.contact_candidates))),
         ngear=len(mech.gears),
         nterrain=len(fields),
         nheight=sum(f.coefficients.size for f in fields),

@@ -22,20 +22,20 @@ def pack_clusters(model: Model) -> None:
     ends = [*(1 + np.flatnonzero(~joined)).tolist(), count]
     for first, end in zip([0, *ends[:-1]], ends if count else [], strict=False):
         points, radii = model.contact_point[first:end], model.contact_radius[first:end]
-        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        around = float(np.max(np.linalg.norm(points - centre, axis=1) + radii))
+        center = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        around = float(np.max(np.linalg.norm(points - center, axis=1) + radii))
         arm = float(np.max(np.linalg.norm(points, axis=1) + radii))
         body = int(model.contact_body[first])
         mass, turning = _mobility(model, body)
         inertia, easy = model.body_inertia[body], turning**0.5
         swing = max(_swing(inertia, p) + r * easy for p, r in zip(points, radii, strict=True))
-        spread = float(np.max(np.linalg.norm(points - centre, axis=1)))
+        spread = float(np.max(np.linalg.norm(points - center, axis=1)))
         mobility = mass + swing * swing + 2.0 * spread * swing * easy
         friction = model.contact_friction[first:end].max()
         model.cluster_end[first] = end
         turn = _swing(inertia, points.mean(axis=0)) * easy
         several = np.count_nonzero(model.contact_body[:count] == body)
-        model.cluster[first] = *centre, around, arm, mobility, friction, turn, several
+        model.cluster[first] = *center, around, arm, mobility, friction, turn, several
 
 
 def _swing(inertia: Floats, p: Floats) -> float:

@@ -120,7 +120,7 @@ class Polytope(Solid):
             )
         return self.central_inertia(mass)
 
-    def mass_centre(self) -> Floats:
+    def mass_center(self) -> Floats:
         """Centre of the solid.
 
         Returns:

@@ -40,13 +40,13 @@ def self_collisions(
     Returns:
         (the collisions, the names of the pairs that overlap).
     """
-    at, near = body_poses(joints, q), _neighbours(bodies, joints, loops)
+    at, near = body_poses(joints, q), _neighbors(bodies, joints, loops)
     reach = _REACH * _extent(bodies, at)
     found, overlapping = [], []
     for a, b in combinations([body for body in bodies if body.shapes], 2):
         if frozenset((a.name, b.name)) in near:
             continue
-        for (one, label_a), (other, label_b) in product(_labelled(a), _labelled(b)):
+        for (one, label_a), (other, label_b) in product(_labeled(a), _labeled(b)):
             name = f"{label_a}-{label_b}"
             if separation(at[a.name], one, at[b.name], other) > 0.0:
                 shapes = (None if len(a.shapes) == 1 else one), (None if len(b.shapes) == 1 else other)
@@ -58,7 +58,7 @@ def self_collisions(
 
 def _extent(bodies: Sequence[Body], at: Mapping[str, Pose]) -> float:
     """Largest side of the box around the shapes of all bodies [m]."""
-    ends = [_points(at[body.name], shape) for body in bodies for shape, _ in _labelled(body)]
+    ends = [_points(at[body.name], shape) for body in bodies for shape, _ in _labeled(body)]
     if not ends:
         return 1.0
     low = np.min([points.min(axis=0) - radius for points, radius in ends], axis=0)
@@ -66,14 +66,14 @@ def _extent(bodies: Sequence[Body], at: Mapping[str, Pose]) -> float:
     return float((high - low).max())
 
 
-def _labelled(body: Body) -> Iterator[tuple[Solid, str]]:
+def _labeled(body: Body) -> Iterator[tuple[Solid, str]]:
     """The shapes with an end, with their names as in contacts."""
     for number, shape in enumerate(body.shapes):
         if not isinstance(shape, HalfSpace | String):
             yield shape, body.name if len(body.shapes) == 1 else f"{body.name}.{shape.name or number}"
 
 
-def _neighbours(bodies: Sequence[Body], joints: Sequence[Joint], loops: Sequence[Joint]) -> set[frozenset[str]]:
+def _neighbors(bodies: Sequence[Body], joints: Sequence[Joint], loops: Sequence[Joint]) -> set[frozenset[str]]:
     """Pairs of bodies that a joint connects, or that are one."""
     solid = {body.name: body.mass > 0.0 for body in bodies}
     parent = {joint.child: joint for joint in joints}

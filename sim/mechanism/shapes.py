@@ -221,7 +221,7 @@ class Solid:
             raise ValueError(f"{call}: expected shape (..., 3), got {places.shape}")
         return places @ rotation_matrix(self.orientation).T + np.asarray(self.center)
 
-    def mass_centre(self) -> Floats:
+    def mass_center(self) -> Floats:
         """Centre of the solid.
 
         Returns:

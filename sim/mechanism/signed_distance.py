@@ -245,7 +245,7 @@ class SignedDistance(Solid):
             )
         return self.central_inertia(mass)
 
-    def mass_centre(self) -> Floats:
+    def mass_center(self) -> Floats:
         """Centre of the solid.
 
         Returns:
@@ -336,13 +336,13 @@ class SignedDistance(Solid):
             below, squares = -2.0 * away @ n, (away**2).sum(axis=1)
             inward = below > 1e-3 * self.spacing
             radius = min(radius, float((squares[inward] / below[inward]).min(initial=np.inf)))
-        centres = at - radius * normals
-        apart = np.unique(np.round(centres / (_APART * self.spacing)), axis=0, return_index=True)[1]
-        return centres[np.sort(apart)], radius
+        centers = at - radius * normals
+        apart = np.unique(np.round(centers / (_APART * self.spacing)), axis=0, return_index=True)[1]
+        return centers[np.sort(apart)], radius
 
     def stance(self) -> Stance:
-        centres, radius = self._balls
-        return Stance("point", centres, self.offset + radius)
+        centers, radius = self._balls
+        return Stance("point", centers, self.offset + radius)
 
 
 def _at_edge(values: Floats) -> float:

@@ -57,7 +57,7 @@ class Verdict(Code):
 
     VALID = 0
     OVERLAPPING = 1  # in features that were not active
-    TUNNELLED = 2  # a point has passed through the other shape, or a collision gave energy
+    TUNNELED = 2  # a point has passed through the other shape, or a collision gave energy
     ENERGY_GAIN = 3  # the step gained energy
 
 

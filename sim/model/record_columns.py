@@ -137,7 +137,7 @@ class Apart(Code):
 class Cluster(Code):
     """cluster: contacts of one body against one direction, as one ball (mechanism/pack_clusters.py)."""
 
-    CENTRE = 0  # (3,) in the body
+    CENTER = 0  # (3,) in the body
     RADIUS = 3
     ARM = 4  # largest distance from the centre of mass
     MOBILITY = 5  # M of contact/inactive.py

@@ -47,7 +47,7 @@ class Scratch:
             first = kept["first"] = self.tables(1)[0]
         return first
 
-    def turn(self) -> None:
+    def refresh_contact_frames(self) -> None:
         """Mark Data as stale after contact frames turned; every thread reloads them at its next call."""
         self._turns += 1
 

@@ -40,7 +40,7 @@ class Arguments:
     def states(self, call: str, xs: ArrayLike) -> Floats:
         """A copy of the states (..., nx), with quaternions of length one."""
         out = np.array(xs, dtype=np.float64, order="C")
-        bad = self._engine.states.normalise(out.reshape(-1, self.nx), UNIT)
+        bad = self._engine.states.normalize(out.reshape(-1, self.nx), UNIT)
         if bad >= 0:
             row, body = divmod(bad, self.nbody)
             at = f" in row {row}" if out.ndim > 1 else ""
@@ -136,7 +136,7 @@ class Arguments:
                 raise ValueError(f"{call}(Ks=...): gains need reference states, xs=...")
             xs[:] = start
         external = self._engine.external(wrenches)
-        return FeedbackLaw(self.states(f"{call}(xs=...)", xs), us, external, ks, Ks, gaps, *self._engine.unknown)
+        return FeedbackLaw(self.states(f"{call}(xs=...)", xs), us, external, ks, Ks, gaps, *self._engine.no_predictions)
 
     def limits(self, call: str, limits: tuple[ArrayLike, ArrayLike] | None) -> tuple[Floats, Floats]:
         """(lower, upper) of every input, infinite where free."""

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 
 from sim.mechanism.contact import Contact
-from sim.mechanism.contact_candidates import Touch
+from sim.mechanism.contact_candidates import ContactCandidate
 from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes
@@ -104,7 +104,7 @@ def _collision_lines(mech: Mechanism) -> list[str]:
     """The shapes of each collision, and the number of their contact points."""
     lines = []
     for c in mech.collisions:
-        points = sum(touch.collision == c.name for touch in mech.touches)
+        points = sum(candidate.collision == c.name for candidate in mech.contact_candidates)
         met = _count(points, "point", "points") if points else "fixed to one another, omitted"
         kinds = [_solid(mech, *end) for end in ((c.a, c.shape_a), (c.b or WORLD, c.shape_b))]
         more = f", restitution {c.restitution:g}" if c.restitution else ""
@@ -147,7 +147,7 @@ def _far_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
 def _parts(mech: Mechanism, order: int, second_order: str) -> list[tuple[str, str]]:
     """The parts of a step, and those that it omits."""
     nlimit = mechanism_sizes(mech).nlimit
-    points: list[Contact | Touch] = [*mech.contacts, *mech.touches]
+    points: list[Contact | ContactCandidate] = [*mech.contacts, *mech.contact_candidates]
     cones = sum(c.friction > 0 and c.law == "nonlinear" for c in points)
     pyramids = sum(c.friction > 0 and c.law == "linear" for c in points)
     impacts = len(points) - cones - pyramids

@@ -22,7 +22,7 @@ def roll_policy(
     us = np.zeros((count, engine.nu))
     xs, reports = np.zeros((count + 1, engine.nx)), np.zeros((count, REPORT))
     contacts: list[Floats] = []
-    division, (A, B) = Division.none(count), engine.unknown[:2]
+    division, (A, B) = Division.none(count), engine.no_predictions[:2]
     xs[0], knot = x, 0
     try:
         for k in range(count):
@@ -31,8 +31,11 @@ def roll_policy(
             one = engine.roll(xs[k], us[k : k + 1], None if wrenches is None else wrenches[k : k + 1])
             reports[k], xs[k + 1] = one.reports[0], one.xs[1]
             contacts.append(one.contacts[0])
-            division.substeps[k], division.shares[k] = one.division.substeps[0], one.division.shares[0]
-            if one.knot == 0:
+            division.parts[k], division.momentum_fractions[k] = (
+                one.division.parts[0],
+                one.division.momentum_fractions[0],
+            )
+            if one.solved_steps == 0:
                 break
             knot = k + 1
     except KeyboardInterrupt:

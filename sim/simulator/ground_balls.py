@@ -44,18 +44,18 @@ class GroundBalls:
         Returns:
             (centres (k, 3), gaps (k,)) [m].
         """
-        centres = at[self._bodies] + (R[self._bodies] @ self._points[..., None])[..., 0]
-        gap = np.einsum("ka,ka->k", centres, self._normals) - self._away
+        centers = at[self._bodies] + (R[self._bodies] @ self._points[..., None])[..., 0]
+        gap = np.einsum("ka,ka->k", centers, self._normals) - self._away
         for i in self._uneven:
-            gap[i] = self._contacts[i].gap(centres[i])
-        return centres, gap
+            gap[i] = self._contacts[i].gap(centers[i])
+        return centers, gap
 
-    def force_map(self, i: int, centre: Floats, z: Floats, J: Floats) -> tuple[Floats, Floats]:
+    def force_map(self, i: int, center: Floats, z: Floats, J: Floats) -> tuple[Floats, Floats]:
         """Generalised forces per unit of normal and tangential forces at the point of a ball nearest to the ground.
 
         Args:
             i: number of the ball.
-            centre: (3,) its centre [m].
+            center: (3,) its centre [m].
             z: (nbody, 13) maximal states of the bodies.
             J: (nbody, 6, nv) Jacobians of the bodies.
 
@@ -63,12 +63,12 @@ class GroundBalls:
             (forces (nv, 3), directions (3, 3) by rows in world axes: the normal, and two tangents).
         """
         contact, body = self._contacts[i], self._bodies[i]
-        n = np.asarray(contact.normal_at(centre), dtype=np.float64)
+        n = np.asarray(contact.normal_at(center), dtype=np.float64)
         k = int(np.abs(n).argmin())
         first = _cross(n) @ np.eye(3)[k]
         first /= np.linalg.norm(first)
         frame = np.stack([n, first, _cross(n) @ first])
-        arm = centre - contact.radius * n - z[body, BodyState.POSITION]
+        arm = center - contact.radius * n - z[body, BodyState.POSITION]
         return ((frame @ J[body, :3]) - (frame @ _cross(arm)) @ J[body, 3:]).T, frame
 
 

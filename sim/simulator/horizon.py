@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from sim.integrators.feedback import FeedbackLaw
 from sim.model.record_columns import StepReport
 from sim.simulator.arguments import Arguments
+from sim.simulator.derivative_results import Linearization
 from sim.simulator.engines.engine import Engine
-from sim.simulator.results import STATUSES, Linearization
+from sim.simulator.results import STATUSES
 from solvers.status import Status
 
 Floats = NDArray[np.float64]
@@ -46,7 +47,7 @@ class Rollout(NamedTuple):
     x: Floats  # (T + 1, nx)
     u: Floats  # (T, nu) [N, N m]
     status: Status
-    knot: int  # number of solved knots
+    solved_knots: int
     steps: Steps | None  # None where a knot has several
 
 
@@ -94,13 +95,13 @@ class Horizon:
         known: Known = _NOTHING,
         max_iterations: int | None = None,
     ) -> Rollout:
-        """Rollout from x0 (nx,) under the gains around (xs, us), as `Simulator.closed_loop`.
+        """Rollout from x0 (nx,) under the gains around (xs, us), as `Simulator.rollout_feedback`.
 
         known: of (xs, us).
         max_iterations: of a step, where it may fail sooner than the simulator's.
         """
-        derivatives = self._engine.unknown[:2] if known.linear is None else (known.linear.A, known.linear.B)
-        cones = self._engine.unknown[2:] if known.steps is None else known.steps
+        derivatives = self._engine.no_predictions[:2] if known.linear is None else (known.linear.A, known.linear.B)
+        cones = self._engine.no_predictions[2:] if known.steps is None else known.steps
         policy = FeedbackLaw(
             xs,
             us,
@@ -112,7 +113,7 @@ class Horizon:
             *cones,
         )
         keep = self._substeps == 1
-        knot, path = self._engine.closed_loop(
+        knot, path = self._engine.roll_feedback(
             x0, policy, alpha, self._limits, self._substeps, kappa, keep=keep, max_iterations=max_iterations
         )
         kept = Steps(path.cones, path.bounds) if keep else None

@@ -30,7 +30,7 @@ class Kinematics:
 
     A frame has the name of a body, with its origin at the centre of mass, or of a link of a robot from a file, merged
     links included; `frames` lists them, `add` adds one. If a link and a body have the same name, the frame is that of
-    the link. Velocities are those of joints, as in `Simulator.start`, not momenta of a step.
+    the link. Velocities are those of joints, as in `Simulator.state_from_velocity`, not momenta of a step.
 
     Jacobians, twists and wrenches have linear parts first, world axes: [velocity of the frame's origin; angular].
 
@@ -118,7 +118,7 @@ class Kinematics:
         q = self._q("Kinematics.pose(q)", q)
         if body < 0:
             return np.broadcast_to(point, (*q.shape[:-1], 3)), np.broadcast_to(turn, (*q.shape[:-1], 3, 3))
-        z = self.sim.bodies(q, np.zeros((*q.shape[:-1], self.sim.nv)))[..., body, :]
+        z = self.sim.body_states(q, np.zeros((*q.shape[:-1], self.sim.nv)))[..., body, :]
         R = _rotations(z[..., BodyState.QUATERNION])
         return z[..., BodyState.POSITION] + R @ point, R @ turn
 
@@ -165,7 +165,7 @@ class Kinematics:
             (..., 3) place [m].
         """
         q = self._q("Kinematics.center_of_mass(q)", q)
-        z = self.sim.bodies(q, np.zeros((*q.shape[:-1], self.sim.nv)))
+        z = self.sim.body_states(q, np.zeros((*q.shape[:-1], self.sim.nv)))
         return np.asarray(self._mass @ z[..., BodyState.POSITION] / self._mass.sum())
 
     def com_jacobian(self, q: ArrayLike) -> Floats:
@@ -193,7 +193,7 @@ class Kinematics:
         """
         q = self._q("Kinematics.centroidal_momentum(q)", q)
         v = _rows("Kinematics.centroidal_momentum(v)", v, self.sim.nv)
-        z = self.sim.bodies(q, np.zeros((*q.shape[:-1], self.sim.nv)))
+        z = self.sim.body_states(q, np.zeros((*q.shape[:-1], self.sim.nv)))
         J, R = self._body_jacobians(q)
         twist = (J @ v[..., None, :, None])[..., 0]
         p = self._mass[:, None] * twist[..., :3]
@@ -320,13 +320,13 @@ class Kinematics:
         J, R = self._body_jacobians(q)
         load = checks.within_range(call, self._inverse_dynamics(q, v, dv, J, R)) - known
         forces, residual = np.zeros((*load.shape[:-1], len(names), 3)), np.zeros(load.shape[:-1])
-        success, z = np.zeros(load.shape[:-1], dtype=bool), self.sim.bodies(q, np.zeros(load.shape))
+        success, z = np.zeros(load.shape[:-1], dtype=bool), self.sim.body_states(q, np.zeros(load.shape))
         pushed = np.zeros(load.shape)
         ground = GroundBalls(chosen, [self._bodies[c.body] for c in chosen])
         for row in np.ndindex(load.shape[:-1]):
-            centres, gap = ground.places(z[row][:, BodyState.POSITION], R[row])
+            centers, gap = ground.places(z[row][:, BodyState.POSITION], R[row])
             near = [i for i in range(len(names)) if contacts is not None or gap[i] < _TOUCHING]
-            maps = [ground.force_map(i, centres[i], z[row], J[row]) for i in near]
+            maps = [ground.force_map(i, centers[i], z[row], J[row]) for i in near]
             A = np.array([push for push, _ in maps]).reshape(len(near), mech.nv, 3).transpose(1, 0, 2)
             f, residual[row] = least_forces(A[~driven], load[row][~driven], ground.friction[near])
             success[row] = balanced(float(residual[row]), load[row])
@@ -357,7 +357,7 @@ class Kinematics:
 
     def _twists(self, q: Floats, v: Floats) -> Floats:
         """Velocities and angular velocities (..., nbody, 6) of the bodies, world axes."""
-        z = checks.within_range("Kinematics", self.sim.bodies(q, v))
+        z = checks.within_range("Kinematics", self.sim.body_states(q, v))
         spin = _rotations(z[..., BodyState.QUATERNION]) @ z[..., BodyState.SPIN, None]
         return np.concatenate([z[..., BodyState.VELOCITY], spin[..., 0]], axis=-1)
 
@@ -438,7 +438,7 @@ class Kinematics:
         """
         nv = self.sim.nv
         many = np.broadcast_to(q[..., None, :], (*q.shape[:-1], nv, q.shape[-1]))
-        z = self.sim.bodies(many, np.broadcast_to(np.eye(nv), (*q.shape[:-1], nv, nv)))
+        z = self.sim.body_states(many, np.broadcast_to(np.eye(nv), (*q.shape[:-1], nv, nv)))
         checks.within_range("Kinematics", z)
         R = _rotations(z[..., 0, :, BodyState.QUATERNION])
         columns = np.moveaxis(z, -3, -1)  # (..., nbody, 13, nv)

@@ -21,8 +21,10 @@ from sim.simulator.engines.mean_states import MeanStates
 Floats = NDArray[np.float64]
 
 _APART = 0.1  # [m, rad] parts of a cut body that are farther apart are first brought together
-_ASIDE = 0.03  # [m, rad]
-_ALONE = 2  # starts of each distance of one loop alone, which are only to explain why all of them stay open
+_DISPLACEMENT = 0.03  # [m, rad]
+_STARTS_OF_ONE_LOOP = (
+    2  # starts of each distance of one loop alone, which are only to explain why all of them stay open
+)
 _STARTS = 30  # repetitions, each of which halves the error at least
 _DEPENDENT = 1e-6  # singular values below this share of the largest belong to redundant constraints
 
@@ -173,12 +175,12 @@ class Closure:
         return here._replace(singular=max(0, *more, 0), nearby=max((r.weakest for r in near), default=here.weakest))
 
     def _next_to(self, x: Floats, free: Floats) -> list[Floats]:
-        """Closed states at rest, _ASIDE away from x along some of its free directions (n, nv)."""
+        """Closed states at rest, _DISPLACEMENT away from x along some of its free directions (n, nv)."""
         rng = np.random.default_rng(0)
         states = []
         for _ in range(2 if len(free) else 0):
             d = rng.normal(size=len(free)) @ free
-            moved = self._around(x)(d[None] * (_ASIDE / np.abs(d).max()))[0]
+            moved = self._around(x)(d[None] * (_DISPLACEMENT / np.abs(d).max()))[0]
             moved[self._nq :] = 0.0
             try:
                 states.append(self.close(moved, search=False))
@@ -226,7 +228,7 @@ class Closure:
         """The error message when the state place(d) is the best that was found."""
         gaps = {name: float(np.abs(gap).max()) for name, gap in self.gaps(place(d[None])[0]).items()}
         names = [*gaps] if search and len(gaps) > 1 else []
-        alone = [name for name in names if not nearest(self._error(place, name), len(d), _ALONE).found]
+        alone = [name for name in names if not nearest(self._error(place, name), len(d), _STARTS_OF_ONE_LOOP).found]
         worst = max(alone or gaps, key=lambda name: gaps[name])
         welds = {j.name: j.name.removeprefix(f"{j.parent}.") for j in self._mechanism.loops if is_weld(j)}
         constraint = worst if worst.startswith("gear ") else f"loop joint {welds.get(worst, worst)!r}"

@@ -17,7 +17,7 @@ from sim.simulator.npz_file import check_head, check_shapes, read_npz, reading
 
 Floats = NDArray[np.float64]
 
-__all__ = ["archived", "contact_rows", "export", "joint_trajectory", "opened", "restored"]
+__all__ = ["archived", "contact_rows", "export", "joint_trajectory", "opened", "restored", "with_new_names"]
 
 _SETTINGS = (
     "time_step",
@@ -97,6 +97,21 @@ def restored(head: dict[str, Any], arrays: dict[str, Any]) -> Any:
     return sim
 
 
+_RENAMED = {"knot": "solved_steps", "substeps": "parts", "shares": "momentum_fractions"}  # until version 0.2
+
+
+def with_new_names(entries: dict[str, Any]) -> dict[str, Any]:
+    """Entries of a head, or arrays, of a trajectory, those with an old name under the new one.
+
+    Args:
+        entries: the entries by name.
+
+    Returns:
+        The same entries by their present names.
+    """
+    return {_RENAMED.get(name, name): entry for name, entry in entries.items()}
+
+
 def contact_rows(sim: Any, head: Mapping[str, Any], arrays: Arrays) -> Arrays:
     """Check the archive of a trajectory.
 
@@ -111,10 +126,10 @@ def contact_rows(sim: Any, head: Mapping[str, Any], arrays: Arrays) -> Arrays:
     Raises:
         ValueError: an entry or an array is missing, or does not fit.
     """
-    check_head(head, {"status": int, "knot": int, "residual": float, "detail": str})
-    steps, row = head["knot"], (head["knot"], sim.ncontact)
+    check_head(head, {"status": int, "solved_steps": int, "residual": float, "detail": str})
+    steps, row = head["solved_steps"], (head["solved_steps"], sim.ncontact)
     shapes: dict[str, tuple[int | None, ...]] = {"x": (steps + 1, sim.nx), "u": (steps, sim.nu), "time": (steps + 1,)}
-    shapes |= dict.fromkeys(("iterations", "substeps", "shares", "errors"), (steps,))
+    shapes |= dict.fromkeys(("iterations", "parts", "momentum_fractions", "errors"), (steps,))
     shapes |= {"contact_gap": row, "contact_slip": row}
     shapes |= dict.fromkeys(("contact_impulse", "contact_point", "contact_normals"), (*row, 3))
     shapes |= {"wrenches": (steps, sim.nbody, 6)} if "wrenches" in arrays else {}

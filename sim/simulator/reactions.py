@@ -31,7 +31,7 @@ from sim.mechanism.short_repr import short_repr
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.record_columns import StepReport
-from sim.simulator.engines.engine import Divided, Engine
+from sim.simulator.engines.engine import DividedStep, Engine
 from sim.simulator.results import Result
 from solvers.status import MESSAGES, Status
 
@@ -130,12 +130,12 @@ def reactions(
     status, detail = Status.SOLVED, ""
     for k, (state, control) in enumerate(zip(states, us, strict=True)):
         rolled = engine.roll(state, control[None], None if wrenches is None else wrenches[k : k + 1])
-        if rolled.knot == 0:
+        if rolled.solved_steps == 0:
             if status == Status.SOLVED:
                 report = rolled.reports[0]
                 status, detail = Status(int(report[StepReport.STATUS])), explain(call, report, state)
             continue
-        if rolled.division.substeps[0] == 1:
+        if rolled.division.parts[0] == 1:
             out[:, k] = _rows(mech, engine, loops, frame)
         else:
             external = engine.external(wrenches)[k : k + 1]
@@ -159,7 +159,7 @@ def _rows(mech: Mechanism, engine: Engine, loops: list[tuple[int, Joint]], frame
 
 
 def _mean_rows(
-    mech: Mechanism, divided: Divided, given: tuple[Floats, Floats], loops: list[tuple[int, Joint]], frame: str
+    mech: Mechanism, divided: DividedStep, given: tuple[Floats, Floats], loops: list[tuple[int, Joint]], frame: str
 ) -> Floats:
     """As `_rows` of a divided step: points where it begins, means of the wrenches of its parts."""
     control, external = given

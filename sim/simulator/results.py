@@ -1,13 +1,12 @@
 """Results of Simulator: frozen dataclasses of arrays, each a Result with `success`, `status` and `message`.
 
-No method raises for an unsolved step unless throw=True: the result has its status. Derivatives of
-an unsolved step are zero: a Jacobian or Gradient raises SimulationError when they are taken out, by unpacking or by
-name; a Linearization, of many knots, has their status.
+No method raises for an unsolved step unless throw=True: the result has its status. Results of
+derivatives are in derivative_results.py.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
@@ -22,10 +21,11 @@ from sim.contact.pairs.limited_reach import BEYOND
 from sim.integrators.feedback import Path
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.renamed import renamed
 from sim.mechanism.short_repr import drawn, short_repr
 from sim.model.record_columns import ContactRow, StepReport
 from sim.model.state_columns import BodyState
-from sim.simulator.motion_file import archived, contact_rows, export, opened, restored
+from sim.simulator.motion_file import archived, contact_rows, export, opened, restored, with_new_names
 from sim.simulator.npz_file import reading, write_npz
 from solvers.status import MESSAGES, Status
 from solvers.types import Integers
@@ -54,9 +54,10 @@ class Interrupted(KeyboardInterrupt):
     """Ctrl-C during a long call, which ends within a fifth of a second.
 
     Attributes:
-        result: return value of the call so far: the Trajectory, Shot or Batch of a rollout with the solved steps, the
-            Plan of `ilqr` with the trajectory of its last iteration, the ClosedLoop of `closed_loop`; None if nothing
-            was done yet. Calls that compute derivatives only raise KeyboardInterrupt.
+        result: return value of the call so far: the Trajectory, FeedbackRollout or RolloutBatch of a rollout with the
+            solved steps, the Plan of `ilqr` with the trajectory of its last iteration, the ClosedLoop of
+            `dojo.closed_loop`; None if nothing was done yet. Calls that compute derivatives only raise
+            KeyboardInterrupt.
     """
 
     def __init__(self, result: Any = None) -> None:
@@ -184,8 +185,8 @@ class StepResult(Result):
         residual: largest error of a balance or gap equation [N s, m].
         violation: largest |product - kappa| of the complementary pairs [N s m].
         scene: mechanism, time step, and rows of the contacts, for `contacts`.
-        substeps: number of steps that it was divided into.
-        share: share of the relative momentum of bodies that a divided step conserved.
+        parts: number of steps that it was divided into.
+        momentum_fraction: fraction of the relative momentum of bodies that a divided step conserved.
         error: ratio of the estimated error to the one that the accuracy allows; 0 without an accuracy.
         detail: sentence about an unsolved step, with its numbers.
     """
@@ -196,10 +197,12 @@ class StepResult(Result):
     residual: float
     violation: float
     scene: tuple[Mechanism, float, Floats] = field(repr=False)
-    substeps: int = 1
-    share: float = 1.0
+    parts: int = 1
+    momentum_fraction: float = 1.0
     error: float = 0.0
     detail: str = ""
+    substeps = renamed("parts")
+    share = renamed("momentum_fraction")
 
     @cached_property
     def contacts(self) -> Contacts:
@@ -211,7 +214,7 @@ class StepResult(Result):
 
 @dataclass(frozen=True, repr=False)
 class Trajectory(Result):
-    """A rollout. It ends at the first step that was not solved: then x has knot + 1 rows, u and the rest knot rows.
+    """A rollout. It ends at the first step that was not solved: u has one row per solved step, and x one more.
 
     Attributes:
         simulator: the Simulator that made it.
@@ -219,12 +222,13 @@ class Trajectory(Result):
         u: (T, nu) inputs [N, N m].
         time: (T + 1,) times of the states [s].
         status: Status of the rollout.
-        knot: number of solved steps.
+        solved_steps: number of solved steps.
         residual: largest error of an equation in the last step that was tried [N s, m].
         iterations: (T,) iterations of each step.
         contacts: contacts of each step, (T, ncontact, ...).
-        substeps: (T,) number of steps that each step was divided into.
-        shares: (T,) share of the relative momentum of bodies that each step conserved: 1, except in whip-like motions.
+        parts: (T,) number of steps that each step was divided into; with an accuracy, of sub-steps.
+        momentum_fractions: (T,) fraction of the relative momentum of bodies that each step conserved: 1, except in
+            whip-like motions.
         errors: (T,) ratio of the estimated to the allowed error of each step: above 1 if contacts prevented a shorter
             step; 0 without an accuracy.
         detail: sentence about an unsolved step, with its numbers.
@@ -236,19 +240,22 @@ class Trajectory(Result):
     u: Floats
     time: Floats
     status: Status
-    knot: int
+    solved_steps: int
     residual: float
     iterations: Integers
     contacts: Contacts
-    substeps: Integers
-    shares: Floats
+    parts: Integers
+    momentum_fractions: Floats
     errors: Floats
     detail: str = ""
     wrenches: Floats | None = None
+    knot = renamed("solved_steps")
+    substeps = renamed("parts")
+    shares = renamed("momentum_fractions")
 
     def __repr__(self) -> str:
         sim, shapes = self.simulator, f"x {self.x.shape}, u {self.u.shape}"
-        steps = f"{self.knot} steps of {sim.time_step:g} s"
+        steps = f"{self.solved_steps} steps of {sim.time_step:g} s"
         return f"Trajectory({sim.mechanism.name}, {steps}, {self.status.name}, {shapes})"
 
     def _repr_html_(self) -> str:
@@ -264,8 +271,9 @@ class Trajectory(Result):
             OSError: the file cannot be written.
         """
         head, arrays = archived(self.simulator, "trajectory")
-        plain = {"status": int(self.status), "knot": self.knot, "residual": self.residual, "detail": self.detail}
-        names = ("x", "u", "time", "iterations", "substeps", "shares", "errors")
+        plain = {name: getattr(self, name) for name in ("solved_steps", "residual", "detail")}
+        plain["status"] = int(self.status)
+        names = ("x", "u", "time", "iterations", "parts", "momentum_fractions", "errors")
         arrays |= {name: getattr(self, name) for name in names}
         rows = {name: getattr(self.contacts, name) for name in ("impulse", "point", "gap", "slip", "normals")}
         arrays |= {f"contact_{name}": array for name, array in rows.items()}
@@ -289,7 +297,7 @@ class Trajectory(Result):
         call = "Trajectory.load"
         head, arrays = opened(call, path, "trajectory")
         with reading(call, path, "trajectory"):
-            sim = restored(head, arrays)
+            sim, head, arrays = restored(head, arrays), with_new_names(head), with_new_names(arrays)
             rows = contact_rows(sim, head, arrays)
             contacts = Contacts(sim.mechanism.contact_names, time_step=sim.time_step, **rows)
             return cls(simulator=sim, status=Status(head.pop("status")), contacts=contacts, **head, **arrays)
@@ -329,14 +337,14 @@ class Trajectory(Result):
 
 
 @dataclass(frozen=True)
-class Shot(Result):
-    """A closed-loop rollout; x and u end at the first knot that was not solved.
+class FeedbackRollout(Result):
+    """A rollout under a feedback law; x and u end at the first knot that was not solved.
 
     Attributes:
         x: (T + 1, nx) states.
         u: (T, nu) inputs [N, N m].
         status: Status of the rollout.
-        knot: number of solved knots.
+        solved_knots: number of solved knots.
         residual: largest error of an equation in the last step that was tried [N s, m].
         detail: sentence about an unsolved step, with its numbers.
     """
@@ -344,14 +352,15 @@ class Shot(Result):
     x: Floats
     u: Floats
     status: Status
-    knot: int
+    solved_knots: int
     residual: float
     detail: str = ""
+    knot = renamed("solved_knots")
 
     __repr__ = short_repr
 
     @classmethod
-    def of(cls, found: tuple[int, Path]) -> Shot:
+    def of(cls, found: tuple[int, Path]) -> FeedbackRollout:
         """The result of a rollout.
 
         Args:
@@ -366,163 +375,26 @@ class Shot(Result):
 
 
 @dataclass(frozen=True)
-class Jacobian(Result):
-    """Derivatives of one step: unpacks into its blocks, `A, B = jacobian`, and is a table of them by name.
-
-    Access to A, B or a block of an unsolved step raises SimulationError.
-
-    Attributes:
-        blocks: in the order of wrt=...: "state" (ndx, ndx), "input" (ndx, nu), parameters (ndx, n).
-        x_next: (nx,) state after the step.
-        status: Status of the step.
-        accuracy: estimate of the error, relative to the largest entry.
-        detail: sentence about an unsolved step, with its numbers.
-    """
-
-    blocks: Mapping[str, Floats]
-    x_next: Floats
-    status: Status
-    accuracy: float = 0.0
-    detail: str = ""
-
-    __repr__ = short_repr
-
-    @property
-    def A(self) -> Floats:
-        """(ndx, ndx) d(next state)/d(state)."""
-        return self["state"]
-
-    @property
-    def B(self) -> Floats:
-        """(ndx, nu) d(next state)/d(input)."""
-        return self["input"]
-
-    def __iter__(self) -> Iterator[Floats]:
-        return iter(self.values())
-
-    def __len__(self) -> int:
-        return len(self.blocks)
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.blocks
-
-    def __getitem__(self, name: str | int) -> Floats:
-        self.check()
-        return tuple(self.blocks.values())[name] if isinstance(name, int) else self.blocks[name]
-
-    def keys(self) -> Iterable[str]:
-        """Names of the blocks, in the order of wrt=...; `dict(jacobian)` is a table of them.
-
-        Returns:
-            The names.
-
-        Raises:
-            SimulationError: the step was not solved.
-        """
-        self.check()
-        return self.blocks.keys()
-
-    def values(self) -> Iterable[Floats]:
-        """The blocks.
-
-        Returns:
-            Blocks (ndx, n), in the order of the names.
-
-        Raises:
-            SimulationError: the step was not solved.
-        """
-        self.check()
-        return self.blocks.values()
-
-    def items(self) -> Iterable[tuple[str, Floats]]:
-        """Names and blocks.
-
-        Returns:
-            Pairs (name, block (ndx, n)).
-
-        Raises:
-            SimulationError: the step was not solved.
-        """
-        self.check()
-        return self.blocks.items()
-
-
-@dataclass(frozen=True)
-class Linearization(Result):
-    """Derivatives of every knot at its state and input, in tangent coordinates.
-
-    Attributes:
-        A: (T, ndx, ndx) derivatives by the state.
-        B: (T, ndx, nu) derivatives by the input.
-        x_next: (T, nx) states after the knots.
-        status: (T,) Status of each knot; the derivatives of an unsolved knot are zero.
-        parameters: derivatives (T, ndx, n) by the names of the requested parameters.
-        accuracy: (T,) estimate of the error of A and B, relative to their largest entry: hard contacts on light parts
-            cost digits. It takes the step as solved: where contacts graze, a step that is solved to the default
-            `tolerance` may have derivatives that are off by 1e-3; with 1e-12 they are not.
-        detail: sentence about an unsolved step, with its numbers.
-    """
-
-    A: Floats
-    B: Floats
-    x_next: Floats
-    status: Integers
-    parameters: Mapping[str, Floats] = field(default_factory=dict)
-    accuracy: Floats = field(default_factory=lambda: np.zeros(0))
-    detail: str = ""
-
-    __repr__ = short_repr
-
-
-@dataclass(frozen=True)
-class Gradient(Result, Mapping[str, Floats]):
-    """Gradient of a scalar of a rollout, by the names of wrt=...
-
-    Access to a block of an unsolved rollout raises SimulationError.
-
-    Attributes:
-        blocks: "state" (ndx,), "input" (T, nu), parameters (n,).
-        status: Status of the rollout.
-        detail: sentence about an unsolved step, with its numbers.
-    """
-
-    blocks: Mapping[str, Floats]
-    status: Status
-    detail: str = ""
-
-    __repr__ = short_repr
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.blocks)
-
-    def __len__(self) -> int:
-        return len(self.blocks)
-
-    def __getitem__(self, name: str) -> Floats:
-        self.check()
-        return self.blocks[name]
-
-
-@dataclass(frozen=True)
-class Batch(Result):
+class RolloutBatch(Result):
     """Rollouts from many states. Rows after the first unsolved step of a rollout repeat its last state.
 
     Attributes:
         x: (n, T + 1, nx) states.
         status: (n,) Status of each rollout.
-        knot: (n,) number of solved steps.
+        solved_steps: (n,) number of solved steps.
         detail: sentence about an unsolved step, with its numbers.
     """
 
     x: Floats
     status: Integers
-    knot: Integers
+    solved_steps: Integers
     detail: str = ""
+    knot = renamed("solved_steps")
 
     __repr__ = short_repr
 
     @classmethod
-    def of(cls, rows: tuple[Floats, Integers, Integers]) -> Batch:
+    def of(cls, rows: tuple[Floats, Integers, Integers]) -> RolloutBatch:
         """The result of a batch.
 
         Args:

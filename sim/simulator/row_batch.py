@@ -35,16 +35,26 @@ _KEPT = 512  # models
 
 
 @dataclass(frozen=True)
-class BatchStep(Result):
-    """One knot of every row. An unsolved row keeps its state, and its derivatives are zero."""
+class StepBatch(Result):
+    """One knot of every row. An unsolved row keeps its state, and its derivatives are zero.
 
-    x: Floats  # (n, nx)
-    status: Integers  # (n,) Status of each row
-    iterations: Integers  # (n,) of its last step
-    A: Floats  # (n, ndx, ndx) derivatives by its state, or (0, ndx, ndx)
-    B: Floats  # (n, ndx, nu) by its input, held over the knot
+    Attributes:
+        x: (n, nx) states after the knot.
+        status: (n,) Status of each row.
+        iterations: (n,) iterations of the last step of each row.
+        A: (n, ndx, ndx) derivatives by the state of each row, or (0, ndx, ndx).
+        B: (n, ndx, nu) derivatives by its input, held over the knot, or (0, ndx, nu).
+        detail: sentence about an unsolved row, with its numbers.
+        contacts: contacts of the last step of each row, if the call asked for them.
+    """
+
+    x: Floats
+    status: Integers
+    iterations: Integers
+    A: Floats
+    B: Floats
     detail: str = ""
-    contacts: Contacts | None = None  # of the last step of each row, if the call asked for them
+    contacts: Contacts | None = None
 
     @property
     def unsolved(self) -> Integers:
@@ -137,7 +147,7 @@ class RowBatch:
 
     __repr__ = short_repr
 
-    def step(self, derivatives: bool) -> tuple[BatchStep, Floats]:
+    def step(self, derivatives: bool) -> tuple[StepBatch, Floats]:
         """One knot of every row, and the report of each."""
         first = self.engines[0]
         n = len(self.us)
@@ -162,7 +172,7 @@ class RowBatch:
         if len(self.impulses):
             self.impulses.known[:] = whole & (reports[:, StepReport.STATUS] == Status.SOLVED)
         statuses, iterations = (reports[:, k].astype(np.int64) for k in (StepReport.STATUS, StepReport.ITERATIONS))
-        return BatchStep(x_next, statuses, iterations, A, B), reports
+        return StepBatch(x_next, statuses, iterations, A, B), reports
 
     def _kappa(self, row: int) -> float | None:
         """Kappa of a row; None for that of its engine."""
@@ -209,7 +219,7 @@ class RowBatch:
         us = np.repeat(self.us[:, None], self.substeps, axis=1)
         knots = np.zeros(n, dtype=np.int64)
         contacts = np.zeros((len(self.contacts) * self.substeps, *self.contacts.shape[1:]))
-        motions = BatchBuffers(xs, us, reports[:, None], knots, first.no_wrenches, contacts, *first.unkept[1:])
+        motions = BatchBuffers(xs, us, reports[:, None], knots, first.no_wrenches, contacts, *first.no_outputs[1:])
         deadline = np.zeros(len(StepSetting))
         for _ in pieces(deadline, 2):
             rows.settings[:, StepSetting.DEADLINE] = deadline[StepSetting.DEADLINE]
@@ -224,8 +234,8 @@ class RowBatch:
         engine = self.engines[self.index[row]]
         us = np.repeat(self.us[row : row + 1], self.substeps, axis=0)
         rolled = engine.roll(self.xs[row], us, kappa=self._kappa(row), derivatives=derivatives)
-        reports[row] = rolled.reports[min(rolled.knot, self.substeps - 1)]
-        if rolled.knot < self.substeps:
+        reports[row] = rolled.reports[min(rolled.solved_steps, self.substeps - 1)]
+        if rolled.solved_steps < self.substeps:
             return
         x_next[row] = rolled.xs[-1]
         if len(self.contacts):
@@ -261,8 +271,8 @@ class SingleRow:
     def __init__(self, mechanism: Mechanism, engine: Engine, steps: int, contacts: bool) -> None:
         self._mechanism, self._engine, self._steps = mechanism, engine, steps
         xs, us, reports = np.empty((steps + 1, engine.nx)), np.empty((steps, engine.nu)), np.empty((steps, REPORT))
-        rows = np.zeros((steps if contacts else 0, *engine.unkept[0].shape[1:]))
-        self._motion = MotionBuffers(xs, us, engine.external(None), reports, rows, *engine.unkept[1:])
+        rows = np.zeros((steps if contacts else 0, *engine.no_outputs[0].shape[1:]))
+        self._motion = MotionBuffers(xs, us, engine.external(None), reports, rows, *engine.no_outputs[1:])
         self._division = Division.none(steps)
         self._none = np.zeros((0, engine.ndx, engine.ndx)), np.zeros((0, engine.ndx, engine.nu))
         self._start, self.end, self._knot = xs[0], xs[-1], 0
@@ -284,7 +294,7 @@ class SingleRow:
         self._knot = self._engine.take_steps(self._engine.step_table(), motion, None, self._division)
         return self._knot == self._steps
 
-    def step(self, states: Floats, inputs: Floats) -> BatchStep:
+    def step(self, states: Floats, inputs: Floats) -> StepBatch:
         """The knot of a row.
 
         Args:
@@ -292,21 +302,21 @@ class SingleRow:
             inputs: (1, nu) finite inputs [N, N m].
 
         Returns:
-            BatchStep without derivatives.
+            StepBatch without derivatives.
         """
         states = states[:, : self._engine.nx]
         self.advance(states[0], inputs[0])
         return self.result(states)
 
-    def result(self, states: Floats) -> BatchStep:
+    def result(self, states: Floats) -> StepBatch:
         """How the knot ended that began at these states (1, nx), which a row keeps that was not solved."""
         solved = self._knot == self._steps
         last = self._motion.reports[-1 if solved else self._knot]
         status, iterations = last[:2].astype(np.int64)[:, None]
         if solved:
-            return BatchStep(self.end[None].copy(), status, iterations, *self._none, contacts=self.contacts)
+            return StepBatch(self.end[None].copy(), status, iterations, *self._none, contacts=self.contacts)
         detail = sentence(self._mechanism, "Simulator.step_batch: row 0", last, self._engine.settings.tolerance)
-        return BatchStep(states, status, iterations, *self._none, detail, self.contacts)
+        return StepBatch(states, status, iterations, *self._none, detail, self.contacts)
 
     @property
     def contacts(self) -> Contacts | None:
@@ -335,7 +345,7 @@ class RowStepping(StateSpace):
         contacts: bool = False,
         impulses: RowImpulses | None = None,
         throw: bool = False,
-    ) -> BatchStep:
+    ) -> StepBatch:
         """One knot of independent rows, over all cores: row i goes from X[i] by `substeps` steps with U[i] held.
 
         A row starts from its own state alone, so its result depends neither on the other rows nor on the cores.
@@ -356,7 +366,7 @@ class RowStepping(StateSpace):
             throw: raise SimulationError where a step is not solved.
 
         Returns:
-            BatchStep with the states after the knot, and A (n, ndx, ndx), B (n, ndx, nu).
+            StepBatch with the states after the knot, and A (n, ndx, ndx), B (n, ndx, nu).
 
         Raises:
             ValueError: a value is out of range, or has the wrong shape.
@@ -384,7 +394,7 @@ class RowStepping(StateSpace):
         if contacts and (derivatives or not self._engine.in_one_kernel):
             raise ValueError(f"{call}(contacts=True): expected no derivatives, and a simulator without an accuracy")
         engines, index = self._row_models.of(f"{call}(parameters=...)", parameters, count)
-        rows = np.zeros((count if contacts else 0, *self._engine.unkept[0].shape[1:]))
+        rows = np.zeros((count if contacts else 0, *self._engine.no_outputs[0].shape[1:]))
         found, reports = RowBatch(engines, index, states, inputs, steps, kappas, rows, kept).step(bool(derivatives))
         if contacts:
             found = replace(found, contacts=contacts_of(self.mechanism, self.time_step, rows))

@@ -19,7 +19,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.model.interruptible_loops import pieces
 from sim.model.record_columns import StepReport
 from sim.simulator.engines.division import DIVISIBLE, Division
-from sim.simulator.engines.engine import CONTACT, REPORT, Divided, Engine, Rolled, refuse
+from sim.simulator.engines.engine import CONTACT, REPORT, DividedStep, Engine, Rolled, refuse
 from sim.simulator.link_kernels import link_heights, link_parameters
 from solvers.status import Status
 from solvers.types import Vector
@@ -128,7 +128,7 @@ def divided_slopes(
 
 
 def _products(
-    engine: Engine, request: Request, step: tuple[Vector, Vector, Floats], divided: Divided, kappa: float | None
+    engine: Engine, request: Request, step: tuple[Vector, Vector, Floats], divided: DividedStep, kappa: float | None
 ) -> StepSlopes:
     """Of a divided step: the products of those of its parts and of the conversions at both ends."""
     x, u, external = step
@@ -162,7 +162,7 @@ def roll_parameters(
     while knot < n:
         if in_one_loop:
             motion = MotionBuffers(
-                xs[knot:], us[knot:], wrenches[knot:], reports[knot:], engine.unkept[0], A[knot:], B[knot:]
+                xs[knot:], us[knot:], wrenches[knot:], reports[knot:], engine.no_outputs[0], A[knot:], B[knot:]
             )
             knot += _whole_steps(engine, request.plan, motion, J[knot:], kappa)
             if knot == n:

@@ -14,20 +14,19 @@ from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory_limit import room_for
+from sim.mechanism.renamed import renamed
 from sim.model.record_columns import StepReport
 from sim.simulator.arguments import is_plain
 from sim.simulator.contact_settings import with_contacts
+from sim.simulator.derivative_results import Gradient, Jacobian, Linearization
 from sim.simulator.engines.engine import REPORT, Rolled
 from sim.simulator.feedback_rollout import Feedback, roll_policy
 from sim.simulator.horizon import Horizon
 from sim.simulator.reactions import Reactions, reactions
 from sim.simulator.results import (
     STATUSES,
-    Batch,
-    Gradient,
-    Jacobian,
-    Linearization,
-    Shot,
+    FeedbackRollout,
+    RolloutBatch,
     StepResult,
     Trajectory,
     carried,
@@ -72,8 +71,8 @@ class Simulator(RowStepping):
             order 2 near contacts, collisions and limits, and for joints too stiff for an explicit step: see
             `describe()`.
         divide: whether a step that cannot be solved, or turns a body too far, becomes 2, 4, ... up to 1024 steps, as
-            few as it needs: see `substeps` of results. The parts conserve momentum exactly, unless no pair of
-            consecutive poses has this momentum; then part of the relative momentum is lost: see `shares`.
+            few as it needs: see `parts` of results. The parts conserve momentum exactly, unless no pair of
+            consecutive poses has this momentum; then part of the relative momentum is lost: see `momentum_fractions`.
         accuracy: allowed error of the joint coordinates per second of motion [m, rad]. Each step is divided into
             sub-steps of order 8 or 2 accordingly, and impacts happen at their own times. `errors` of results has the
             ratio of estimated to allowed error; see sim/integrators/adaptive.py.
@@ -171,10 +170,10 @@ class Simulator(RowStepping):
         if status == REFUSED:
             check.state("step", x)
             check.inputs("step", "u", control, (self.nu,))
-        scene, end = (self.mechanism, self.time_step, rolled.contacts[0]), rolled.xs[1 if rolled.knot else 0]
+        scene, end = (self.mechanism, self.time_step, rolled.contacts[0]), rolled.xs[1 if rolled.solved_steps else 0]
         (parts, share, error), worst = rolled.division, float(rolled.division.errors[0])
         solved = STATUSES[int(status)], int(iterations), residual, violation
-        detail = "" if rolled.knot else self._sentence("Simulator.step", rolled.reports[0], end)
+        detail = "" if rolled.solved_steps else self._sentence("Simulator.step", rolled.reports[0], end)
         division = int(parts[0]), float(share[0]), worst, missed(error) if worst > 1.0 else detail
         return ended(StepResult(end, *solved, scene, *division), throw)
 
@@ -209,12 +208,8 @@ class Simulator(RowStepping):
         if callable(us):
             count = self._arguments.steps("rollout", steps)
             external = self._arguments.wrenches("rollout", wrenches, count)
-            policy = us
-            asked = carried(
-                lambda: roll_policy(self._engine, state, policy, count, external),
-                lambda found: self._trajectory(found[0], found[1], external),
-            )
-            return ended(asked, throw)
+            taken, policy = (lambda found: self._trajectory(found[0], found[1], external)), us
+            return ended(carried(lambda: roll_policy(self._engine, state, policy, count, external), taken), throw)
         if us is None:
             inputs = np.zeros((self._arguments.steps("rollout", steps), self.nu))
         else:
@@ -228,9 +223,9 @@ class Simulator(RowStepping):
 
     def _trajectory(self, inputs: Floats, rolled: Rolled, wrenches: Floats | None) -> Trajectory:
         """A rollout under the inputs (T, nu)."""
-        knot, xs, reports = rolled.knot, rolled.xs, rolled.reports
+        knot, xs, reports = rolled.solved_steps, rolled.xs, rolled.reports
         last = reports[min(knot, len(reports) - 1)] if len(reports) else np.zeros(REPORT)
-        status, (substeps, shares, errors) = STATUSES[int(last[StepReport.STATUS])], rolled.division
+        status, (parts, fractions, errors) = STATUSES[int(last[StepReport.STATUS])], rolled.division
         where = "Simulator.rollout: step "
         detail = missed(errors) if status == Status.SOLVED else self._sentence(f"{where}{knot}", last, xs[knot])
         return Trajectory(
@@ -239,18 +234,18 @@ class Simulator(RowStepping):
             u=inputs[:knot],
             time=self.time_step * np.arange(knot + 1.0),
             status=status,
-            knot=knot,
+            solved_steps=knot,
             residual=float(last[StepReport.RESIDUAL]),
             iterations=reports[:knot, StepReport.ITERATIONS].astype(np.int64),
             contacts=contacts_of(self.mechanism, self.time_step, rolled.contacts[:knot]),
-            substeps=substeps[:knot],
-            shares=shares[:knot],
+            parts=parts[:knot],
+            momentum_fractions=fractions[:knot],
             errors=errors[:knot],
             detail=detail,
             wrenches=None if wrenches is None else wrenches[:knot],
         )
 
-    def rollout_batch(self, x0s: ArrayLike, us: ArrayLike, *, throw: bool = False) -> Batch:
+    def rollout_batch(self, x0s: ArrayLike, us: ArrayLike, *, throw: bool = False) -> RolloutBatch:
         """Rollouts over all cores.
 
         Args:
@@ -259,14 +254,14 @@ class Simulator(RowStepping):
             throw: raise SimulationError if a step is not solved.
 
         Returns:
-            Batch of the states.
+            RolloutBatch of the states.
         """
         call = "Simulator.rollout_batch"
         inputs = self._arguments.inputs("rollout_batch", "us", us, ("n", "T", self.nu))
         starts = self._arguments.states(f"{call}(x0s)", checks.array(f"{call}(x0s)", x0s, (len(inputs), self.nx)))
-        return ended(carried(lambda: self._engine.roll_batch(starts, inputs), Batch.of), throw)
+        return ended(carried(lambda: self._engine.roll_batch(starts, inputs), RolloutBatch.of), throw)
 
-    def closed_loop(  # noqa: PLR0913
+    def rollout_feedback(  # noqa: PLR0913
         self,
         x0: ArrayLike,
         us: ArrayLike,
@@ -281,7 +276,7 @@ class Simulator(RowStepping):
         kappa: float | None = None,
         wrenches: Wrenches | None = None,
         throw: bool = False,
-    ) -> Shot:
+    ) -> FeedbackRollout:
         """Rollout under a feedback law, each knot `substeps` steps with u held:
 
             u_t     = clamp(us_t + alpha ks_t + Ks_t (x_t (-) xs_t))
@@ -302,9 +297,9 @@ class Simulator(RowStepping):
             throw: raise SimulationError where a step is not solved.
 
         Returns:
-            Shot with the solved knots.
+            FeedbackRollout with the solved knots.
         """
-        call = "closed_loop"
+        call = "rollout_feedback"
         state, inputs = self._arguments.state(call, x0, "x0"), self._arguments.inputs(call, "us", us, ("T", self.nu))
         name = f"Simulator.{call}"
         factor = checks.number(f"{name}(alpha=...)", alpha)
@@ -312,8 +307,12 @@ class Simulator(RowStepping):
         external = self._arguments.wrenches(call, wrenches, len(inputs))
         policy = self._arguments.policy(name, state, inputs, external, (xs, ks, Ks, gaps))
         count, level = whole_number(f"{name}(substeps=...)", substeps), self._arguments.kappa(call, kappa)
-        found = carried(lambda: self._engine.closed_loop(state, policy, factor, bounds, count, level), Shot.of)
+        found = carried(
+            lambda: self._engine.roll_feedback(state, policy, factor, bounds, count, level), FeedbackRollout.of
+        )
         return ended(found, throw)
+
+    closed_loop = renamed("rollout_feedback")
 
     def reactions(
         self,
@@ -382,7 +381,7 @@ class Simulator(RowStepping):
         call = "Simulator.horizon"
         size = room_for(f"{call}(knots)", knots, 8.0 * self.ndx * (self.ndx + 2 * self.nu + 1))
         steps, bounds = whole_number(f"{call}(substeps=...)", substeps), self._arguments.limits(call, limits)
-        return Horizon(self._engine.whole(), self._arguments, size, steps, bounds)
+        return Horizon(self._engine.undivided(), self._arguments, size, steps, bounds)
 
     # -- derivatives ---------------------------------------------------------------------------------------------------
 
@@ -461,7 +460,7 @@ class Simulator(RowStepping):
             blocks = {name: J[:, :, rows] for name, rows in selected[1].rows.items()}
         else:
             rolled = self._engine.roll(state, inputs, external, kappa=level, derivatives=True)
-        knot, reports, detail = rolled.knot, rolled.reports, ""
+        knot, reports, detail = rolled.solved_steps, rolled.reports, ""
         if knot < len(inputs):
             detail = sentence(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)
             reports[knot:, StepReport.STATUS] = reports[knot, StepReport.STATUS]

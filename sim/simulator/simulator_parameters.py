@@ -87,7 +87,7 @@ class SimulatorParameters:
         for own, after in changes:
             np.copyto(own, after)
         self._packed = new
-        self._engine.renew()
+        self._engine.refresh()
 
     def roll(
         self,

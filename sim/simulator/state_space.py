@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.dynamics.loops.loop_rank import LoopRank
 from sim.mechanism import checks
-from sim.mechanism.axes import contact_frame
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes, pack
+from sim.mechanism.renamed import renamed
 from sim.model.record_columns import StepReport
 from sim.simulator.arguments import Arguments, shaped
 from sim.simulator.describe import describe
@@ -101,39 +101,6 @@ class StateSpace:
 
         return SimulatorParameters(self._engine, self.mechanism, self.time_step)
 
-    def turn_ground(self, normal: ArrayLike) -> None:
-        """Turn the half-spaces under all contacts, in place.
-
-        It is meant for loops that estimate the ground in their own simulator. `mechanism` keeps the normals that it was
-        made with; heights along the normals stay.
-
-        Args:
-            normal: (3,) outward normal.
-
-        Raises:
-            ValueError: the normal is zero, a body that cannot move freely has a contact, or the simulator has steps of
-                a higher order or an accuracy.
-        """
-        unit = checks.direction("Simulator.turn_ground(normal)", normal)
-        if np.any(self.model.contact_hold) or self.order != 2 or self.accuracy:
-            raise ValueError("Simulator.turn_ground: expected steps of order 2, and contacts that move freely")
-        self._engine.turn_ground(contact_frame(unit))
-
-    def set_parameters(self, values: Mapping[str, ArrayLike]) -> None:
-        """Give parameters other values, in place; `with_parameters` returns a new simulator instead.
-
-        It is meant for loops that estimate parameters of their own simulator. `mechanism` and `parameters` keep the
-        values that it was made with, as do the parameters that are not named here. Kappa stays.
-
-        Args:
-            values: {name: value}, with the names of `parameters`.
-
-        Raises:
-            ValueError: for an unknown name, a value that no mechanism has, or one that changes the structure of the
-                model, such as a damper where there was none; the simulator has steps of a higher order or an accuracy.
-        """
-        self._by_parameters.adopt("Simulator.set_parameters(values)", values)
-
     def neutral(self) -> Floats:
         """The standing or hanging state of the mechanism, at rest, its loops closed as by `close`.
 
@@ -206,14 +173,14 @@ class StateSpace:
         state = self.neutral() if x is None else self._placed("loop_rank", x)
         return Closure(self.mechanism, self._states).rank(state)
 
-    def start(self, q: ArrayLike, v: ArrayLike) -> Floats:
+    def state_from_velocity(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """State with coordinates q (nq,) whose velocity at the node is v (nv,).
 
         The velocity of a state is the mean over the interval before it. This state has the momentum M(q) v at the end
         of that interval, so a simulation from it is of second order from its first step. The motion is assumed to be
-        free of contacts: start(q, 0) on the ground has the velocity g h/2, which gravity alone would cancel, and the
-        robot makes a small hop. A robot at rest on its contacts did not move before the node either: its state is [q;
-        0], as returned by `neutral` and `equilibrium`.
+        free of contacts. On the ground, v = 0 gives a state with the velocity g h/2, which gravity alone would cancel,
+        and the robot makes a small hop. A robot at rest on its contacts did not move before the node either: its state
+        is [q; 0], as returned by `neutral` and `equilibrium`.
 
         Loops are closed, as by `close`, and the velocity is the part of v that they allow.
 
@@ -228,16 +195,18 @@ class StateSpace:
             ValueError: the shapes are wrong, a quaternion is not of unit length, or a loop cannot be closed.
             SimulationError: no state has this velocity.
         """
-        q0 = checks.array("Simulator.start(q)", q, (self.nq,))
-        v0 = checks.array("Simulator.start(v)", v, (self.nv,))
-        q0 = self._arguments.states("Simulator.start(q)", np.concatenate([q0, v0]))[: self.nq]
+        q0 = checks.array("Simulator.state_from_velocity(q)", q, (self.nq,))
+        v0 = checks.array("Simulator.state_from_velocity(v)", v, (self.nv,))
+        q0 = self._arguments.states("Simulator.state_from_velocity(q)", np.concatenate([q0, v0]))[: self.nq]
         x0 = np.concatenate([q0, v0])
         if self._closes:
-            return Closure(self.mechanism, self._states).start(self._placed("start", x0)[: self.nq], v0)
-        return self._arguments.finite_result("start", self._states.started(q0, v0), x0[None])
+            return Closure(self.mechanism, self._states).start(self._placed("state_from_velocity", x0)[: self.nq], v0)
+        return self._arguments.finite_result("state_from_velocity", self._states.started(q0, v0), x0[None])
+
+    start = renamed("state_from_velocity")
 
     def velocity(self, x: ArrayLike) -> Floats:
-        """Joint velocities at the node, the v of start(q, v).
+        """Joint velocities at the node, the v of state_from_velocity(q, v).
 
         They are M(q)^-1 p with the momentum p of the node by the discrete Legendre transform; with closed loops, the
         part of it along them, as their forces act before and after the node.
@@ -252,7 +221,7 @@ class StateSpace:
         v = self._arguments.finite_result("velocity(x)", self._states.node_velocities(xs), xs)
         return v.reshape(*lead, self.nv)
 
-    def bodies(self, q: ArrayLike, v: ArrayLike) -> Floats:
+    def body_states(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Positions and velocities of the bodies for coordinates q and velocities v at one moment.
 
         `maximal` has mean velocities over the last interval instead.
@@ -264,9 +233,11 @@ class StateSpace:
         Returns:
             (..., nbody, 13) per body [position, velocity (world), quaternion, omega (body)].
         """
-        qs, vs, lead = self._arguments.paired("bodies", ("q", q, self.nq), ("v", v, self.nv))
-        xs = self._arguments.states("Simulator.bodies(q)", np.concatenate([qs, vs], axis=1))
-        return self._arguments.finite_result("bodies", self._states.bodies(xs), xs).reshape(*lead, self.nbody, 13)
+        qs, vs, lead = self._arguments.paired("body_states", ("q", q, self.nq), ("v", v, self.nv))
+        xs = self._arguments.states("Simulator.body_states(q)", np.concatenate([qs, vs], axis=1))
+        return self._arguments.finite_result("body_states", self._states.bodies(xs), xs).reshape(*lead, self.nbody, 13)
+
+    bodies = renamed("body_states")
 
     def task_space(self) -> TaskSpace:
         """Frames, momenta, contacts and distances along trajectories, with their derivatives, for planners.
@@ -274,7 +245,7 @@ class StateSpace:
         Returns:
             TaskSpace, whose arrays are not checked.
         """
-        return TaskSpace(self._engine.whole())
+        return TaskSpace(self._engine.undivided())
 
     def integrate(self, x: ArrayLike, dx: ArrayLike) -> Floats:
         """x (+) dx: the state moved by a perturbation.

@@ -147,7 +147,7 @@ def judge_solution(
         return Verdict.VALID
     found = overlapping(model, data)
     if found == Verdict.VALID and pairs_gained(model, data, options, inputs[1]):
-        return Verdict.TUNNELLED
+        return Verdict.TUNNELED
     if found == Verdict.VALID and step_gained(model, data, options, inputs):
         return Verdict.ENERGY_GAIN
     return found
@@ -203,7 +203,7 @@ def solve_active(
             if out.status == Status.SOLVED:
                 data.strategy_solves[k] += 1
             break
-        refused = verdict == Verdict.OVERLAPPING or verdict == Verdict.TUNNELLED
+        refused = verdict == Verdict.OVERLAPPING or verdict == Verdict.TUNNELED
         why = Status.COLLISION_STEP.value if refused else Status.NO_PROGRESS.value
         out = Outcome(why, out.iterations, out.residual, out.violation)
         gained = gained or verdict == Verdict.ENERGY_GAIN

@@ -14,7 +14,7 @@ from sim.solve.residual import balance_to_wrench, norm, project_wrench
 from solvers.compiler import kernel
 from solvers.types import Vector
 
-_NEAR = 100.0  # of kappa: violations that Newton's method takes away in a few steps
+_NEWTON_REACH = 100.0  # of kappa: violations that Newton's method takes away in a few steps
 
 
 class Merit(NamedTuple):
@@ -29,7 +29,7 @@ class Merit(NamedTuple):
 @kernel
 def is_near(merit: Merit, kappa: float) -> bool:
     """Whether Newton's method can be trusted to end here: products all but kappa, the residual within their noise."""
-    return merit.violation < _NEAR * kappa and merit.residual < 0.1 * kappa**0.5
+    return merit.violation < _NEWTON_REACH * kappa and merit.residual < 0.1 * kappa**0.5
 
 
 @kernel

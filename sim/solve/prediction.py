@@ -30,7 +30,7 @@ from solvers.gauss_seidel import gauss_seidel
 from solvers.rotation import Vec3
 from solvers.types import Vector
 
-_NEAR = 0.2  # of the way to a contact: motion beyond which it may become active
+_ACTIVATION_REACH = 0.2  # of the way to a contact: motion beyond which it may become active
 _STEPS = 2
 _CLOSE = 1e-3  # error, as of the merit, from which one iteration of Newton's method does more
 
@@ -46,7 +46,7 @@ def predictable(model: Model, data: Data) -> bool:
 @kernel
 def _may_touch(gap: float, rate: float, slack: float, impulse: float, kappa: float) -> bool:
     """Whether a gap may close: by the motion that the impulses of the step before leave, or because it had closed."""
-    return gap + rate < max(_NEAR * abs(rate), kappa**0.5) or impulse > slack
+    return gap + rate < max(_ACTIVATION_REACH * abs(rate), kappa**0.5) or impulse > slack
 
 
 @kernel

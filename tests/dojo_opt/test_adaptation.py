@@ -6,6 +6,7 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt.mpc.adaptation import ParameterEstimator
 from dojo_opt.mpc.ground_estimate import Ground
+from sim.simulator.adjustable_simulator import AdjustableSimulator
 from support.scenes import ball, block
 
 NAMES = ("mass:ball", "friction:*")
@@ -27,7 +28,7 @@ def samples(sim, steps, noise=0.0, seed=0):
 def estimate(settings, plant, steps=500, noise=0.0, seed=0):
     """The filter of a ball of 1 kg and friction .5 after some samples of a plant."""
     nominal = dojo.Simulator(ball(friction=0.5), time_step=0.02)
-    made = ParameterEstimator(nominal, nominal.replace(), settings)
+    made = ParameterEstimator(nominal, AdjustableSimulator.like(nominal), settings)
     xs, us = samples(plant, steps, noise, seed)
     for k in range(steps):
         made.observe(k * plant.time_step, xs[k], us[k], Ground(nominal))
@@ -64,7 +65,7 @@ def test_friction_that_nothing_shows_stays_unknown():
 
 def test_the_models_take_the_estimate_and_forget_it(plant):
     nominal = dojo.Simulator(ball(friction=0.5), time_step=0.02)
-    planner = nominal.replace(friction=0.3)
+    planner = AdjustableSimulator.like(nominal.replace(friction=0.3))
     made = ParameterEstimator(nominal, planner, dojo.Adaptation(NAMES, noise=(1e-6, 1e-5)), friction=0.3)
     xs, us = samples(plant, 300)
     for k in range(300):
@@ -79,7 +80,7 @@ def test_the_models_take_the_estimate_and_forget_it(plant):
 
 def test_samples_at_uneven_times_are_not_used(plant):
     nominal = dojo.Simulator(ball(friction=0.5), time_step=0.02)
-    made = ParameterEstimator(nominal, nominal.replace(), dojo.Adaptation(NAMES))
+    made = ParameterEstimator(nominal, AdjustableSimulator.like(nominal), dojo.Adaptation(NAMES))
     xs, us = samples(plant, 40)
     for k in range(40):
         made.observe(k * plant.time_step + 5e-4 * (k % 2), xs[k], us[k], Ground(nominal))
@@ -99,7 +100,7 @@ def test_a_quadruped_carries_what_the_fixed_model_does_not():
 @pytest.mark.parametrize("order", [2, 4])
 def test_parameters_are_set_in_place(order):
     values = {"mass:block": 3.0, "friction:*": 0.1, "com:block": (0.02, 0.0, 0.01)}
-    own = dojo.Simulator(block(), time_step=0.01, order=order)
+    own = AdjustableSimulator(block(), time_step=0.01, order=order)
     kept = own.replace()
     x = kept.neutral()
     x[2], x[7:] = 0.24, (1.0, 0.2, 0.0, 0.1, 0.2, 0.3)
@@ -119,7 +120,7 @@ def test_parameters_are_set_in_place(order):
 
 
 def test_what_parameters_do_not_change_stays():
-    sim = dojo.Simulator(block(), time_step=0.01)
+    sim = AdjustableSimulator(block(), time_step=0.01)
     sim.model.contact_height[:] = 0.3
     sim.turn_ground((0.1, 0.0, 1.0))
     frame = sim.model.contact_frame.copy()
@@ -129,7 +130,7 @@ def test_what_parameters_do_not_change_stays():
 
 
 def test_values_that_change_the_structure_are_refused():
-    sim = dojo.Simulator(dojo.models.npendulum(2), time_step=0.01)
+    sim = AdjustableSimulator(dojo.models.npendulum(2), time_step=0.01)
     for values, words in (({"damper": np.ones(2)}, "structure"), ({"time_step": 0.1}, "time_step"), ({"x": 1.0}, "x")):
         with pytest.raises(ValueError, match=words):
             sim.set_parameters(values)

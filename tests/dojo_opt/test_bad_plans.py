@@ -195,8 +195,10 @@ COMPLEX = {
     "step(x)": lambda: HOPPER.step(AT * SPUN, INPUTS[0]),
     "rollout(us)": lambda: HOPPER.rollout(AT, INPUTS * SPUN),
     "rollout(policy)": lambda: HOPPER.rollout(AT, lambda t, x: INPUTS[0] * SPUN, steps=3),
-    "closed_loop(limits)": lambda: HOPPER.closed_loop(AT, INPUTS, PATH, limits=(-np.ones(3) * SPUN, np.ones(3))),
-    "closed_loop(Ks)": lambda: HOPPER.closed_loop(AT, INPUTS, PATH, Ks=np.ones((5, 3, 14)) * SPUN),
+    "rollout_feedback(limits)": lambda: HOPPER.rollout_feedback(
+        AT, INPUTS, PATH, limits=(-np.ones(3) * SPUN, np.ones(3))
+    ),
+    "rollout_feedback(Ks)": lambda: HOPPER.rollout_feedback(AT, INPUTS, PATH, Ks=np.ones((5, 3, 14)) * SPUN),
     "equilibrium(x)": lambda: dojo.equilibrium(HOPPER, AT * SPUN),
     "Plant(noise)": lambda: dojo.Plant(HOPPER, noise=np.ones(14) * SPUN),
     "Plant(payload_inertia)": lambda: dojo.Plant(HOPPER, payload=1.0, payload_inertia=np.ones(3) * SPUN),

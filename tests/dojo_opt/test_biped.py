@@ -28,12 +28,12 @@ def test_equilibrium_on_rigid_feet(atlas, kappa):
 def balanced(sim, gait):
     """Asserts that the centre of mass is over the feet on the ground whenever one is in the air."""
     mass = np.array([body.mass for body in sim.mechanism.bodies])
-    centre = np.einsum("b,tbk->tk", mass / mass.sum(), sim.maximal(gait.x)[..., :2])
+    center = np.einsum("b,tbk->tk", mass / mass.sum(), sim.maximal(gait.x)[..., :2])
     swings = np.flatnonzero(~gait.contact.all(axis=1))
     assert len(swings)
     for t in swings:
         stance = gait.feet[t, gait.contact[t], :2]
-        assert np.all(centre[t] > stance.min(axis=0)) and np.all(centre[t] < stance.max(axis=0))
+        assert np.all(center[t] > stance.min(axis=0)) and np.all(center[t] < stance.max(axis=0))
     np.testing.assert_allclose(Feet(sim).positions(gait.x), gait.feet, atol=1e-7)
 
 
@@ -112,7 +112,7 @@ def test_the_example_step_holds_at_a_fifth_of_the_time_step(atlas):
     assert plan.success, plan.message
     fine = atlas.replace(time_step=0.01)
     for K in (plan.K, dojo.tracking_gains(problem, plan)):
-        replay = fine.closed_loop(problem.start, plan.u, xs=plan.x, Ks=K, substeps=5)
+        replay = fine.rollout_feedback(problem.start, plan.u, xs=plan.x, Ks=K, substeps=5)
         assert replay.status == dojo.Status.SOLVED
         assert np.abs(Feet(atlas).positions(replay.x[-1]) - gait.feet[-1]).max() < 0.02
         assert 1.0 - 2.0 * (replay.x[:, 4] ** 2 + replay.x[:, 5] ** 2).max() > 0.99

@@ -114,7 +114,7 @@ def test_jax_has_gradients_through_jit_and_vmap(jax: Any) -> None:
 @pytest.mark.parametrize("sim", [PENDULUM, PENDULUM.replace(order=4), LOOP], ids=["tree", "order 4", "loop"])
 def test_jax_step_has_the_jacobians_of_the_simulator(jax: Any, sim: dojo.Simulator) -> None:
     step, rollout = dojo.bridges.to_jax(sim)
-    x, u = sim.start(sim.neutral()[: sim.nq], np.zeros(sim.nv)), np.full(sim.nu, 0.3)
+    x, u = sim.state_from_velocity(sim.neutral()[: sim.nq], np.zeros(sim.nv)), np.full(sim.nu, 0.3)
     A, B = jax.jacrev(step, argnums=(0, 1))(x, u)
     for ours, theirs in zip((A, B), sim.linearize(x, u), strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1e-9 * np.abs(theirs).max())

@@ -35,7 +35,7 @@ def test_a_push_moves_the_cube_as_the_integral_says() -> None:
 
 @pytest.mark.parametrize("time_step", [1e-3, 1e-2])
 @pytest.mark.parametrize("kappa", [1e-8, 1e-10, 1e-11])
-def test_hard_contact_at_100_metres_per_second(time_step: float, kappa: float) -> None:
+def test_hard_contact_at_100_meters_per_second(time_step: float, kappa: float) -> None:
     """Friction laws of 100 N s at 100 m/s are rounded by more than 1e-3 kappa: solved all the same."""
     engine = Ours(kappa=kappa, rounds=1)
     for found in (measure.ball_impact(engine, time_step), measure.box_impact(engine, time_step)):

@@ -68,7 +68,7 @@ def test_a_periodic_plan_in_a_row():
     assert row.x.shape == (31, 2) and row.u.shape == (30, 1) and row.K.shape == (30, 1, 2)
     np.testing.assert_allclose(row.x[20:], plan.x + 2.0 * stride, atol=1e-2)
     np.testing.assert_allclose(row.stride, 3.0 * stride)
-    off = problem.sim.closed_loop(row.x[0] + 0.1, row.u, xs=row.x, Ks=row.K).x - row.x
+    off = problem.sim.rollout_feedback(row.x[0] + 0.1, row.u, xs=row.x, Ks=row.K).x - row.x
     assert np.abs(off[-1]).max() < 1e-2  # of the 0.1 at the start
 
 

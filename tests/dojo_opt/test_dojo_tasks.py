@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.learn.randomisation import Drawn
+from dojo_opt.learn.randomization import Drawn
 from dojo_opt.learn.registration import task_of
 from support.robot_files import has_robots
 

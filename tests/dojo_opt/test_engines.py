@@ -64,7 +64,7 @@ def test_energy_of_a_run_agrees_with_the_simulator() -> None:
     sim = dojo.Simulator(mech, time_step=0.01)
     rng = np.random.default_rng(2)
     q, v = sim.neutral()[: sim.nq] + np.r_[0, 0, 2.0, np.zeros(16)], rng.normal(size=sim.nv)
-    x = sim.start(q, v)
+    x = sim.state_from_velocity(q, v)
     run = Ours(rounds=1).simulate(mech, time_step=0.01, q=q, v=v, duration=0.02, samples=2)
     trajectory = sim.rollout(x, np.zeros((2, sim.nu)))
     np.testing.assert_allclose(run.energy, sim.energy(trajectory.x), rtol=1e-10)

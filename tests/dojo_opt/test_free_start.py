@@ -67,7 +67,7 @@ def test_the_best_start_in_one_iteration(free):
 @pytest.mark.parametrize("shift", [[0.0, 0.0], [0.5, 0.0]])
 def test_periodic_motion_is_the_best_of_its_kind(shift):
     p, reference = problem(free_start=True, constraints=[Periodic(shift)])
-    plan = ilqr(p, stages=ONE_STAGE, tolerance=1e-9, violation=1e-8)
+    plan = ilqr(p, stages=ONE_STAGE, tolerance=1e-9, violation_tolerance=1e-8)
     x, u = dense(reference, [0, 1], shift)
     assert plan.success and plan.violation <= 1e-8
     np.testing.assert_allclose(plan.x, x, atol=1e-6)

@@ -44,9 +44,9 @@ def test_differences_of_a_linear_step_are_its_matrices():
     mech = dojo.Mechanism([body], [joint], inputs=[dojo.Input("rail")], gravity=(0, 0, 0))
     sim = dojo.Simulator(mech, time_step=0.1)
     expected = [[1.0, 0.1, 0.005], [0.0, 1.0, 0.05]]
-    for centred in (True, False):
+    for centered in (True, False):
         stepper = Stepper(sim, [0.3, -0.2], [0.5])
-        np.testing.assert_allclose(stepper.jacobian(1e-4, centred=centred), expected, atol=1e-10)
+        np.testing.assert_allclose(stepper.jacobian(1e-4, centered=centered), expected, atol=1e-10)
 
 
 def test_ways_to_a_jacobian_agree():
@@ -59,7 +59,7 @@ def test_ways_to_a_jacobian_agree():
     assert max(p.error for p in points if p.method == one_step.TIGHTLY) < 1e-8
     error = {(p.method, p.eps): p.error for p in points if p.eps}
     assert error[one_step.FORWARD, 1e-6] / error[one_step.FORWARD, 1e-7] == pytest.approx(10.0, rel=0.1)
-    assert error[one_step.CENTRED, 1e-6] < 0.01 * error[one_step.FORWARD, 1e-6]
+    assert error[one_step.CENTERED, 1e-6] < 0.01 * error[one_step.FORWARD, 1e-6]
     bias = one_step.smoothed(scene)
     assert np.all(np.diff(bias) < 0.0) and bias[-1] < 1e-3 < 0.1 < bias[0]
 

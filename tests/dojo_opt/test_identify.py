@@ -154,7 +154,7 @@ def test_a_quadruped_finds_payload_friction_and_damping_in_its_own_log():
     truth = {"mass:trunk": 7.5, "friction:*": 0.35, "damper:FL_thigh": 0.15}
     rng = np.random.default_rng(0)
     start = sim.integrate(plan.x[0], 0.01 * rng.standard_normal(sim.ndx))
-    motion = sim.with_parameters(truth).closed_loop(start, plan.u, plan.x, Ks=plan.K)
+    motion = sim.with_parameters(truth).rollout_feedback(start, plan.u, plan.x, Ks=plan.K)
     assert motion.success
     noise = np.repeat((1e-3, 3e-3, 2e-3, 0.02, 0.03, 0.05), (3, 3, 12) * 2)  # [m, rad, rad, and their rates]
     measured = sim.integrate(motion.x, noise * rng.standard_normal((len(motion.x), sim.ndx)))

@@ -49,7 +49,7 @@ def test_control_limits_hold_and_are_used():
     held = plan.u[:, 0] == -0.6
     assert held.any() and np.all(plan.K[held] == 0.0)
     # the same optimum as bounds by augmented Lagrangian
-    soft = ilqr(lqr(constraints=[ControlBounds(-0.6, 0.5)]), violation=1e-6, tolerance=1e-9)
+    soft = ilqr(lqr(constraints=[ControlBounds(-0.6, 0.5)]), violation_tolerance=1e-6, tolerance=1e-9)
     assert soft.success
     np.testing.assert_allclose(plan.u, soft.u, atol=1e-3)
 
@@ -97,6 +97,8 @@ def test_warm_start_takes_over_multipliers():
     assert plan.success and again.success
     assert again.nit <= 3 < plan.nit
     np.testing.assert_allclose(again.fun, plan.fun, rtol=1e-2)
+    with pytest.raises(ValueError, match="expected multipliers of shapes"):
+        ilqr(swingup(), warm_start=plan)
 
 
 def test_table_and_history():
@@ -119,6 +121,7 @@ def test_the_refined_problem_may_ask_for_more_and_the_table_tells_both():
     plan = ilqr(problem, verbose=True, stream=stream)
     assert plan.success and plan.substeps == 2 and len(plan.multipliers) == 2
     assert plan.x[10, 2] == pytest.approx(higher[2], abs=1e-3)
+    Solver(problem).reset(plan.multipliers, plan.penalties)  # of which it takes those that it has
     ends = [line.split(" iterations")[0] for line in stream.getvalue().splitlines() if " iterations, " in line]
     counts = [int(part) for part in ends[-1].split(" + ")]
     assert len(ends) == 3 and len(counts) == 2 and sum(counts) == plan.nit == len(plan.history)
@@ -143,7 +146,7 @@ def test_save_and_load(tmp_path):
     "settings, message",
     [
         ({"max_iterations": -1}, r"ilqr\(max_iterations=...\): expected a whole number >= 0, got -1"),
-        ({"reopen": "open"}, r'ilqr\(reopen=...\): expected "feedback" or "gaps"'),
+        ({"on_kappa_change": "open"}, r'ilqr\(on_kappa_change=...\): expected "feedback" or "gaps"'),
         ({"stages": ()}, "at least one stage"),
         ({"stages": ((0.0, 1e-3),)}, "expected positive kappa"),
         ({"time_limit": np.nan}, "time_limit"),

@@ -5,8 +5,9 @@ import pytest
 
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.planning.ilqr import Iterate, Solver, ilqr
+from dojo_opt.planning.ilqr import Solver, ilqr
 from dojo_opt.planning.ilqr_search import Direction, Search
+from dojo_opt.planning.iterate import Iterate
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
 from solvers.riccati import PredictedChange
@@ -15,12 +16,12 @@ from support.doubles import DoubleIntegrator, Pendulum, SmoothedWall
 from support.small_problems import ONE_STAGE, gaps, lqr, swingup
 
 
-@pytest.mark.parametrize("reopen", ["gaps", "feedback"])
-def test_continuation_ends_at_the_hard_wall(reopen):
+@pytest.mark.parametrize("on_kappa_change", ["gaps", "feedback"])
+def test_continuation_ends_at_the_hard_wall(on_kappa_change):
     problem = Problem(
         SmoothedWall(), [1.0, 0.0], 20, cost=[Tracking([-1.0, 0.0], 1.0), Effort(0.01)], constraints=[Goal([0.5, 0.0])]
     )
-    plan = ilqr(problem, reopen=reopen)
+    plan = ilqr(problem, on_kappa_change=on_kappa_change)
     assert plan.success, plan.message
     assert gaps(problem, plan, 1e-6) < 1e-12
     assert plan.x[:, 0].min() > 0.0
@@ -30,7 +31,7 @@ def test_continuation_ends_at_the_hard_wall(reopen):
 
 def entered(problem, now, stage):
     """A trajectory after its passage to a stage, before its first iteration."""
-    return Solver(problem, Options(stages=(stage._replace(iterations=0),), reopen="gaps")).iterate(now).now
+    return Solver(problem, Options(stages=(stage._replace(iterations=0),), on_kappa_change="gaps")).iterate(now).now
 
 
 def test_gaps_reopen_when_kappa_changes():
@@ -75,7 +76,7 @@ def test_the_first_trials_of_a_search_give_wild_steps_up_early():
     search = Search(problem, horizon, solver.objective, solver.options)
     now = solver.guess(np.zeros((31, 2)), problem.controls0)
     k, K = np.ones((30, 1)), np.zeros((30, 1, 2))
-    alpha, _ = search.rollouts(
+    alpha, _ = search.single_shooting(
         now, Direction(k, K, None, None, PredictedChange(Status.SOLVED, 0, -1.0, 0.0, 0.0)), 1e-4
     )
     assert alpha == 0.0 and len(limits) == 5
@@ -92,7 +93,7 @@ def test_step_sizes_go_down_by_the_factor_of_the_options():
     search = Search(problem, horizon, solver.objective, solver.options)
     now = solver.guess(np.zeros((31, 2)), problem.controls0)
     k, K = np.ones((30, 1)), np.zeros((30, 1, 2))
-    search.rollouts(now, Direction(k, K, None, None, PredictedChange(Status.SOLVED, 0, -1.0, 0.0, 0.0)), 1e-4)
+    search.single_shooting(now, Direction(k, K, None, None, PredictedChange(Status.SOLVED, 0, -1.0, 0.0, 0.0)), 1e-4)
     assert sizes == [1.0, 0.25, 0.0625]
     for factor in (0.0, 1.0, 2.0):
         with pytest.raises(ValueError, match="backtracking"):
@@ -115,7 +116,7 @@ def test_iterations_one_by_one_agree_with_a_solve():
 
 def test_an_iteration_keeps_a_guess_that_no_step_improves():
     problem, (stage,) = swingup(Stuck()), ONE_STAGE
-    solver = Solver(problem, Options(stages=(stage._replace(iterations=1),), shooting=0.0))
+    solver = Solver(problem, Options(stages=(stage._replace(iterations=1),), multiple_shooting_below=0.0))
     result = solver.iterate(solver.guess(np.linspace([0.0, 0.0], [np.pi, 0.0], 31), problem.controls0))
     assert result.alpha == 0.0 and not result.consistent and result.now.gap > 0.0
     assert solver.rollout(result.now, result.K) is None
@@ -137,9 +138,9 @@ class Lost(Pendulum):
 
     lost = 14
 
-    def closed_loop(self, x0, us, *rest):
+    def rollout_feedback(self, x0, us, *rest):
         self.lost -= 1
-        shot = super().closed_loop(x0, us, *rest)
+        shot = super().rollout_feedback(x0, us, *rest)
         return shot if self.lost < 0 else shot._replace(status=Status.MAX_ITERATIONS)
 
 
@@ -168,8 +169,22 @@ def test_a_step_of_all_states_solves_a_linear_problem():
 def test_steps_of_all_states_are_taken_where_rollouts_are_lost():
     states = np.linspace([0.0, 0.0], [np.pi, 0.0], 31)
     with_shooting, without = (
-        ilqr(swingup(Lost()), states=states, stages=ONE_STAGE, shooting=bar, rejections=3) for bar in (0.1, 0.0)
+        ilqr(swingup(Lost()), states=states, stages=ONE_STAGE, multiple_shooting_below=bar, rejections=3)
+        for bar in (0.1, 0.0)
     )
     assert with_shooting.history[0]["alpha"] > 0.0 and with_shooting.history[0]["gap"] > 0.0
     assert without.history[0]["alpha"] == 0.0
     assert with_shooting.success and gaps(with_shooting.problem, with_shooting, 1e-4) < 1e-12
+
+
+def test_a_stage_that_used_all_its_iterations_is_not_solved():
+    """Neither an iteration nor a plan; one that converged is."""
+    problem = swingup()
+    stage = Stage(1e-4, 1e-4, decrease=1e-9, iterations=1)
+    solver = Solver(problem, Options(stages=(stage,)))
+    result = solver.iterate(solver.rollout(Iterate(np.tile(problem.start, (31, 1)), problem.controls0)))
+    assert result.status == Status.MAX_ITERATIONS and result.success and len(result.history) == 1
+    plan = ilqr(problem, stages=(stage,))
+    assert plan.status == Status.MAX_ITERATIONS and not plan.success and plan.nit == 1
+    whole = ilqr(problem, stages=(stage._replace(iterations=100),))
+    assert whole.success and whole.nit > 1

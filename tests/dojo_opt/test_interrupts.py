@@ -19,7 +19,7 @@ from solvers.status import Status
 from support.interrupts import dropped, heard
 from support.programs import HOME
 
-ENDLESS: dict[str, Any] = {"tolerance": 1e-12, "violation": 1e-14}
+ENDLESS: dict[str, Any] = {"tolerance": 1e-12, "violation_tolerance": 1e-14}
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.discounted_sum import DiscountedSum
 from dojo_opt.learn.network import Adam, Network, perceptron
 from dojo_opt.learn.policy_rollout import Noise
-from dojo_opt.learn.randomisation import Drawn, Models
+from dojo_opt.learn.randomization import Drawn, Models
 
 
 def _task(steps=30, tolerance=1e-8):
@@ -69,7 +69,7 @@ def test_gradients_of_returns_are_those_of_central_differences(hidden, activatio
     task = _task(tolerance=1e-12)
     policy, rng = _policy(task, hidden, activation), np.random.default_rng(6)
     starts, weights = task.starts([rng] * 3), rng.uniform(0.5, 1.0, (6, 3))
-    noise = Noise.draw(rng, task, (6, 3), 0.1, dojo.learn.Randomisation(noise=0.02))
+    noise = Noise.draw(rng, task, (6, 3), 0.1, dojo.learn.Randomization(noise=0.02))
     seeds, drawn = rng.standard_normal((6, 3, task.sim.ndx)), replace(Drawn.of(task), delay=delay)
 
     def value(states):
@@ -183,7 +183,7 @@ ALGORITHMS = {
     "ars": {"epochs": 6, "directions": 6},
     "gradient_search": {"epochs": 6, "environments": 4, "rate": 0.3},
 }
-MODELS = dojo.learn.Randomisation(
+MODELS = dojo.learn.Randomization(
     values={"friction:*": (0.2, 0.4)},
     factors={"mass": (0.9, 1.1)},
     substeps=(1, 2),
@@ -242,7 +242,7 @@ def test_rows_of_an_epoch_have_models_of_their_own_or_one(task, by_row):
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_a_seed_repeats_to_the_bit_and_a_run_can_be_resumed(task, name, tmp_path):
     algorithm = getattr(dojo.learn, name)
-    options = ALGORITHMS[name] | {"randomisation": MODELS, "evaluations": 3, "episodes": 2, "seed": 3}
+    options = ALGORITHMS[name] | {"randomization": MODELS, "evaluations": 3, "episodes": 2, "seed": 3}
     whole = algorithm(task, **options)
     half = algorithm(task, **options, callback=lambda record: _stop(record, options["epochs"] // 2))
     assert half.status == dojo.Status.STOPPED and not half.success
@@ -264,7 +264,7 @@ def _stop(record, epoch):
 
 @pytest.mark.slow
 def test_workers_find_the_same_policies(task):
-    options = {"epochs": 3, "directions": 20, "randomisation": MODELS, "evaluations": 1, "episodes": 2}
+    options = {"epochs": 3, "directions": 20, "randomization": MODELS, "evaluations": 1, "episodes": 2}
     alone = dojo.learn.seeds(dojo.learn.ars, task, (3, 4), **options)
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:  # a task is pickled with its functions
         together = dojo.learn.ars(task, seed=3, executor=pool, **options)
@@ -281,7 +281,7 @@ def test_workers_find_the_same_policies(task):
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_a_dask_cluster_finds_the_same_policy_though_a_worker_is_killed(task):
     distributed = pytest.importorskip("distributed")
-    options = {"epochs": 4, "directions": 40, "randomisation": MODELS, "evaluations": 1, "episodes": 2}
+    options = {"epochs": 4, "directions": 40, "randomization": MODELS, "evaluations": 1, "episodes": 2}
     alone = dojo.learn.ars(task, seed=3, **options)
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
@@ -369,7 +369,7 @@ def test_imitated_policies_have_the_feedback_of_plans_and_can_learn_on(task, tmp
             lambda t: dojo.learn.shac(t, resume=dojo.learn.ars(t, epochs=1, directions=4, best=1)),
             "expected a run of shac",
         ),
-        (lambda t: dojo.learn.Randomisation(kappa=(1.0, 0.1)), "kappa"),
+        (lambda t: dojo.learn.Randomization(kappa=(1.0, 0.1)), "kappa"),
     ],
 )
 def test_bad_arguments_are_named(task, call, message):

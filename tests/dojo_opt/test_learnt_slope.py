@@ -10,6 +10,7 @@ from dojo_opt.mpc.ground_estimate import Ground
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.plant.ground_plane import GroundPlane
 from dojo_opt.plant.plant import Plant
+from sim.simulator.adjustable_simulator import AdjustableSimulator
 
 SLOPE, HEADING = 0.1, 0.7
 RISE = tuple(np.tan(SLOPE) * np.array([np.cos(HEADING), np.sin(HEADING)]))
@@ -23,7 +24,7 @@ def robot():
 def test_ground_turned_in_place_is_ground_made_so(robot):
     """Steps and derivatives are the same to the bit, of a planner's horizon, too, and in a thread that has stepped."""
     plant = Plant(robot, slope=SLOPE, slope_heading=HEADING)
-    made, turned, x = plant.simulator, robot.replace(), plant.x
+    made, turned, x = plant.simulator, AdjustableSimulator.like(robot), plant.x
     u = np.zeros((4, 12))
     planner = turned.horizon(4)
     before = planner.roll(x, np.tile(x, (5, 1)), u, 1e-4).x
@@ -41,7 +42,7 @@ def test_ground_turned_in_place_is_ground_made_so(robot):
     for own, other in zip(turned.linearize(x, u[0]), made.linearize(x, u[0]), strict=True):
         np.testing.assert_array_equal(own, other)
     with pytest.raises(ValueError, match="order 2"):
-        robot.replace(order=4).turn_ground((0.0, 0.0, 1.0))
+        AdjustableSimulator.like(robot.replace(order=4)).turn_ground((0.0, 0.0, 1.0))
 
 
 def test_references_are_carried_as_a_plant_is(robot):
@@ -60,7 +61,7 @@ def test_references_are_carried_as_a_plant_is(robot):
 
 def test_the_slope_is_learnt_from_feet_that_stand(robot):
     """To rounding, at once from four and then from two; a foot that is still high in the air says nothing."""
-    own = robot.replace()
+    own = AdjustableSimulator.like(robot)
     ground = Ground(own, kappa=1e-2)
     x = Plant(robot, slope=SLOPE, slope_heading=HEADING).x
     policy = Policy(own, 0.0, np.tile(x, (3, 1)), np.zeros((2, 12)), np.zeros((2, 12, 36)))

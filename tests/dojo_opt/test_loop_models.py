@@ -84,7 +84,7 @@ def test_period_of_a_four_bar() -> None:
     errors = []
     for h in (0.01, 0.005):
         sim = dojo.Simulator(mech, time_step=h, tolerance=1e-11)
-        t = sim.rollout(sim.start(q, np.zeros(3)), np.zeros((int(2.2 * exact / h), 0)), throw=True)
+        t = sim.rollout(sim.state_from_velocity(q, np.zeros(3)), np.zeros((int(2.2 * exact / h), 0)), throw=True)
         v = t.x[1:, 3]  # of the crank, in the middle of every interval
         k = [k for k in range(2, len(v) - 1) if v[k] * v[k + 1] <= 0.0][1]  # from rest through one side and back
         errors.append(abs((k + 0.5 + v[k] / (v[k] - v[k + 1])) * h - exact))

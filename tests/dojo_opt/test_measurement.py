@@ -13,7 +13,7 @@ def test_measured_velocity_becomes_the_mean_one_of_a_model_step():
     plant = HOPPER.replace(time_step=1e-3, kappa=1e-8)
     x = HOPPER.neutral()
     x[2] += 2.0
-    fall = plant.rollout(plant.start(x[:8], np.zeros(7)), np.zeros((100, 3)), throw=True)
+    fall = plant.rollout(plant.state_from_velocity(x[:8], np.zeros(7)), np.zeros((100, 3)), throw=True)
     measured = Measurement(HOPPER)
     for t, state in zip(fall.time, fall.x, strict=True):
         measured.add(float(t), state)
@@ -40,7 +40,7 @@ def test_prediction_over_the_delay_ends_a_free_fall_where_it_ends():
     plant = HOPPER.replace(time_step=1e-3, kappa=1e-8)
     x = HOPPER.neutral()
     x[2] += 2.0
-    fall = plant.rollout(plant.start(x[:8], np.zeros(7)), np.zeros((100, 3)), throw=True)
+    fall = plant.rollout(plant.state_from_velocity(x[:8], np.zeros(7)), np.zeros((100, 3)), throw=True)
     for t, state in zip(fall.time[:81], fall.x[:81], strict=True):
         measured.add(float(t), state)
     delay.forget(np.zeros(3))

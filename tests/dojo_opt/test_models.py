@@ -189,8 +189,8 @@ def test_older_names() -> None:
     assert models.box2d is models.block2d
 
 
-def test_catalogue() -> None:
-    entries = {entry.name: entry for entry in models.catalogue()}
+def test_catalog() -> None:
+    entries = {entry.name: entry for entry in models.catalog()}
     assert set(entries) == set(models.__all__)
     atlas = entries["atlas"]
     assert (atlas.bodies, atlas.nv, atlas.contacts) == (31, 36, 8)

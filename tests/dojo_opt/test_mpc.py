@@ -119,7 +119,9 @@ def test_a_model_that_cannot_be_solved_keeps_the_old_plan():
 
 def test_a_rejected_step_keeps_the_old_plan():
     """No step is short enough and no decrease large enough, and the gains do not lead back to the plan either."""
-    mpc = dojo.MPC(standing_problem(), options=Options(halvings=0, armijo=1e9, ascent=0.0, penalty_growth=1.0))
+    mpc = dojo.MPC(
+        standing_problem(), options=Options(halvings=0, armijo=1e9, max_increase_ratio=0.0, penalty_growth=1.0)
+    )
     x = HOPPER.neutral()
     mpc(0.0, x)
     before = mpc.policy
@@ -129,7 +131,9 @@ def test_a_rejected_step_keeps_the_old_plan():
 
 
 def test_a_rejected_step_near_the_plan_rolls_it_out_with_its_gains():
-    mpc = dojo.MPC(standing_problem(), options=Options(halvings=0, armijo=1e9, ascent=0.0, penalty_growth=1.0))
+    mpc = dojo.MPC(
+        standing_problem(), options=Options(halvings=0, armijo=1e9, max_increase_ratio=0.0, penalty_growth=1.0)
+    )
     x = HOPPER.neutral()
     mpc(0.0, x)
     before = mpc.policy
@@ -138,7 +142,7 @@ def test_a_rejected_step_near_the_plan_rolls_it_out_with_its_gains():
     now = mpc.policy
     assert now is not before and now.time == 0.05
     np.testing.assert_array_equal(now.x[0], mpc.log[-1].x)
-    again = HOPPER.closed_loop(now.x[0], now.u, kappa=mpc.settings.kappa).x
+    again = HOPPER.rollout_feedback(now.x[0], now.u, kappa=mpc.settings.kappa).x
     np.testing.assert_allclose(again, now.x, rtol=1e-6, atol=1e-6)
 
 

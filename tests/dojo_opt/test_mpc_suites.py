@@ -9,9 +9,9 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt.__main__ import main
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.mpc.moving_reference import Onward
+from dojo_opt.mpc.moving_reference import AnchoredReference
 from dojo_opt.mpc.servo import ModelServo
-from dojo_opt.planning.ilqr import Iteration
+from dojo_opt.planning.iterate import Iteration
 from dojo_opt.tasks.free_gait import Lead
 from dojo_opt.tasks.suite import servo_effort
 from sim.mechanism.overlaps import overlaps
@@ -291,7 +291,7 @@ def test_a_target_goes_along_with_the_robot():
     end = begin.copy()
     end[1] += 0.4
     end[2] += 2.0
-    target = Onward(sim, begin, end, 2.0, anchored=[2])
+    target = AnchoredReference(sim, begin, end, 2.0, anchored=[2])
     x = begin.copy()
     x[:3] += 0.7
     target.anchor(10.0, x)
@@ -335,7 +335,7 @@ def test_a_compensated_body_floats():
     z = motion.x[-1, [2, 9, 16]]
     np.testing.assert_allclose(z / z[0], [1.0, 0.5, 0.0], atol=1e-12)
     assert z[0] == pytest.approx(-0.5 * 9.81, rel=0.02)
-    assert np.ptp(sim.energy(sim.start(sim.neutral()[: sim.nq], np.zeros(sim.nv)))) == 0.0
+    assert np.ptp(sim.energy(sim.state_from_velocity(sim.neutral()[: sim.nq], np.zeros(sim.nv)))) == 0.0
     torques = dojo.Kinematics(sim).gravity_torques(sim.neutral()[: sim.nq])
     np.testing.assert_allclose(torques[[2, 8, 14]], 9.81 * 2.0 * np.array([1.0, 0.5, 0.0]))
 

@@ -70,7 +70,7 @@ def apart(mechanism: Mechanism, time_step: float, duration: float) -> np.ndarray
     q, v = in_the_air(mechanism)
     u = 0.5 * np.random.default_rng(5).normal(size=sim.nu)
     steps = round(duration / time_step)
-    ours = sim.rollout(sim.start(q, v), np.tile(u, (steps, 1)), throw=True)
+    ours = sim.rollout(sim.state_from_velocity(q, v), np.tile(u, (steps, 1)), throw=True)
     model = twin(sim, integrator="RK4")
     data = mujoco_scene.state(model, np.concatenate([q, v]))
     data.ctrl[:] = u
@@ -142,5 +142,5 @@ def test_orbital_joints_become_hinges_when_asked() -> None:
     x = 1e-4 * np.array([1.0, -2.0, 0.5, 1.5, 0, 0, 0, 0])
     data = mujoco_scene.state(model, x)
     mujoco.mj_step(model, data)
-    step = sim.replace(time_step=0.01).step(sim.start(x[:4], x[4:]))
+    step = sim.replace(time_step=0.01).step(sim.state_from_velocity(x[:4], x[4:]))
     np.testing.assert_allclose(data.qpos, step.x[:4], atol=5e-6)

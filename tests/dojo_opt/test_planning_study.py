@@ -102,7 +102,9 @@ def test_settings_of_the_yardstick_take_effect():
     assert np.all(MujocoIlqr(problem, MujocoSettings(smooth=True))._model.pair_solimp[:, 0] == 0.0)
     xs, us = np.tile(problem.start, (11, 1)), np.ones((10, 3))
     xs[:, 2] += 1.0
-    one, two = (MujocoIlqr(problem, MujocoSettings(centred=centred))._linearize(xs, us)[0] for centred in (False, True))
+    one, two = (
+        MujocoIlqr(problem, MujocoSettings(centered=centered))._linearize(xs, us)[0] for centered in (False, True)
+    )
     assert 0.0 < np.abs(one - two).max() < 1e-5
 
 

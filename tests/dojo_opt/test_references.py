@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.mpc.moving_reference import References, Sampled
+from dojo_opt.mpc.moving_reference import References, SampledReference
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.mpc.receding_horizon import shift_multipliers, tail
 from dojo_opt.plant.ground_plane import GroundPlane
@@ -23,11 +23,11 @@ def test_sampled_goes_round_with_its_advance():
     rows[:, 0] = [0.0, 0.03, 0.1]
     cycle = np.zeros(14)
     cycle[0] = 0.1
-    path = Sampled(time, rows, HOPPER, cycle)
+    path = SampledReference(time, rows, HOPPER, cycle)
     np.testing.assert_allclose(path([0.05, 0.2, 0.3, 1.05, -0.1])[:, 0], [0.015, 0.1, 0.13, 0.515, -0.07], atol=1e-12)
-    held = Sampled(time, rows, HOPPER)
+    held = SampledReference(time, rows, HOPPER)
     np.testing.assert_allclose(held([0.15, 5.0])[:, 0], [0.065, 0.1], atol=1e-12)
-    numbers = Sampled(time, np.array([[0.0], [1.0], [0.0]]), cycle=np.zeros(1))
+    numbers = SampledReference(time, np.array([[0.0], [1.0], [0.0]]), cycle=np.zeros(1))
     np.testing.assert_allclose(numbers([0.05, 0.25])[:, 0], [0.5, 0.5], atol=1e-12)
 
 
@@ -37,7 +37,7 @@ def test_sampled_velocities_over_the_step_of_a_model():
     rows[:, 0] = [0.0, 0.03, 0.1]
     cycle = np.zeros(14)
     cycle[0] = 0.1
-    mean = Sampled(time, rows, HOPPER, cycle).over(0.05)
+    mean = SampledReference(time, rows, HOPPER, cycle).with_mean_velocities(0.05)
     np.testing.assert_allclose(mean.rows[:, 8], [0.7, 0.3, 0.7], atol=1e-9)
 
 
@@ -58,7 +58,7 @@ def test_references_are_checked_at_the_border(reference, message):
 def test_references_move_with_time_and_with_the_ground():
     problem = standing_problem()
     moved = dojo.MPC(problem)  # MPC's own terms; the terms of the user's problem stay
-    references = References(moved.problem, {0: Sampled([0.0, 1.0], _ahead(1.0), HOPPER), 1: np.zeros((3, 3))})
+    references = References(moved.problem, {0: SampledReference([0.0, 1.0], _ahead(1.0), HOPPER), 1: np.zeros((3, 3))})
     references.move(0.5, GroundPlane(0.02))
     term = moved.problem.costs[0]
     np.testing.assert_allclose(term.reference[:, 0], 0.5 + 0.05 * np.arange(9), atol=1e-12)
@@ -71,7 +71,7 @@ def test_tail_follows_the_reference_or_the_last_input():
     problem = standing_problem()
     rng = np.random.default_rng(7)
     policy = random_policy(rng, T=8, time=0.0)
-    moving = References(problem, Sampled([0.0, 1.0], _ahead(1.0), HOPPER))
+    moving = References(problem, SampledReference([0.0, 1.0], _ahead(1.0), HOPPER))
     xs, us = tail(policy, moving, 2)
     np.testing.assert_allclose(xs[:, 0] - policy.x[-1, 0], [0.05, 0.1], atol=1e-9)
     np.testing.assert_array_equal(us, policy.u[-1:].repeat(2, axis=0))

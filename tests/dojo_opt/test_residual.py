@@ -27,12 +27,12 @@ def too_fast(x, u, out):
     out[0] = x[2] ** 2 - 0.9**2
 
 
-@dojo.kernel
+@dojo.jit
 def tip(x):
     return np.array([x[0] + 0.5 * np.sin(x[1]), -0.5 * np.cos(x[1])])  # allocates
 
 
-@dojo.kernel
+@dojo.jit
 def high(x, u, out):
     out[:] = 0.1 * (tip(x) - np.array([1.0, -0.5]))
 
@@ -94,12 +94,12 @@ def test_an_error_of_the_compiler_names_the_function():
 # -- arguments are the planner's own -----------------------------------------------------------------------------------
 
 
-@dojo.kernel
+@dojo.jit
 def clear(x):
     x[0] = 1.0
 
 
-@dojo.kernel
+@dojo.jit
 def spread_out(x):
     return np.array([x[0], 2.0 * x[1]])
 
@@ -230,11 +230,11 @@ def test_an_index_beyond_the_end_names_function_and_knot(function):
 
 
 def test_bounds_are_not_checked_where_the_user_asks_for_that():
-    assert dojo.kernel(boundscheck=False)(forgotten).entry.targetoptions["boundscheck"] is False
-    assert dojo.kernel(forgotten).entry.targetoptions["boundscheck"] is True
-    assert dojo.kernel(boundscheck=False)(dojo.kernel(forgotten)).entry.targetoptions["boundscheck"] is True
+    assert dojo.jit(boundscheck=False)(forgotten).entry.targetoptions["boundscheck"] is False
+    assert dojo.jit(forgotten).entry.targetoptions["boundscheck"] is True
+    assert dojo.jit(boundscheck=False)(dojo.jit(forgotten)).entry.targetoptions["boundscheck"] is True
     unchecked = numba.njit(boundscheck=False)(forgotten)
-    assert dojo.kernel(unchecked) is unchecked
+    assert dojo.jit(unchecked) is unchecked
 
 
 # -- compiled once -----------------------------------------------------------------------------------------------------

@@ -139,7 +139,7 @@ def test_an_arm_reaches_a_pose_and_keeps_clear_of_a_ball():
     assert np.linalg.norm(at - ball.center, axis=1).min() > 0.119
 
 
-def test_a_periodic_centre_of_mass_is_a_constraint_of_a_free_start(walker):
+def test_a_periodic_center_of_mass_is_a_constraint_of_a_free_start(walker):
     sim, xs, us = walker
     tie = constraint.CenterOfMass((0.1, 0.0, 0.0), periodic=True)
     term = bound(tie, sim, xs)

@@ -117,7 +117,7 @@ def test_sloping_ground_is_drawn(page, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_robot_of_meshes_fills_a_third_of_the_picture_in_its_colours(page, tmp_path):
+def test_a_robot_of_meshes_fills_a_third_of_the_picture_in_its_colors(page, tmp_path):
     """A green mesh with a red lid, mirrored by its scale; MeshCat's own menu is hidden."""
     trimesh = pytest.importorskip("trimesh")
     trimesh.creation.box(extents=(0.1, 0.2, 0.4)).export(tmp_path / "box.stl")

@@ -175,11 +175,11 @@ class Step:
         """phi = n.(x3 + R3 p) - rho - height, v_t = T ((x3 - x2)/h + (2/h) s_w x r), r = R3 p - rho n."""
         b, n, tangents = contact.body, contact.frame[0], contact.frame[1:]
         x3, q3 = z3[0][..., b, :], z3[1][..., b, :]
-        centre = rot.rotate(q3, contact.point)
-        arm = centre - contact.radius * n
+        center = rot.rotate(q3, contact.point)
+        arm = center - contact.radius * n
         sine = rot.rotate(self.z2[1][b], rot.mul(rot.conj(self.z2[1][b]), q3)[..., 1:])
         slip = ((x3 - self.z2[0][b]) / self.h + rot.cross(2.0 / self.h * sine, arm)) @ tangents.T
-        return (x3 + centre) @ n - contact.radius - contact.height, slip, arm
+        return (x3 + center) @ n - contact.radius - contact.height, slip, arm
 
     def contact(self, contact: Contact, y: Array, z3: Poses, kappa: float, exact: bool) -> tuple[Array, Array]:
         """Law of one contact and its wrench on the body about the centre of mass; y as in `contact_size`."""

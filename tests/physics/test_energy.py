@@ -16,7 +16,7 @@ MECHANISMS = {
 def energies(mech, q, v, h, seconds):
     """Energy at every node."""
     sim = dojo.Simulator(mech, time_step=h, tolerance=1e-12)
-    xs = run(sim, sim.start(np.array(q), np.array(v)), round(seconds / h))
+    xs = run(sim, sim.state_from_velocity(np.array(q), np.array(v)), round(seconds / h))
     return sim.energy(xs)
 
 
@@ -30,7 +30,7 @@ def test_start_has_the_energy_of_its_velocity():
     """M(q) v is the momentum of the state that start gives, so its energy is the continuous one exactly."""
     v, mech = np.array([0.5]), pendulum(1)
     sim = dojo.Simulator(mech, time_step=0.05)
-    x = sim.start(np.array([1.0]), v)
+    x = sim.state_from_velocity(np.array([1.0]), v)
     inertia = np.asarray(mech.bodies[0].inertia)[0][0] + 0.25
     assert abs(sim.energy(x) - (0.5 * inertia * 0.25 - 9.81 * 0.5 * np.cos(1.0))) < 1e-10
 

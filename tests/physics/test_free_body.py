@@ -26,7 +26,7 @@ def test_attitude_error_is_of_second_order(omega):
     exact, errors = euler(2.0, np.array(omega)), []
     for h in (0.01, 0.005, 0.0025):
         sim = dojo.Simulator(free_body(INERTIA), time_step=h, tolerance=1e-12)
-        x = sim.start(sim.neutral()[:7], np.r_[0.0, 0.0, 0.0, omega])
+        x = sim.state_from_velocity(sim.neutral()[:7], np.r_[0.0, 0.0, 0.0, omega])
         attitude = run(sim, x, round(2.0 / h))[-1][3:7]
         errors.append(np.linalg.norm(rot.log(rot.mul(rot.conj(exact), attitude))))
     assert np.all(np.abs(order(errors) - 2.0) < 0.2), (errors, order(errors))
@@ -37,7 +37,7 @@ def test_rotation_about_a_principal_axis_is_uniform_and_exact_to_fourth_order():
     errors = []
     for h in (0.1, 0.05, 0.025):
         sim = dojo.Simulator(free_body(INERTIA), time_step=h, tolerance=1e-12)
-        x = sim.start(sim.neutral()[:7], np.array([0.0, 0.0, 0.0, 0.0, 0.0, 7.0]))
+        x = sim.state_from_velocity(sim.neutral()[:7], np.array([0.0, 0.0, 0.0, 0.0, 0.0, 7.0]))
         v = run(sim, x, 50)[:, 7:]
         np.testing.assert_allclose(v, np.tile(v[0], (51, 1)), atol=1e-9)
         errors.append(1.0 - v[0, 5] / 7.0)
@@ -48,6 +48,6 @@ def test_rotation_about_a_principal_axis_is_uniform_and_exact_to_fourth_order():
 def test_fast_spin_keeps_energy():
     """1000 rad/s, a sixth of a turn per step of 1 ms: peers lose half the energy or diverge."""
     sim = dojo.Simulator(free_body(INERTIA), time_step=1e-3, tolerance=1e-12)
-    x = sim.start(sim.neutral()[:7], np.array([0.0, 0.0, 0.0, 2.0, 1000.0, 2.0]))
+    x = sim.state_from_velocity(sim.neutral()[:7], np.array([0.0, 0.0, 0.0, 2.0, 1000.0, 2.0]))
     values = sim.energy(run(sim, x, 1000)[::10])
     assert np.ptp(values) < 0.1 * values[0]

@@ -20,7 +20,7 @@ def test_no_penetration_at_any_time_step(time_step, law):
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("time_step", [1e-3, 1e-2, 5e-2])
-def test_impact_at_100_metres_per_second(time_step, law):
+def test_impact_at_100_meters_per_second(time_step, law):
     sim = dojo.Simulator(ball(law=law), time_step=time_step, kappa=1e-6, tolerance=1e-9)
     x = np.r_[0.0, 0.0, 0.1 + 3.3 * 100.0 * time_step, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -100.0, np.zeros(3)]
     xs = run(sim, x, 20)
@@ -31,7 +31,7 @@ def test_impact_at_100_metres_per_second(time_step, law):
 
 
 @pytest.mark.parametrize("time_step", [1e-3, 1e-2])
-def test_block_at_100_metres_per_second(time_step):
+def test_block_at_100_meters_per_second(time_step):
     """A corner first, with spin and sideways speed."""
     sim = dojo.Simulator(block(), time_step=time_step, kappa=1e-6, tolerance=1e-9)
     q = np.r_[0.0, 0.0, 0.6 + 1.5 * 100.0 * time_step, rot.exp(np.array([0.4, -0.3, 0.8]))]

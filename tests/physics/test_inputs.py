@@ -15,7 +15,7 @@ def end(h: float, force: np.ndarray) -> tuple[float, float]:
     slider = dojo.Joint("prismatic", None, "mass", axis=(1, 0, 0))
     mech = dojo.Mechanism([dojo.Body("mass", MASS, (1, 1, 1))], [slider], inputs=[dojo.Input("mass")])
     sim = dojo.Simulator(mech, time_step=h)
-    x = sim.rollout(sim.start([0.0], [0.0]), force[:, None], throw=True).x[-1]
+    x = sim.rollout(sim.state_from_velocity([0.0], [0.0]), force[:, None], throw=True).x[-1]
     return float(x[0]), float(sim.velocity(x)[0])
 
 

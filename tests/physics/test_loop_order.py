@@ -97,7 +97,7 @@ def test_positions_and_node_velocities_are_of_second_order(
         w = PUSH * N @ (N.T @ np.ones(len(a)))
         times = h * np.arange(round(DURATION / h) + 1)
         exact = solve_ivp(plane.rate, (0.0, times[-1]), [*a, *w], "DOP853", times, rtol=1e-11, atol=1e-12).y.T
-        t = sim.rollout(sim.start(q, coordinates @ w), np.zeros((len(times) - 1, sim.nu)), throw=True)
+        t = sim.rollout(sim.state_from_velocity(q, coordinates @ w), np.zeros((len(times) - 1, sim.nu)), throw=True)
         angles, rates = exact[:, : len(a)] @ coordinates.T, exact[:, len(a) :] @ coordinates.T
         assert np.ptp(angles, axis=0).min() > 0.3  # every link moves
         errors.append([np.abs(t.x[:, : sim.nq] - angles).max(), np.abs(sim.velocity(t.x) - rates).max()])
@@ -120,7 +120,7 @@ def test_loops_have_the_accuracy_that_is_asked_for(
     N = plane.freedom(a)
     w = PUSH * N @ (N.T @ np.ones(len(a)))
     exact = solve_ivp(plane.rate, (0.0, DURATION), [*a, *w], "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
-    t = sim.rollout(sim.start(q, coordinates @ w), duration=DURATION, throw=True)
+    t = sim.rollout(sim.state_from_velocity(q, coordinates @ w), duration=DURATION, throw=True)
     assert np.abs(t.x[-1, : sim.nq] - coordinates @ exact[: len(a)]).max() < 3.0 * DURATION * accuracy
     assert np.abs(t.x[-1, sim.nq :] - coordinates @ exact[len(a) :]).max() < 60.0 * DURATION * accuracy
     assert max(np.abs(gap).max() for gap in sim.loop_gaps(t.x[-1]).values()) < 1e-9

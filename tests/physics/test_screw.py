@@ -27,7 +27,9 @@ def test_a_nut_runs_down_its_spindle(pitch: float) -> None:
     errors = []
     for h in (2e-3, 1e-3):
         sim = dojo.Simulator(nut(pitch), time_step=h, tolerance=1e-13)
-        x = sim.rollout(sim.start(np.zeros(1), np.zeros(1)), np.zeros((round(1.0 / h), 1)), throw=True).x[-1]
+        x = sim.rollout(sim.state_from_velocity(np.zeros(1), np.zeros(1)), np.zeros((round(1.0 / h), 1)), throw=True).x[
+            -1
+        ]
         errors.append(abs(x[0] - 0.5 * rate))
     assert abs(0.5 * rate) > 2.0 * np.pi
     assert errors[0] < 1e-4 and (errors[1] < 1e-9 or errors[0] / errors[1] > 3.5), errors
@@ -66,7 +68,7 @@ def test_a_carriage_in_gear_with_the_screw() -> None:
     ]
     mech = dojo.Mechanism(bodies, joints, gears=[dojo.Gear("carriage", "nut", LEAD)])
     sim = dojo.Simulator(mech, time_step=1e-3, tolerance=1e-13)
-    x = sim.rollout(sim.start(np.zeros(2), np.zeros(2)), np.zeros((500, 2)), throw=True).x[-1]
+    x = sim.rollout(sim.state_from_velocity(np.zeros(2), np.zeros(2)), np.zeros((500, 2)), throw=True).x[-1]
     rate = -2.0 * M * G * LEAD / (INERTIA + 2.0 * M * LEAD**2)
     np.testing.assert_allclose(x[:2], 0.125 * rate * np.array([1.0, LEAD]), rtol=1e-6)
 

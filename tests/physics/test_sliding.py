@@ -24,11 +24,11 @@ def slide(angle, time_step=H):
 def test_stopping_distance(angle):
     """The step decelerates by mu g h exactly, so v^2/(2 mu g) is met up to h v / 2, and the discrete sum to kappa."""
     _, xs, direction = slide(angle)
-    travelled = xs[-1, :3] - xs[0, :3]
+    traveled = xs[-1, :3] - xs[0, :3]
     speeds = SPEED - FRICTION * G * H * np.arange(1, 1000)
-    assert abs(travelled @ direction - H * speeds[speeds > 0].sum()) < 1e-4
-    assert abs(travelled @ direction - SPEED**2 / (2.0 * FRICTION * G)) < 0.51 * H * SPEED
-    assert np.linalg.norm(travelled - (travelled @ direction) * direction) < 1e-5, "lateral drift"
+    assert abs(traveled @ direction - H * speeds[speeds > 0].sum()) < 1e-4
+    assert abs(traveled @ direction - SPEED**2 / (2.0 * FRICTION * G)) < 0.51 * H * SPEED
+    assert np.linalg.norm(traveled - (traveled @ direction) * direction) < 1e-5, "lateral drift"
     assert np.abs(xs[-1, 7:10]).max() < 1e-4, "still moving"
 
 

@@ -12,7 +12,7 @@ from support.scenes import pendulum, run, slider
 def test_amplitude_is_kept(stiffness, time_step):
     """sqrt(2 E / k) after a second is the starting deflection."""
     sim = dojo.Simulator(slider(spring=stiffness), time_step=time_step, tolerance=1e-9)
-    xs = run(sim, sim.start(np.array([0.1]), np.zeros(1)), round(1.0 / time_step))
+    xs = run(sim, sim.state_from_velocity(np.array([0.1]), np.zeros(1)), round(1.0 / time_step))
     amplitude = np.sqrt(2.0 * sim.energy(xs) / stiffness)
     np.testing.assert_allclose(amplitude, 0.1, rtol=1e-6)
     assert np.abs(xs[:, 0]).max() < 0.1 * (1.0 + 1e-6)
@@ -37,7 +37,7 @@ def test_strong_damper_in_a_chain():
 
 def test_stiff_rotational_spring_keeps_energy():
     sim = dojo.Simulator(pendulum(2, spring=1e6), time_step=0.01, tolerance=1e-9)
-    energy = sim.energy(run(sim, sim.start(np.array([0.01, -0.02]), np.zeros(2)), 200))
+    energy = sim.energy(run(sim, sim.state_from_velocity(np.array([0.01, -0.02]), np.zeros(2)), 200))
     assert np.ptp(energy) < 0.05 * 0.5e6 * 0.02**2
 
 

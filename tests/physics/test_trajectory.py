@@ -22,7 +22,7 @@ def test_double_pendulum():
     errors = []
     for h in (0.01, 0.005, 0.0025):
         sim = dojo.Simulator(pendulum(2), time_step=h, tolerance=1e-12)
-        q = run(sim, sim.start(np.array([1.0, 0.5]), np.array([0.5, -1.0])), round(1.0 / h))[-1][:2]
+        q = run(sim, sim.state_from_velocity(np.array([1.0, 0.5]), np.array([0.5, -1.0])), round(1.0 / h))[-1][:2]
         errors.append(np.linalg.norm(q - [y[0], y[1] - y[0]]))
     assert np.all(np.abs(order(errors) - 2.0) < 0.2), (errors, order(errors))
 
@@ -38,6 +38,8 @@ def test_damped_driven_slider():
     errors = []
     for h in (0.01, 0.005, 0.0025):
         sim = dojo.Simulator(slider(mass=m, spring=k, damper=d, rest=x0), time_step=h, tolerance=1e-12)
-        errors.append(abs(run(sim, sim.start(np.array([0.3]), np.array([1.0])), round(1.0 / h), [u])[-1][0] - exact))
+        errors.append(
+            abs(run(sim, sim.state_from_velocity(np.array([0.3]), np.array([1.0])), round(1.0 / h), [u])[-1][0] - exact)
+        )
     # a damper acts with the velocity at the end of the step (stable at any strength): first order
     assert np.all(order(errors) > 0.8), (errors, order(errors))

@@ -41,7 +41,7 @@ def test_pendulums_have_the_accuracy_that_is_asked_for(links: int, accuracy: flo
     found = dojo.Simulator(mech, accuracy=accuracy).rollout(x, duration=2.0, throw=True)
     assert np.abs(found.x[-1] - exact)[:links].max() < 2.0 * accuracy
     assert found.time[-1] == 2.0
-    assert found.substeps[0] < 80
+    assert found.parts[0] < 80
 
 
 def test_a_chain_goes_on_and_keeps_its_energy() -> None:
@@ -98,9 +98,9 @@ def test_a_hopper_lands_as_exactly_or_says_so(accuracy: float) -> None:
     mech, seconds = models.hopper(), 0.4
     q, v = np.array([0.0, 1.2, 0.1, 0.5, 0.9, 0.3]), 0.5 * np.random.default_rng(1).normal(size=6)
     fine = dojo.Simulator(mech, time_step=2e-5, kappa=1e-13)
-    exact = fine.rollout(fine.start(q, v), steps=round(seconds / 2e-5), throw=True).x[-1]
+    exact = fine.rollout(fine.state_from_velocity(q, v), steps=round(seconds / 2e-5), throw=True).x[-1]
     sim = dojo.Simulator(mech, accuracy=accuracy)
-    found = sim.rollout(sim.start(q, v), duration=seconds, throw=True)
+    found = sim.rollout(sim.state_from_velocity(q, v), duration=seconds, throw=True)
     assert np.abs(found.x[-1] - exact)[:6].max() < 3.0 * seconds * accuracy * max(1.0, found.errors[0])
     assert found.contacts.gap[-1].min() < 1e-6
     assert ("estimated error" in found.message) == (found.errors[0] > 1.0)
@@ -149,7 +149,7 @@ def test_derivatives_keep_the_division(name: str, height: float, steps: int) -> 
 def test_orders_agree_on_dampers() -> None:
     """A falling hopper with dampers: substeps of order 2 approach order 8, four times closer at half the length."""
     sim = dojo.Simulator(models.hopper(), accuracy=1e-3)
-    x = sim.start(np.r_[0.0, 6.0, 0.0, 0.3, 0.4, 0.2], 0.5 * np.random.default_rng(1).normal(size=sim.nv))
+    x = sim.state_from_velocity(np.r_[0.0, 6.0, 0.0, 0.3, 0.4, 0.2], 0.5 * np.random.default_rng(1).normal(size=sim.nv))
     count, ends = 8, []
     for order, n in ((8, count), (2, count), (2, 2 * count)):
         parts = np.full(n, 0.08 / n), np.full(n, order)
@@ -181,7 +181,7 @@ def test_damped_gears_have_the_accuracy_that_is_asked_for(accuracy: float) -> No
 
     exact = solve_ivp(rate, (0.0, 0.5), [0.0, 1.0], "DOP853", rtol=1e-11, atol=1e-12).y[0, -1]
     sim = dojo.Simulator(GEARED, accuracy=accuracy)
-    t = sim.rollout(sim.start(np.zeros(2), [1.0, -2.0]), duration=0.5, throw=True)
+    t = sim.rollout(sim.state_from_velocity(np.zeros(2), [1.0, -2.0]), duration=0.5, throw=True)
     np.testing.assert_allclose(t.x[-1, :2], [exact, -2.0 * exact], rtol=0.0, atol=1.5 * accuracy)
     np.testing.assert_allclose(t.x[:, 1], -2.0 * t.x[:, 0], atol=1e-9)
 
@@ -192,7 +192,7 @@ def test_velocities_are_closed_along_gears() -> None:
     masses, along = np.array([0.29, 0.18]), np.array([1.0, -2.0])
     v = np.array([0.7, 0.4])
     expected = along * (along @ (masses * v)) / (along @ (masses * along))
-    for x in (sim.start(np.zeros(2), v), sim.close(np.r_[0.0, 0.0, v])):
+    for x in (sim.state_from_velocity(np.zeros(2), v), sim.close(np.r_[0.0, 0.0, v])):
         np.testing.assert_allclose(x[2:], expected, rtol=1e-4)
 
 
@@ -238,7 +238,7 @@ def test_sweeps_closed_loops_and_batches_follow(swing: tuple[dojo.Simulator, doj
         assert np.allclose(gradient["input"][t], linear.B[t].T @ costate)
         costate = linear.A[t].T @ costate + loss[t]
     assert np.allclose(gradient["state"], costate)
-    assert np.array_equal(sim.closed_loop(motion.x[0], motion.u, throw=True).x, motion.x)
+    assert np.array_equal(sim.rollout_feedback(motion.x[0], motion.u, throw=True).x, motion.x)
     assert np.array_equal(sim.rollout_batch(motion.x[:1], motion.u[None], throw=True).x[0], motion.x)
     assert np.array_equal(pickle.loads(pickle.dumps(sim)).rollout(motion.x[0], motion.u).x, motion.x)
 

@@ -19,9 +19,9 @@ def again(mechanism):
     return part_of(json.loads(json.dumps(packed_part(mechanism, arrays))), arrays)
 
 
-@pytest.mark.parametrize("name", [entry.name for entry in dojo.models.catalogue()])
+@pytest.mark.parametrize("name", [entry.name for entry in dojo.models.catalog()])
 def test_every_model_comes_back_as_it_was(name):
-    build = next(entry.build for entry in dojo.models.catalogue() if entry.name == name)
+    build = next(entry.build for entry in dojo.models.catalog() if entry.name == name)
     given = Simulator(build())
     found = Simulator(again(given.mechanism))
     assert type(found.mechanism) is type(given.mechanism)
@@ -44,7 +44,7 @@ def test_a_trajectory_comes_back_and_goes_on(tmp_path):
     made = sim.rollout(sim.neutral(), steps=5)
     made.save(tmp_path / "motion.npz")
     found = dojo.Trajectory.load(tmp_path / "motion.npz")
-    for name in ("x", "u", "time", "iterations", "substeps"):
+    for name in ("x", "u", "time", "iterations", "parts"):
         np.testing.assert_array_equal(getattr(found, name), getattr(made, name))
     np.testing.assert_array_equal(found.contacts.normal_force, made.contacts.normal_force)
     assert found.simulator.kappa == sim.kappa and found.status == made.status

@@ -157,7 +157,7 @@ def test_each_shape_rubs_with_its_own_friction() -> None:
     sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-9)
     v = np.zeros(6)
     v[0] = 2.0
-    t = sim.rollout(sim.start(mech.neutral, v), np.zeros((20, 0)), throw=True)
+    t = sim.rollout(sim.state_from_velocity(mech.neutral, v), np.zeros((20, 0)), throw=True)
     normal, along = t.contacts.normal_force[10], t.contacts.friction_force[10]
     carried = normal > 0.05
     coefficient = np.array([0.2 if "left" in name else 0.4 for name in mech.contact_names])

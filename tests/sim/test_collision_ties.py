@@ -176,7 +176,7 @@ def test_a_capsule_across_the_edge_of_a_box_touches_it_at_one_point() -> None:
         (Pair.SPHERE_CYLINDER, [0.2, 0.4], -EYE[0], 0.3),
     ],
 )
-def test_a_sphere_at_the_centre_has_a_stated_way_out(kind: Pair, b: list[float], normal: Array, depth: float) -> None:
+def test_a_sphere_at_the_center_has_a_stated_way_out(kind: Pair, b: list[float], normal: Array, depth: float) -> None:
     (out,) = contacts(kind, [0.1], b, EYE, [0.0, 0.0, 0.0])
     np.testing.assert_allclose(out[0], -depth, atol=1e-15)
     np.testing.assert_array_equal(out[1:4], normal)

@@ -36,7 +36,7 @@ def test_energy_error_is_of_second_order(kind: str, on_world: bool) -> None:
     error = []
     for h in (0.01, 0.005):
         sim = Simulator(mech, time_step=h, tolerance=1e-10)
-        t = sim.rollout(sim.start(q, v), np.zeros((round(0.5 / h), sim.nu)), throw=True)
+        t = sim.rollout(sim.state_from_velocity(q, v), np.zeros((round(0.5 / h), sim.nu)), throw=True)
         energy = sim.energy(t.x)
         error.append(np.abs(energy - energy[0]).max())
     assert error[0] < 0.02 * (1 + abs(energy[0]))

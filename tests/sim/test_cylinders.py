@@ -141,7 +141,7 @@ def test_motions_keep_momentum_and_gain_no_energy(name: str, first: bool) -> Non
     [("wheel", "wheel", (2, 12, 49, 102)), ("cylinder", "wheel", (18, 110)), ("box", "wheel", (1, 38))],
     ids=str,
 )
-def test_thin_wheels_at_four_centimetres_a_step(a: str, b: str, seeds: tuple[int, ...]) -> None:
+def test_thin_wheels_at_four_centimeters_a_step(a: str, b: str, seeds: tuple[int, ...]) -> None:
     """Motions in which rims ran along each other, or passed an edge within a step."""
     sim = dojo.Simulator(two(ALL[a], ALL[b]), time_step=0.01)
     for seed in seeds:

@@ -21,7 +21,7 @@ def thrown(mech: dojo.Mechanism, h: float, seconds: float) -> Floats:
     rng = np.random.default_rng(7)
     sim = dojo.Simulator(mech, time_step=h, tolerance=1e-12)
     q, v = sim.neutral()[: sim.nq], rng.normal(size=sim.nv)
-    found = sim.rollout(sim.start(q, v), steps=round(seconds / h), throw=True).x[-1]
+    found = sim.rollout(sim.state_from_velocity(q, v), steps=round(seconds / h), throw=True).x[-1]
     exact_q, exact_v = (end[-1] for end in TreeReference(sim.model).run(q, v, np.array([0.0, seconds])))
     moved = sim.difference(np.r_[exact_q, 0.0 * v], np.r_[found[: sim.nq], 0.0 * v])[: sim.nv]
     return np.array([np.abs(moved).max(), np.abs(sim.velocity(found) - exact_v).max()])
@@ -43,7 +43,7 @@ def test_second_order(mech: dojo.Mechanism) -> None:
 def test_it_stops_after_its_momentum_over_the_damper(damper: float) -> None:
     sim = dojo.Simulator(slider(mass=2.0, damper=damper), time_step=0.05, tolerance=1e-13)
     steps = 100 + round(80.0 / (0.05 * damper))
-    xs = sim.rollout(sim.start(np.zeros(1), np.array([3.0])), steps=steps, throw=True).x
+    xs = sim.rollout(sim.state_from_velocity(np.zeros(1), np.array([3.0])), steps=steps, throw=True).x
     np.testing.assert_allclose(xs[-1, 0], 2.0 * 3.0 / damper, rtol=1e-6)
     assert np.diff(xs[:, 0]).min() >= -1e-12
 
@@ -80,7 +80,7 @@ def test_no_energy_in_passive_motion(kind: str) -> None:
     for h in (0.005, 0.05):
         for strength in STIFFNESS:
             sim = dojo.Simulator(chain(kind, 2, damper=strength), time_step=h, tolerance=1e-12)
-            x = sim.start(sim.neutral()[: sim.nq], rng.normal(size=sim.nv))
+            x = sim.state_from_velocity(sim.neutral()[: sim.nq], rng.normal(size=sim.nv))
             xs = sim.rollout(x, steps=40, throw=True).x
             energy = sim.kinetic_energy(xs)
             assert np.diff(energy).max() < 1e-4 * energy[0], (h, strength)

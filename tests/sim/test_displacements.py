@@ -17,7 +17,7 @@ def test_mean_velocities_over_a_tiny_interval(kind: str, on_world: bool) -> None
     sim = Simulator(chain_with(kind, on_world), time_step=1e-10)
     q, v = random_state(np.random.default_rng(3), sim.mechanism)
     mean = sim.maximal(np.concatenate([q, v]))
-    now = sim.bodies(q, v)
+    now = sim.body_states(q, v)
     np.testing.assert_allclose(mean, now, rtol=0, atol=1e-8)
 
 

@@ -69,17 +69,17 @@ def whip() -> tuple[dojo.Simulator, Floats]:
 
 def test_a_refused_step_is_divided(whip: tuple[dojo.Simulator, Floats]) -> None:
     sim, x = whip
-    assert sim.replace(divide=False).rollout(x, steps=20).knot == 1
+    assert sim.replace(divide=False).rollout(x, steps=20).solved_steps == 1
     motion = sim.rollout(x, steps=20, throw=True)
-    assert motion.substeps[0] == 1 < motion.substeps[1]
-    assert sim.step(motion.x[1]).substeps == motion.substeps[1]
+    assert motion.parts[0] == 1 < motion.parts[1]
+    assert sim.step(motion.x[1]).parts == motion.parts[1]
     assert np.array_equal(motion.x, sim.rollout(x, steps=20).x)  # a division is deterministic
 
 
 def test_a_motion_without_division_agrees_with_a_simulator_that_refuses() -> None:
     sim, x, _ = moving("quadruped", 0.01)
     motion = sim.rollout(x, steps=40, throw=True)
-    assert motion.substeps.max() == 1
+    assert motion.parts.max() == 1
     assert np.array_equal(motion.x, sim.replace(divide=False).rollout(x, steps=40).x)
 
 
@@ -113,7 +113,7 @@ def test_derivatives_of_a_divided_step(name: str, steps: int) -> None:
     """Products of the derivatives of parts and conversions, against central differences that keep the division."""
     sim, x, u = moving(name, 0.01, steps)
     if name == "fourbar":
-        x = sim.start(sim.neutral()[: sim.nq], np.ones(sim.nv))
+        x = sim.state_from_velocity(sim.neutral()[: sim.nq], np.ones(sim.nv))
     found = engine(sim).in_parts(4, x, (u, engine(sim).no_wrenches), derivatives=True)
     assert found is not None
     A, B = engine(sim).slopes(x, found)
@@ -153,7 +153,7 @@ def divided(whip: tuple[dojo.Simulator, Floats]) -> tuple[dojo.Simulator, dojo.T
     """A motion in which one step is divided, and its end is exact."""
     sim, x = whip
     motion = sim.rollout(x, 1e-3 * np.ones((3, sim.nu)), throw=True)
-    assert motion.substeps.max() > 1
+    assert motion.parts.max() > 1
     return sim, motion
 
 
@@ -163,7 +163,7 @@ NAMES = ("mass", "inertia", "com", "parent_point", "time_step")
 @pytest.mark.slow
 def test_derivatives_by_parameters(divided: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
     sim, motion = divided
-    t = int(motion.substeps.argmax())
+    t = int(motion.parts.argmax())
     x, u = motion.x[t], motion.u[t]
     table = sim.linearize(x, u, wrt=NAMES)
     for name in NAMES:
@@ -175,7 +175,7 @@ def test_derivatives_by_parameters(divided: tuple[dojo.Simulator, dojo.Trajector
                 changed = values.copy()
                 changed[j] += sign * eps
                 ends.append(sim.with_parameters({name: changed}).step(x, u, throw=True))
-            assert ends[0].substeps == ends[1].substeps == motion.substeps[t]
+            assert ends[0].parts == ends[1].parts == motion.parts[t]
             difference = sim.difference(ends[0].x, ends[1].x) / (2.0 * eps)
             assert np.abs(table[name][:, j] - difference).max() < 1e-6 * max(1.0, np.abs(table[name]).max()), name
 
@@ -202,19 +202,19 @@ def test_batches_and_closed_loops_divide(divided: tuple[dojo.Simulator, dojo.Tra
     x0, us = motion.x[0], motion.u
     batch = sim.rollout_batch(np.tile(x0, (3, 1)), np.tile(us, (3, 1, 1)), throw=True)
     assert np.allclose(batch.x, motion.x, rtol=0.0, atol=1e-9)
-    shot = sim.closed_loop(x0, us, throw=True)
+    shot = sim.rollout_feedback(x0, us, throw=True)
     assert np.allclose(shot.x, motion.x, rtol=0.0, atol=1e-9)
-    held = sim.closed_loop(x0, us[:1], substeps=3, throw=True)
+    held = sim.rollout_feedback(x0, us[:1], substeps=3, throw=True)
     assert np.allclose(held.x[-1], sim.rollout(x0, np.tile(us[:1], (3, 1))).x[-1], rtol=0.0, atol=1e-9)
 
 
 def test_reactions_of_a_divided_step_are_means(divided: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
     """The force of the world on the first link and gravity change the momentum of all links, over the parts."""
     sim, motion = divided
-    t = int(motion.substeps.argmax())
+    t = int(motion.parts.argmax())
     force = sim.reactions(motion.x[t], motion.u[t], throw=True).force[0]
     parts = engine(sim).divide(motion.x[t], motion.u[t], engine(sim).no_wrenches)
-    assert parts is not None and parts.parts == motion.substeps[t]
+    assert parts is not None and parts.parts == motion.parts[t]
     momentum = parts.engine.states.momenta(parts.rolled.xs)[:, :3]
     weight = 2.0 * np.asarray(sim.mechanism.gravity)
     assert np.allclose(momentum[-1] - momentum[0], sim.time_step * (force + weight), rtol=0.0, atol=1e-9)
@@ -239,7 +239,7 @@ def test_bodies_spin_as_fast_as_they_like(rate: float) -> None:
         [dojo.Body("b", 1.0, (0.1, 0.2, 0.3))], [dojo.Joint("floating", None, "b")], gravity=(0, 0, 0)
     )
     sim = dojo.Simulator(mech, time_step=0.01, tolerance=1e-13)
-    x = sim.start(sim.neutral()[:7], np.array([0.0, 0.0, 0.0, 0.1, 0.2, rate]))
+    x = sim.state_from_velocity(sim.neutral()[:7], np.array([0.0, 0.0, 0.0, 0.1, 0.2, rate]))
     motion = sim.rollout(x, steps=50, throw=True)
     momentum = np.asarray([np.concatenate(sim.momentum(row)) for row in motion.x])
     assert np.abs(momentum - momentum[0]).max() < 1e-10 * np.abs(momentum[0]).max()
@@ -261,7 +261,7 @@ def test_steps_that_division_cannot_solve_keep_their_reason() -> None:
     sim = dojo.Simulator(models.quadruped(), time_step=0.01, max_iterations=1)
     result = sim.step(sim.neutral())
     assert result.status == dojo.Status.MAX_ITERATIONS
-    assert result.substeps == 1
+    assert result.parts == 1
     with pytest.raises(TypeError, match="divide"):
         dojo.Simulator(models.quadruped(), divide=3)  # type: ignore[arg-type]
 
@@ -272,15 +272,15 @@ def test_a_step_that_loses_momentum_has_no_derivatives_of_another_division(
     """Where the fewest parts end without a state of their momentum, more parts may have one: that is another step."""
     sim, x = whip
     before = sim.rollout(x, steps=20)
-    knot = int(np.flatnonzero(before.substeps > 1)[0])
+    knot = int(np.flatnonzero(before.parts > 1)[0])
     x = before.x[knot]
-    intervals, parts = engine(sim).intervals, before.substeps[knot]
+    intervals, parts = engine(sim).intervals, before.parts[knot]
     real = intervals.from_part
     fewest = sim.time_step / parts
     monkeypatch.setattr(intervals, "from_part", lambda y, part: real(y, part) if part < 0.9 * fewest else None)
     monkeypatch.setattr(intervals, "slowed", lambda y, part: (real(y, part), 0.5))
     ended = sim.step(x)
-    assert (ended.substeps, ended.share) == (parts, 0.5)
+    assert (ended.parts, ended.momentum_fraction) == (parts, 0.5)
     assert not sim.linearize(x, np.zeros(sim.nu)).success
     assert not sim.linearize_rollout(x, np.zeros((1, sim.nu)))[1].success
 
@@ -296,7 +296,7 @@ def test_ctrl_c_inside_a_division_keeps_the_steps_before(
     monkeypatch.setattr(engine(sim), "in_parts", stop)
     with pytest.raises(dojo.Interrupted) as stopped:
         sim.rollout(x, steps=20)
-    assert stopped.value.result.knot == 1
+    assert stopped.value.result.solved_steps == 1
     assert stopped.value.result.status == dojo.Status.INTERRUPTED
 
 

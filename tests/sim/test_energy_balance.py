@@ -82,7 +82,7 @@ def test_springs_dampers_and_armatures_are_none_of_it():
     mech, errors = pendulum(2, spring=20.0, damper=0.5, armature=0.1), []
     for h in (0.02, 0.01, 0.005):
         sim = dojo.Simulator(mech, time_step=h, tolerance=1e-12)
-        errors.append(abs(work_in_step(sim, sim.start(np.array([1.0, 0.5]), np.array([2.0, -3.0])))[0]))
+        errors.append(abs(work_in_step(sim, sim.state_from_velocity(np.array([1.0, 0.5]), np.array([2.0, -3.0])))[0]))
     assert np.all(order(errors) > 2.7), (errors, order(errors))
 
 
@@ -133,7 +133,7 @@ def test_a_chain_gains_the_work_done_on_it(action, rng):
     for h in (0.02, 0.01, 0.005):
         sim = dojo.Simulator(pendulum(3, **action), time_step=h, tolerance=1e-12)
         u = np.array([1.5, -2.0, 0.7])
-        x = sim.start(np.array([0.4, -0.3, 0.8]), np.array([1.0, 2.0, -1.5]))
+        x = sim.state_from_velocity(np.array([0.4, -0.3, 0.8]), np.array([1.0, 2.0, -1.5]))
         after = sim.step(x, u, throw=True).x
         before, later = (
             arriving(*tables(sim), h, v.copy(), third) for v, third in ((x[sim.nq :], False), (after[sim.nq :], True))
@@ -152,7 +152,7 @@ def test_work_of_inputs_equals_the_energy_gain_of_bodies():
     errors = []
     for h in (0.02, 0.01, 0.005):
         sim = dojo.Simulator(mech, time_step=h, tolerance=1e-12)
-        x = sim.start(sim.neutral()[: sim.nq], np.array([0.3, -0.2, 0.5, 1.0, 2.0, -1.5]))
+        x = sim.state_from_velocity(sim.neutral()[: sim.nq], np.array([0.3, -0.2, 0.5, 1.0, 2.0, -1.5]))
         u = np.array([1.5, -2.0])
         after = sim.step(x, u, throw=True).x
         work, _ = given(*tables(sim), h, x[sim.nq :].copy(), u)
@@ -241,7 +241,7 @@ def test_a_rounding_of_the_state_does_not_flip_the_energy(attacks):
 def test_steps_of_higher_order_that_blow_up_are_refused(links, order_, h):
     """A chain released level: a step that turned joints by 1e8 rad ended in success."""
     sim = dojo.Simulator(pendulum(links, length=2.0 / links), time_step=h, order=order_)
-    x = sim.start(np.r_[np.pi / 2, np.zeros(links - 1)], np.zeros(links))
+    x = sim.state_from_velocity(np.r_[np.pi / 2, np.zeros(links - 1)], np.zeros(links))
     motion = sim.rollout(x, np.zeros((round(10.0 / h), sim.nu)))
     assert motion.status in (dojo.Status.ENERGY_STEP, dojo.Status.ANGULAR_STEP), motion.message
     energy, kinetic_energy = sim.energy(motion.x), sim.kinetic_energy(motion.x)

@@ -26,7 +26,7 @@ def thrown(sim: dojo.Simulator, apart: float, speed: float = 1.0) -> np.ndarray:
     q, v = sim.neutral()[: sim.nq].copy(), np.zeros(sim.nv)
     q[:3], q[7:10] = (0.03, -0.02, apart), 0.0
     v[:6], v[6:] = (0.1, 0.0, -speed, 0.3, 0.5, 0.1), (0.0, 0.1, 0.0, 1.0, -0.7, 2.0)
-    return np.asarray(sim.start(q, v))
+    return np.asarray(sim.state_from_velocity(q, v))
 
 
 def near(sim: dojo.Simulator, x: np.ndarray, us: np.ndarray) -> np.ndarray:
@@ -59,7 +59,7 @@ def test_contact_is_that_of_order_two() -> None:
     order2 = np.flatnonzero(near(sim, x, us))
     k, end = int(order2[0]), int(order2[-1]) + 1
     assert (np.diff(order2) == 1).all()
-    s = second.rollout(second.start(t.x[k, : sim.nq], t.x[k, sim.nq :]), us[k:end], throw=True)
+    s = second.rollout(second.state_from_velocity(t.x[k, : sim.nq], t.x[k, sim.nq :]), us[k:end], throw=True)
     np.testing.assert_allclose(t.x[k : end + 1, : sim.nq], s.x[:, : sim.nq], atol=1e-9)
     np.testing.assert_allclose(t.contacts.impulse[k:end], s.contacts.impulse, atol=1e-8)
     assert s.contacts.impulse.any()
@@ -99,8 +99,8 @@ def test_joints_too_stiff_for_an_explicit_step_have_steps_of_order_two(field: st
     assert re.search(f"all steps are of order 2: joint .*: its {field} acts at", sim.describe())
     us = np.ones((50, sim.nu))
     t, s = (
-        sim.rollout(sim.start([0.1], [0.1]), us, throw=True),
-        second.rollout(second.start([0.1], [0.1]), us, throw=True),
+        sim.rollout(sim.state_from_velocity([0.1], [0.1]), us, throw=True),
+        second.rollout(second.state_from_velocity([0.1], [0.1]), us, throw=True),
     )
     np.testing.assert_allclose(t.x[:, 0], s.x[:, 0], atol=1e-10)
     np.testing.assert_allclose(t.x[:, 1], second.velocity(s.x)[:, 0], atol=1e-9)

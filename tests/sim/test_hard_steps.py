@@ -67,7 +67,7 @@ def test_extreme_state_with_solutions_that_gain_energy(robustness, number, kappa
     assert sim.replace(divide=False).step(x, np.zeros(sim.nu)).status == dojo.Status.ENERGY_STEP
     assert sim.energy(sim.step(x, np.zeros(sim.nu), throw=True).x) < sim.energy(x)
     finer = sim.replace(time_step=0.05 / 32)
-    start = finer.start(x[: sim.nq], sim.velocity(x))
+    start = finer.state_from_velocity(x[: sim.nq], sim.velocity(x))
     motion = finer.rollout(start, np.zeros((32, sim.nu)), throw=True)
     assert finer.energy(motion.x[-1]) < finer.energy(start)
 

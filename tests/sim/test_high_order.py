@@ -48,7 +48,7 @@ def test_it_is_the_same_motion_as_that_of_second_order(kind: str, on_world: bool
     q, v = random_state(np.random.default_rng(3), mech)
     coarse, fine = (
         dojo.Simulator(mech, time_step=h).rollout(
-            dojo.Simulator(mech, time_step=h).start(q, v), np.zeros((round(0.2 / h), sim.nu))
+            dojo.Simulator(mech, time_step=h).state_from_velocity(q, v), np.zeros((round(0.2 / h), sim.nu))
         ).x[-1][: sim.nq]
         for h in (5e-4, 2.5e-4)
     )  # fmt: skip
@@ -60,7 +60,7 @@ def test_momentum_stays_to_rounding(kind: str) -> None:
     mech = replace(branch(kind, False, spring=2.0), gravity=(0.0, 0.0, 0.0))
     sim = dojo.Simulator(mech, time_step=0.02, order=6)
     q, v = random_state(np.random.default_rng(1), mech)
-    x = sim.rollout(sim.start(q, v), np.zeros((200, sim.nu)), throw=True).x
+    x = sim.rollout(sim.state_from_velocity(q, v), np.zeros((200, sim.nu)), throw=True).x
     for part in sim.momentum(x):
         assert np.abs(part - part[0]).max() < 1e-12 * max(1.0, np.abs(part[0]).max())
 
@@ -68,7 +68,7 @@ def test_momentum_stays_to_rounding(kind: str) -> None:
 @pytest.mark.parametrize(("order", "h", "bound"), [(4, 0.005, 1e-6), (6, 0.01, 1e-7), (8, 0.02, 1e-9)])
 def test_energy_over_a_hundred_seconds(order: int, h: float, bound: float) -> None:
     sim = dojo.Simulator(dojo.models.npendulum(2), time_step=h, order=order)
-    x = sim.rollout(sim.start([0.4, 0.3], [0.0, 0.0]), np.zeros((round(100.0 / h), sim.nu)), throw=True).x
+    x = sim.rollout(sim.state_from_velocity([0.4, 0.3], [0.0, 0.0]), np.zeros((round(100.0 / h), sim.nu)), throw=True).x
     assert np.abs(sim.energy(x) - sim.energy(x[0])).max() < bound
 
 
@@ -76,8 +76,8 @@ def test_armature_is_in_the_motion_and_in_the_energy() -> None:
     mech = dojo.models.npendulum(2)
     mech = replace(mech, joints=[replace(j, armature=0.3) for j in mech.joints])
     sim, second = dojo.Simulator(mech, time_step=0.01, order=8), dojo.Simulator(mech, time_step=2e-4)
-    x = sim.rollout(sim.start([1.0, 0.3], [0.0, 0.5]), np.zeros((50, sim.nu)), throw=True).x
-    y = second.rollout(second.start([1.0, 0.3], [0.0, 0.5]), np.zeros((2500, sim.nu)), throw=True).x
+    x = sim.rollout(sim.state_from_velocity([1.0, 0.3], [0.0, 0.5]), np.zeros((50, sim.nu)), throw=True).x
+    y = second.rollout(second.state_from_velocity([1.0, 0.3], [0.0, 0.5]), np.zeros((2500, sim.nu)), throw=True).x
     np.testing.assert_allclose(x[-1, :2], y[-1, :2], atol=1e-6)
     assert np.abs(sim.energy(x) - sim.energy(x[0])).max() < 1e-10
 
@@ -86,13 +86,13 @@ def test_states_have_the_velocity_of_the_node() -> None:
     mech = branch("cylindrical_free", False)
     sim, second = dojo.Simulator(mech, time_step=0.02, order=4), dojo.Simulator(mech, time_step=0.02)
     q, v = random_state(np.random.default_rng(5), mech)
-    x, y = sim.start(q, v), second.start(q, v)
+    x, y = sim.state_from_velocity(q, v), second.state_from_velocity(q, v)
     np.testing.assert_array_equal(x, np.r_[q, v])
     np.testing.assert_array_equal(sim.velocity(x), v)
     assert abs(sim.energy(x) - second.energy(y)) < 1e-9
     np.testing.assert_allclose(np.hstack(sim.momentum(x)), np.hstack(second.momentum(y)), atol=1e-10)
     z = sim.maximal(x)
-    np.testing.assert_allclose(z, second.bodies(q, v), atol=1e-12)
+    np.testing.assert_allclose(z, second.body_states(q, v), atol=1e-12)
     assert np.abs(sim.difference(sim.minimal(z), x)).max() < 1e-10
     assert np.abs(second.maximal(y) - z).max() > 1e-4
     slow = sim.minimal(z + np.r_[0, 0, 0, 1e-3, np.zeros(9)], joint_tolerance=np.inf)
@@ -104,7 +104,7 @@ def test_batches_steps_and_copies_agree_with_rollouts() -> None:
     sim = dojo.Simulator(mech, time_step=0.01, order=4)
     q, v = random_state(np.random.default_rng(6), mech)
     us = np.random.default_rng(7).normal(size=(2, 5, sim.nu))
-    x = sim.start(q, v)
+    x = sim.state_from_velocity(q, v)
     batch = sim.rollout_batch(np.tile(x, (2, 1)), us)
     copies = [pickle.loads(pickle.dumps(sim)), sim.replace(order=6).replace(order=4)]
     for run in (sim, *copies):
@@ -129,7 +129,7 @@ def test_a_scene_without_contacts_has_no_forces_of_them() -> None:
 
 def test_a_body_that_turns_too_far_is_reported() -> None:
     sim = dojo.Simulator(dojo.models.npendulum(1), time_step=0.1, order=4)
-    result = sim.step(sim.start([0.0], [300.0]))
+    result = sim.step(sim.state_from_velocity([0.0], [300.0]))
     assert not result.success
     assert result.status in (dojo.Status.ANGULAR_STEP, dojo.Status.NO_PROGRESS)
 
@@ -143,7 +143,7 @@ def test_springs_and_dampers_have_steps_of_order_two_where_they_would_be_unstabl
         stiff = dojo.Simulator(mech, time_step=1.02 * stable(order) / rate, order=order)
         assert re.search(rf"order 2: joint .*: its {field} acts at .* use a time step below", stiff.describe())
         sim = dojo.Simulator(mech, time_step=0.98 * stable(order) / rate, order=order)
-        x = sim.rollout(sim.start([0.1], [0.1]), np.zeros((2000, sim.nu)), throw=True).x
+        x = sim.rollout(sim.state_from_velocity([0.1], [0.1]), np.zeros((2000, sim.nu)), throw=True).x
         assert np.abs(x).max() < 10.0 and np.abs(x[-1]).max() < 2.0
 
 

@@ -17,7 +17,7 @@ from support.smooth_mechanisms import branch
 def test_derivatives_agree_with_central_differences(kind: str, on_world: bool) -> None:
     mech = branch(kind, on_world, damper=0.1)
     sim = dojo.Simulator(mech, time_step=0.05, order=4)
-    x = sim.start(*random_state(np.random.default_rng(3), mech, speed=1.0))
+    x = sim.state_from_velocity(*random_state(np.random.default_rng(3), mech, speed=1.0))
     u = np.array([0.5, 0.3, -0.7])
     A, B = sim.linearize(x, u)
 
@@ -34,7 +34,7 @@ def test_derivatives_agree_with_central_differences(kind: str, on_world: bool) -
 def test_knots_of_several_steps_are_products_and_policies_follow_trajectories() -> None:
     mech = branch("spherical", False)
     sim = dojo.Simulator(mech, time_step=0.02, order=6)
-    x0 = sim.start(*random_state(np.random.default_rng(3), mech, speed=1.0))
+    x0 = sim.state_from_velocity(*random_state(np.random.default_rng(3), mech, speed=1.0))
     us = np.random.default_rng(1).normal(size=(4, sim.nu))
     fine = sim.rollout(x0, np.repeat(us, 2, axis=0), throw=True).x
     line = sim.linearize_trajectory(fine[::2], us, substeps=2)
@@ -46,10 +46,10 @@ def test_knots_of_several_steps_are_products_and_policies_follow_trajectories() 
     np.testing.assert_allclose(xs, sim.rollout(x0, us[:2]).x, atol=1e-12)
     np.testing.assert_allclose(rolled.A[0], A1, atol=1e-10)
     Ks = np.random.default_rng(2).normal(size=(4, sim.nu, sim.ndx))
-    shot = sim.closed_loop(x0, us, fine[::2], Ks=Ks, substeps=2)
+    shot = sim.rollout_feedback(x0, us, fine[::2], Ks=Ks, substeps=2)
     np.testing.assert_allclose(shot.x, fine[::2], atol=1e-10)
     dx = 1e-6 * np.random.default_rng(4).normal(size=sim.ndx)
-    shot = sim.closed_loop(sim.integrate(x0, dx), us, fine[::2], Ks=Ks, substeps=2)
+    shot = sim.rollout_feedback(sim.integrate(x0, dx), us, fine[::2], Ks=Ks, substeps=2)
     np.testing.assert_allclose(sim.difference(shot.x[1], fine[2]), (line.A[0] + line.B[0] @ Ks[0]) @ dx, atol=1e-9)
 
 

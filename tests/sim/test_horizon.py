@@ -14,7 +14,7 @@ T = 8
 def trajectory(kappa=1e-4):
     rng = np.random.default_rng(0)
     us = np.array([0.0, 0.0, 4.18 * 9.81]) + rng.normal(size=(T, 3))
-    return HOPPER.closed_loop(HOPPER.neutral(), us, kappa=kappa).x, us
+    return HOPPER.rollout_feedback(HOPPER.neutral(), us, kappa=kappa).x, us
 
 
 def gains():
@@ -24,17 +24,17 @@ def gains():
 
 def counted(horizon, *given, **named):
     """A rollout, and the Newton iterations that it took."""
-    calls, seen = horizon._engine.closed_loop, []
+    calls, seen = horizon._engine.roll_feedback, []
 
     def count(*args, **more):
         seen.append(calls(*args, **more))
         return seen[-1]
 
-    horizon._engine.closed_loop = count
+    horizon._engine.roll_feedback = count
     try:
         return horizon.roll(*given, **named), seen[0][1].report[1]
     finally:
-        del horizon._engine.closed_loop
+        del horizon._engine.roll_feedback
 
 
 @pytest.mark.parametrize("alpha", [1.0, 0.5])
@@ -42,7 +42,7 @@ def test_rollouts_agree_with_the_simulator(alpha):
     xs, us = trajectory()
     k, K, gaps = gains()
     horizon = HOPPER.horizon(T, limits=(-50.0, 50.0))
-    expected = HOPPER.closed_loop(
+    expected = HOPPER.rollout_feedback(
         xs[0], us, xs=xs, ks=k, Ks=K, gaps=gaps, alpha=alpha, limits=(-50.0, 50.0), kappa=1e-4
     )
     near = horizon.roll(xs[0], xs, us, 1e-4)
@@ -50,7 +50,7 @@ def test_rollouts_agree_with_the_simulator(alpha):
     linear = horizon.linearize(xs, us, 1e-4)
     for known in (Known(), Known(linear), Known(linear, near.steps)):
         trial = horizon.roll(xs[0], xs, us, 1e-4, k=k, K=K, gaps=gaps, alpha=alpha, known=known)
-        assert trial.status == 0 and trial.knot == T
+        assert trial.status == 0 and trial.solved_knots == T
         np.testing.assert_allclose(trial.x, expected.x, atol=1e-5)
         np.testing.assert_allclose(trial.u, expected.u, atol=1e-4)
 
@@ -80,7 +80,7 @@ def test_a_limit_of_iterations_holds_for_one_rollout():
     whole, usual = counted(horizon, xs[0], xs, us, 1e-6)
     stopped, iterations = counted(horizon, xs[0], xs, us, 1e-6, max_iterations=1)
     again, later = counted(horizon, xs[0], xs, us, 1e-6)
-    assert (stopped.status, iterations) == (Status.MAX_ITERATIONS, 1) and stopped.knot < T
+    assert (stopped.status, iterations) == (Status.MAX_ITERATIONS, 1) and stopped.solved_knots < T
     assert (again.status, later) == (whole.status, usual) and whole.status == Status.SOLVED
     np.testing.assert_array_equal(again.x, whole.x)
 
@@ -102,7 +102,7 @@ def test_knots_of_several_steps():
     xs, us = trajectory()
     horizon = HOPPER.replace(time_step=0.01).horizon(T, substeps=5)
     trial = horizon.roll(xs[0], xs, us, 1e-4)
-    shot = HOPPER.replace(time_step=0.01).closed_loop(xs[0], us, xs=xs, substeps=5, kappa=1e-4)
+    shot = HOPPER.replace(time_step=0.01).rollout_feedback(xs[0], us, xs=xs, substeps=5, kappa=1e-4)
     assert trial.steps is None
     np.testing.assert_allclose(trial.x, shot.x, atol=2e-6)
 

@@ -66,7 +66,7 @@ def test_below_the_ground_it_is_refused_by_name() -> None:
         _ = sim.linearize(sim.neutral()).A
     assert "'foot'" in sim.linearize(sim.neutral()).message
     t = sim.rollout(sim.neutral(), np.zeros((2, sim.nu)))
-    assert (t.status, t.knot) == (SUNKEN, 0) and "'foot'" in t.message
+    assert (t.status, t.solved_steps) == (SUNKEN, 0) and "'foot'" in t.message
 
 
 @pytest.mark.parametrize(

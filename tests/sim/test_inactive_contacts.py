@@ -106,7 +106,7 @@ def test_contacts_that_come_near_within_the_step_are_solved_for(height):
 def test_a_fall_from_far_to_near():
     """Impulses that stand from step to step, contacts that become near: the same path, and gaps as they are."""
     sim, exact = pair(block(friction=0.3), kappa=1e-8)
-    x = sim.start(flying(None, 2.0)[:7], flying(None, 2.0)[7:])
+    x = sim.state_from_velocity(flying(None, 2.0)[:7], flying(None, 2.0)[7:])
     us = np.zeros((60, 0))
     counts = [far(sim) for t in range(0, 61, 5) if sim.rollout(x, us[: t + 1]).success]
     assert counts[0] == 8 and counts[-1] == 0
@@ -123,7 +123,7 @@ def test_far_contacts_push_by_the_law_of_the_central_path():
     """In flight momentum changes by gravity and by kappa/gap of every corner, to the tolerance of every step."""
     kappa, steps = 1e-6, 50
     sim = dojo.Simulator(block(friction=0.0, gravity=np.zeros(3)), time_step=0.02, kappa=kappa)
-    x = sim.start(flying(None, 40.0)[:7], flying(None, 40.0)[7:])
+    x = sim.state_from_velocity(flying(None, 40.0)[:7], flying(None, 40.0)[7:])
     path = sim.rollout(x, np.zeros((steps, 0)))
     assert far(sim) == 8
     push = kappa / path.contacts.gap
@@ -141,7 +141,7 @@ def test_arms_of_far_impulses_turn_with_the_body():
     mech = dataclasses.replace(block(gravity=np.zeros(3)), contacts=contacts)
     sim = dojo.Simulator(mech, time_step=0.02, kappa=kappa, tolerance=TOLERANCE)
     turning = np.r_[np.zeros(3), 1.0, np.zeros(3)], np.r_[np.zeros(4), 1.0, 0.0]
-    path = sim.rollout(sim.start(*turning), np.zeros((steps, 0)))
+    path = sim.rollout(sim.state_from_velocity(*turning), np.zeros((steps, 0)))
     assert far(sim) == len(points)
     assert sim._engine.last().inactive[0, Inactive.TURNED] == 1.0, "evaluated again instead"
     moment = np.cross(path.contacts.point, path.contacts.impulse).sum(axis=1)

@@ -52,28 +52,28 @@ ROLLOUTS = {  # calls of so many steps; enough of them take a second
         60_000,
     ),
     "closed loop": (
-        lambda n: QUADRUPED.closed_loop(QUADRUPED.neutral(), inputs(QUADRUPED, n // 10), substeps=10),
+        lambda n: QUADRUPED.rollout_feedback(QUADRUPED.neutral(), inputs(QUADRUPED, n // 10), substeps=10),
         150_000,
     ),
     "closed loop under wrenches": (
-        lambda n: QUADRUPED.closed_loop(
+        lambda n: QUADRUPED.rollout_feedback(
             QUADRUPED.neutral(), inputs(QUADRUPED, n // 20), substeps=20, wrenches={"trunk": PUSH}
         ),
         150_000,
     ),
     "closed loop with many substeps": (
-        lambda n: QUADRUPED.closed_loop(QUADRUPED.neutral(), inputs(QUADRUPED, 200), substeps=n // 200),
+        lambda n: QUADRUPED.rollout_feedback(QUADRUPED.neutral(), inputs(QUADRUPED, 200), substeps=n // 200),
         200_000,
     ),
     "higher order": (lambda n: CHAIN.rollout(CHAIN.neutral() + 0.1, inputs(CHAIN, n)), 400_000),
     "higher order, closed loop": (
-        lambda n: CHAIN.closed_loop(CHAIN.neutral() + 0.1, inputs(CHAIN, n // 20), substeps=20),
+        lambda n: CHAIN.rollout_feedback(CHAIN.neutral() + 0.1, inputs(CHAIN, n // 20), substeps=20),
         400_000,
     ),
     "higher order, far": (lambda n: FALLING.rollout(FLYING, inputs(FALLING, n)), 600_000),
     "higher order, near": (lambda n: FALLING.rollout(RESTING, inputs(FALLING, n)), 300_000),
     "higher order, near, closed loop": (
-        lambda n: FALLING.closed_loop(RESTING, inputs(FALLING, n // 100), substeps=100),
+        lambda n: FALLING.rollout_feedback(RESTING, inputs(FALLING, n // 100), substeps=100),
         300_000,
     ),
 }
@@ -107,7 +107,7 @@ DERIVATIVES = {
 }
 STATES = {
     "velocity": (lambda n: HOPPER.velocity(rows(HOPPER, n)), 1_500_000),
-    "bodies": (lambda n: HOPPER.bodies(*np.split(rows(HOPPER, n), [HOPPER.nq], axis=1)), 2_000_000),
+    "body_states": (lambda n: HOPPER.body_states(*np.split(rows(HOPPER, n), [HOPPER.nq], axis=1)), 2_000_000),
     "integrate": (lambda n: QUADRUPED.integrate(rows(QUADRUPED, n), np.zeros((n, QUADRUPED.ndx))), 1_000_000),
     "difference": (lambda n: QUADRUPED.difference(rows(QUADRUPED, n), rows(QUADRUPED, n)), 1_000_000),
     "maximal": (lambda n: HOPPER.maximal(rows(HOPPER, n)), 1_500_000),
@@ -129,8 +129,8 @@ def stopped(call: Callable[[int], Any], enough: int, after: float = 0.3, *, in_l
 def test_rollouts_hear_ctrl_c_and_keep_what_they_have(name: str) -> None:
     found = stopped(*ROLLOUTS[name], in_loop=name != "under a policy")
     assert found.status == dojo.Status.INTERRUPTED
-    assert found.knot > 0
-    assert found.x.shape[0] == found.knot + 1 == len(found.u) + 1
+    assert found.solved_steps > 0
+    assert found.x.shape[0] == found.solved_steps + 1 == len(found.u) + 1
     assert np.isfinite(found.x).all()
 
 
@@ -139,10 +139,10 @@ def test_rollouts_hear_ctrl_c_and_keep_what_they_have(name: str) -> None:
 def test_batches_hear_ctrl_c_and_keep_what_they_have(name: str) -> None:
     found = stopped(*BATCHES[name], in_loop=True)
     steps = found.x.shape[1] - 1
-    done = found.knot == steps
-    assert 0 < found.knot.sum() < done.size * steps
+    done = found.solved_steps == steps
+    assert 0 < found.solved_steps.sum() < done.size * steps
     np.testing.assert_array_equal(found.status, np.where(done, dojo.Status.SOLVED, dojo.Status.INTERRUPTED))
-    for x, knot in zip(found.x[::97], found.knot[::97], strict=True):
+    for x, knot in zip(found.x[::97], found.solved_steps[::97], strict=True):
         np.testing.assert_array_equal(x[knot:], np.tile(x[knot], (steps + 1 - knot, 1)))
 
 
@@ -170,11 +170,24 @@ def test_pieces_change_no_bit(sim: Any, monkeypatch: pytest.MonkeyPatch) -> None
     batch = np.tile(us, (5, 1, 1)) * np.arange(5.0)[:, None, None]
 
     def results() -> list[Any]:
-        t, b, c = sim.rollout(x, us), sim.rollout_batch(np.tile(x, (5, 1)), batch), sim.closed_loop(x, us, substeps=2)
+        t, b, c = (
+            sim.rollout(x, us),
+            sim.rollout_batch(np.tile(x, (5, 1)), batch),
+            sim.rollout_feedback(x, us, substeps=2),
+        )
         lines = sim.linearize_trajectory(t.x, us), sim.linearize_rollout(x, us)[1]
         blocks = sim.vjp(t, np.ones((61, sim.ndx)), wrt=("state", "input"))
         rest = [sim.velocity(t.x), sim.maximal(t.x), sim.energy(t.x), *blocks.values()]
-        return [t.x, t.contacts.impulse, t.iterations, b.x, b.knot, c.x, *(a for k in lines for a in (k.A, k.B)), *rest]
+        return [
+            t.x,
+            t.contacts.impulse,
+            t.iterations,
+            b.x,
+            b.solved_steps,
+            c.x,
+            *(a for k in lines for a in (k.A, k.B)),
+            *rest,
+        ]
 
     whole = results()
     monkeypatch.setattr(interruptible_loops, "PAUSE", 3e-5)  # a few steps
@@ -229,7 +242,7 @@ def test_knots_that_cannot_be_solved_go_back_to_python(
 
 RESTS = {
     "rollout": lambda sim: sim.rollout(sim.neutral(), steps=1000),
-    "closed loop with many substeps": lambda sim: sim.closed_loop(sim.neutral(), inputs(sim, 1), substeps=1000),
+    "closed loop with many substeps": lambda sim: sim.rollout_feedback(sim.neutral(), inputs(sim, 1), substeps=1000),
     "batch": lambda sim: sim.rollout_batch(rows(sim, 1), np.zeros((1, 1000, sim.nu))),
 }
 

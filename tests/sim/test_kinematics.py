@@ -71,7 +71,7 @@ def test_quantities_are_of_one_motion(tmp_path: Path, state: tuple[np.ndarray, .
     sim = dojo.Simulator(robot(tmp_path), 0.01)
     kin = dojo.Kinematics(sim)
     q, v, _ = state
-    z = sim.bodies(q, v)
+    z = sim.body_states(q, v)
     bodies = sim.mechanism.bodies
     twice = sum(
         b.mass * zb[3:6] @ zb[3:6] + zb[10:] @ np.array(b.inertia) @ zb[10:] for b, zb in zip(bodies, z, strict=True)

@@ -74,13 +74,13 @@ def ring(kind: str, **action: Any) -> Mechanism:
     """Four bodies in a floating ring of spherical joints; the last one, of the given kind, acts."""
     bodies = [Body(f"b{k}", 1.0 + 0.3 * k, (0.02, 0.03, 0.04)) for k in range(4)]
     corners = [(0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (-0.5, 0.0, 0.0), (0.0, -0.5, 0.0)]
-    centres = 0.5 * (np.array(corners) + np.roll(corners, -1, axis=0))
+    centers = 0.5 * (np.array(corners) + np.roll(corners, -1, axis=0))
     joints = [Joint("floating", None, "b0")]
     for k in range(1, 4):
         at = np.array(corners[k])
-        joints.append(Joint("spherical", f"b{k - 1}", f"b{k}", "", at - centres[k - 1], at - centres[k]))
+        joints.append(Joint("spherical", f"b{k - 1}", f"b{k}", "", at - centers[k - 1], at - centers[k]))
     at = np.array(corners[0])
-    last = Joint(kind, "b3", "b0", "last", at - centres[3], at - centres[0], axis=(0.6, 0.0, 0.8), close=True, **action)
+    last = Joint(kind, "b3", "b0", "last", at - centers[3], at - centers[0], axis=(0.6, 0.0, 0.8), close=True, **action)
     return Mechanism(bodies, [*joints, last], gravity=(0, 0, 0))
 
 

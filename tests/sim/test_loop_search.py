@@ -84,7 +84,7 @@ def test_a_five_bar_with_its_arms_stretched_outwards() -> None:
 
 def test_start_closes_as_neutral_does() -> None:
     sim = at(plain_fourbar(), (0.0, 0.0, 0.0))
-    x = sim.start(np.zeros(3), np.array([1.0, 0.0, 0.0]))
+    x = sim.state_from_velocity(np.zeros(3), np.array([1.0, 0.0, 0.0]))
     np.testing.assert_allclose(x[:3], sim.neutral()[:3], atol=1e-6)
     assert worst_gap(sim, x) < 1e-10 and np.abs(x[3:]).max() > 0.1
 

@@ -59,7 +59,7 @@ def start(mech: MjcfMechanism, seed: int) -> tuple[np.ndarray, np.ndarray, np.nd
 def flown(mech: MjcfMechanism, q: np.ndarray, v: np.ndarray, u: np.ndarray, h: float, duration: float) -> np.ndarray:
     """Coordinates after free flight under the inputs u."""
     sim = Simulator(mech, time_step=h, tolerance=1e-10)
-    t = sim.rollout(sim.start(q, v), np.tile(u, (round(duration / h), 1)), throw=True)
+    t = sim.rollout(sim.state_from_velocity(q, v), np.tile(u, (round(duration / h), 1)), throw=True)
     return np.asarray(t.x[-1, : sim.nq])
 
 

@@ -52,7 +52,7 @@ def test_an_actuator_on_a_site_moves_with_its_body() -> None:
     for h in (1e-3, 5e-4):  # inputs act at the beginning of a step: an error of first order, extrapolated
         steps = round(0.2 / h)
         sim = Simulator(mech, time_step=h)
-        x = sim.start(sim.neutral()[: sim.nq], np.zeros(sim.nv))
+        x = sim.state_from_velocity(sim.neutral()[: sim.nq], np.zeros(sim.nv))
         ends.append(sim.rollout(x, np.tile(mech.report.gear * data.ctrl, (steps, 1)), throw=True).x[-1, : sim.nq])
     np.testing.assert_allclose(2.0 * ends[1] - ends[0], data.qpos, atol=3e-5)
 

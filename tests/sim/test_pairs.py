@@ -176,8 +176,8 @@ def test_a_stack_of_boxes_stands() -> None:
     sim = dojo.Simulator(tower(Box(0.2, 0.2, 0.2), [1.0] * 4), time_step=0.01)
     t = sim.rollout(sim.neutral(), np.zeros((100, sim.nu)))
     assert t.success, t.message
-    centres = sim.maximal(t.x[-1])[:, :3]
-    np.testing.assert_allclose(centres, [[0, 0, 0.1 + 0.2 * k] for k in range(4)], atol=1e-3)
+    centers = sim.maximal(t.x[-1])[:, :3]
+    np.testing.assert_allclose(centers, [[0, 0, 0.1 + 0.2 * k] for k in range(4)], atol=1e-3)
     load = t.contacts.force[-1, :, 2]
     names = sim.mechanism.contact_names
     for k in range(4):

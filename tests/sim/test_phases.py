@@ -25,7 +25,7 @@ def thrown(sim: dojo.Simulator, height: float, up: float = 0.0) -> np.ndarray:
     q, v = sim.neutral()[: sim.nq].copy(), np.zeros(sim.nv)
     q[2] += height
     v[:6] = 0.5, 0.1, up, 0.3, 0.5, 0.1
-    return np.asarray(sim.start(q, v))
+    return np.asarray(sim.state_from_velocity(q, v))
 
 
 def inputs(sim: dojo.Simulator, steps: int) -> np.ndarray:
@@ -51,7 +51,7 @@ def test_flight_has_the_higher_order_and_lands() -> None:
         assert -1e-9 < t.contacts.gap[-1].min() < 1e-6
         errors.append(np.abs(sim.difference(t.x[round(0.6 / h)], exact)).max())
     second = simulator(2)
-    x2 = second.rollout(second.start(q[: second.nq], q[second.nq :]), np.zeros((30, 3)), throw=True).x[-1]
+    x2 = second.rollout(second.state_from_velocity(q[: second.nq], q[second.nq :]), np.zeros((30, 3)), throw=True).x[-1]
     of_order_2 = np.abs(second.difference(np.r_[x2[: second.nq], second.velocity(x2)], exact)).max()
     assert errors[0] < 0.5 * of_order_2, (errors, of_order_2)  # which has a step half as long, and dampers of order 2
     assert errors[1] < errors[0] / 12.0
@@ -71,7 +71,7 @@ def test_momentum_and_energy_across_the_handover() -> None:
     gained = np.diff(p, axis=0) - H * (us + np.array([0.0, 0.0, -9.81]))
     np.testing.assert_allclose(gained, t.contacts.impulse.sum(axis=1), atol=TOLERANCE)
     for x in t.x[[landing, leaving]]:
-        mean = second.start(x[: sim.nq], x[sim.nq :])
+        mean = second.state_from_velocity(x[: sim.nq], x[sim.nq :])
         np.testing.assert_allclose(second.energy(mean), sim.energy(x), rtol=1e-12)
         np.testing.assert_allclose(np.hstack(second.momentum(mean)), np.hstack(sim.momentum(x)), atol=1e-12)
 
@@ -83,7 +83,7 @@ def test_contact_agrees_with_order_two() -> None:
     order2 = near(sim, x, us)
     k = int(np.flatnonzero(order2)[0])
     assert order2[k:].all() and len(us) - k > 20
-    s = second.rollout(second.start(t.x[k, : sim.nq], t.x[k, sim.nq :]), us[k:], throw=True)
+    s = second.rollout(second.state_from_velocity(t.x[k, : sim.nq], t.x[k, sim.nq :]), us[k:], throw=True)
     np.testing.assert_allclose(t.x[k:, : sim.nq], s.x[:, : sim.nq], atol=1e-9)
     np.testing.assert_allclose(t.x[k:, sim.nq :], second.velocity(s.x), atol=1e-7)
     np.testing.assert_allclose(t.contacts.impulse[k:], s.contacts.impulse, atol=1e-8)
@@ -100,7 +100,7 @@ def test_all_calls_take_the_same_steps_in_flight() -> None:
     np.testing.assert_allclose(one, t.x[-1], atol=1e-7)
     np.testing.assert_array_equal(sim.rollout_batch(x[None], us[None]).x[0], t.x)
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(sim)).rollout(x, us).x, t.x)
-    np.testing.assert_allclose(sim.closed_loop(x, us).x, t.x, atol=1e-7)
+    np.testing.assert_allclose(sim.rollout_feedback(x, us).x, t.x, atol=1e-7)
     assert set(sim.inactive_contacts(t.x[0])) == set(sim.mechanism.contact_names)
     assert "foot" not in sim.inactive_contacts(t.x[-1])
     foot = next(c for c in sim.mechanism.contacts if c.name == "foot")
@@ -177,7 +177,7 @@ def test_limits_are_met_and_left() -> None:
     """A pendulum swings freely at order 4, and bounces off its stop at order 2; nothing passes it."""
     mech = pendulum(1, limits=(-0.6, 3.0))
     sim = simulator(4, mech, h=0.01)
-    x, us = sim.start([1.0], [0.0]), np.zeros((300, sim.nu))
+    x, us = sim.state_from_velocity([1.0], [0.0]), np.zeros((300, sim.nu))
     t = sim.rollout(x, us, throw=True)
     order2 = near(sim, x, us)
     assert order2.any() and not order2.all()
@@ -189,9 +189,9 @@ def test_limits_are_met_and_left() -> None:
 def test_a_step_that_fails_says_so() -> None:
     sim = simulator(4, max_iterations=1)
     t = sim.rollout(thrown(sim, 0.05), np.zeros((40, 3)))
-    assert not t.success and 0 < t.knot < 40
-    assert f"step {t.knot}" in t.message and t.status == dojo.Status.MAX_ITERATIONS
-    assert len(t.x) == t.knot + 1 and np.isfinite(t.x).all()
+    assert not t.success and 0 < t.solved_steps < 40
+    assert f"step {t.solved_steps}" in t.message and t.status == dojo.Status.MAX_ITERATIONS
+    assert len(t.x) == t.solved_steps + 1 and np.isfinite(t.x).all()
 
 
 def test_steps_of_both_orders_are_one_call_of_a_kernel(monkeypatch: pytest.MonkeyPatch) -> None:

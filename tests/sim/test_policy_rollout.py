@@ -49,7 +49,7 @@ def test_it_stops_at_the_step_that_cannot_be_solved() -> None:
         return [0.0, 0.0, np.inf] if time > 0.05 else [0.0, 0.0, 1e200 if time > 0.03 else 0.0]
 
     found = SIM.rollout(x, spun, steps=10)
-    assert (found.knot, found.x.shape, found.u.shape) == (2, (3, SIM.nx), (2, 3))
+    assert (found.solved_steps, found.x.shape, found.u.shape) == (2, (3, SIM.nx), (2, 3))
     assert found.status != Status.SOLVED
     assert "step 2" in found.message
 

@@ -39,7 +39,7 @@ def test_tension_of_a_pendulum() -> None:
     errors = []
     for h in (2e-3, 1e-3):
         sim = dojo.Simulator(pendulum(m, length), time_step=h, tolerance=1e-12)
-        r = sim.reactions(sim.start(np.array([q]), np.array([w])), frame="body")["pin"]
+        r = sim.reactions(sim.state_from_velocity(np.array([q]), np.array([w])), frame="body")["pin"]
         errors.append(np.abs(r.force - (0.0, 0.0, exact)).max())
         np.testing.assert_allclose(r.torque, 0.0, atol=1e-6)
         np.testing.assert_allclose(r.point, 0.0, atol=1e-15)

@@ -45,7 +45,7 @@ def test_against_the_force_and_torque_sensors_of_mujoco() -> None:
     errors = []
     for h in (2e-4, 1e-4):
         sim = dojo.Simulator(dojo.load_mjcf(SENSORS), time_step=h, tolerance=1e-12)
-        r = sim.reactions(sim.start(data.qpos, data.qvel), data.ctrl, frame="body")
+        r = sim.reactions(sim.state_from_velocity(data.qpos, data.qvel), data.ctrl, frame="body")
         # the site of the slide stays in its body, as our joint point does
         errors.append(max(np.abs(r.force - sensed[:, 0]).max(), np.abs(r.torque - sensed[:, 1]).max()))
     assert errors[1] < 5e-3 * np.abs(sensed).max() and errors[1] < 0.6 * errors[0]

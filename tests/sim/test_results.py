@@ -20,7 +20,7 @@ CALLS: dict[str, Callable[..., Any]] = {
     "rollout": lambda **k: HOPPER.rollout(X, US, **k),
     "rollout of a policy": lambda **k: HOPPER.rollout(X, lambda t, x: US[0], steps=3, **k),
     "rollout_batch": lambda **k: HOPPER.rollout_batch(X[None], US[None], **k),
-    "closed_loop": lambda **k: HOPPER.closed_loop(X, US, **k),
+    "rollout_feedback": lambda **k: HOPPER.rollout_feedback(X, US, **k),
     "linearize": lambda **k: HOPPER.linearize(X, **k),
     "linearize by name": lambda **k: HOPPER.linearize(X, wrt=("state", "friction"), **k),
     "linearize_rollout": lambda **k: HOPPER.linearize_rollout(X, US, **k)[1],

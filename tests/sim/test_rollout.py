@@ -26,7 +26,7 @@ def above(mech: Mechanism, height: float) -> tuple[Simulator, np.ndarray, float]
 def test_step_and_rollout_agree() -> None:
     x0, us = np.array([1.0, -0.5, 0.2, 0.1]), np.full((5, 2), 0.3)
     t = PENDULUM.rollout(x0, us)
-    assert t.success and t.knot == 5 and t.x.shape == (6, 4) and t.u.shape == (5, 2)
+    assert t.success and t.solved_steps == 5 and t.x.shape == (6, 4) and t.u.shape == (5, 2)
     np.testing.assert_allclose(t.time, 0.01 * np.arange(6))
     x = x0
     for expected in t.x[1:]:
@@ -39,7 +39,7 @@ def test_step_and_rollout_agree() -> None:
 
 def test_rollout_of_no_steps() -> None:
     t = PENDULUM.rollout(np.zeros(4), np.zeros((0, 2)))
-    assert t.success and t.x.shape == (1, 4) and t.knot == 0
+    assert t.success and t.x.shape == (1, 4) and t.solved_steps == 0
 
 
 def test_unsolved_step_is_not_used() -> None:
@@ -49,7 +49,7 @@ def test_unsolved_step_is_not_used() -> None:
     assert not r.success and r.status == Status.MAX_ITERATIONS
     np.testing.assert_array_equal(r.x, x0)
     t = sim.rollout(x0, np.zeros((3, 2)))
-    assert (t.knot, len(t.x), len(t.u), len(t.contacts.gap)) == (0, 1, 0, 0)
+    assert (t.solved_steps, len(t.x), len(t.u), len(t.contacts.gap)) == (0, 1, 0, 0)
     assert t.message.startswith("Simulator.rollout: step 0: The iteration limit") and "Residual" in t.message
     with pytest.raises(RuntimeError, match=r"Simulator.rollout: step 0: The iteration limit"):
         sim.rollout(x0, np.zeros((3, 2)), throw=True)
@@ -61,7 +61,7 @@ def test_batch_equals_single_rollouts() -> None:
     rng = np.random.default_rng(0)
     x0s, us = rng.normal(size=(6, 4)), rng.normal(size=(6, 5, 2))
     batch = PENDULUM.rollout_batch(x0s, us)
-    assert np.all(batch.status == 0) and np.all(batch.knot == 5)
+    assert np.all(batch.status == 0) and np.all(batch.solved_steps == 5)
     for k in range(6):
         np.testing.assert_array_equal(batch.x[k], PENDULUM.rollout(x0s[k], us[k]).x)
 
@@ -115,7 +115,7 @@ def test_closed_loop_follows_its_policy() -> None:
     rng = np.random.default_rng(3)
     x0, us, xs = rng.normal(size=4), rng.normal(size=(3, 2)), rng.normal(size=(4, 4))
     ks, Ks, gaps = rng.normal(size=(3, 2)), rng.normal(size=(3, 2, 4)), rng.normal(size=(4, 4))
-    shot = PENDULUM.closed_loop(
+    shot = PENDULUM.rollout_feedback(
         x0, us, xs, ks=ks, Ks=Ks, gaps=gaps, alpha=0.25, limits=(-1.0, [0.5, np.inf]), substeps=2
     )
     x = x0
@@ -124,6 +124,6 @@ def test_closed_loop_follows_its_policy() -> None:
         np.testing.assert_allclose(shot.u[t], u, rtol=1e-12)
         x = PENDULUM.rollout(x, [u, u]).x[-1] - 0.75 * gaps[t + 1]
         np.testing.assert_allclose(shot.x[t + 1], x, atol=1e-12)
-    assert (shot.status, shot.knot) == (Status.SOLVED, 3)
+    assert (shot.status, shot.solved_knots) == (Status.SOLVED, 3)
     # under a policy, the guess for the next velocity is the policy's velocity: equal to the tolerance of a step
-    np.testing.assert_allclose(PENDULUM.closed_loop(x0, us).x, PENDULUM.rollout(x0, us).x, atol=1e-7)
+    np.testing.assert_allclose(PENDULUM.rollout_feedback(x0, us).x, PENDULUM.rollout(x0, us).x, atol=1e-7)

@@ -95,9 +95,9 @@ def test_distances_and_derivatives(kind: Pair, rng: np.random.Generator) -> None
                 continue
             seen.add(feature)
             phi, n, p = out[0], out[1:4], out[4:7]
-            centre = p + n * (0.1 + 0.5 * phi)
-            if np.linalg.norm(centre / (0.3, 0.2, 0.25)) > 1.0:
-                away = np.linalg.norm(surface - centre, axis=1).min()
+            center = p + n * (0.1 + 0.5 * phi)
+            if np.linalg.norm(center / (0.3, 0.2, 0.25)) > 1.0:
+                away = np.linalg.norm(surface - center, axis=1).min()
                 assert phi + 0.11 == pytest.approx(away, abs=5e-4)
             np.testing.assert_allclose(at(here)[0], out[:7], atol=1e-14)
             expected, _ = differences(at, 6, rows=True)

@@ -53,7 +53,7 @@ def whirling(sim: dojo.Simulator) -> np.ndarray:
 def test_a_parallelogram_stays_one() -> None:
     """It swings through the pose with its links in one line; the other branch is the antiparallelogram."""
     sim = dojo.Simulator(linkage(PARALLELOGRAM, SIDEWAYS), time_step=0.01, tolerance=1e-11)
-    energy, gap, x = spread(sim, sim.start([-1.2, 1.2, -1.2], [1.0, -1.0, 1.0]), 5000)
+    energy, gap, x = spread(sim, sim.state_from_velocity([-1.2, 1.2, -1.2], [1.0, -1.0, 1.0]), 5000)
     assert passages(x, PARALLELOGRAM) > 40
     assert energy < 2e-3 and gap < 1e-10
     np.testing.assert_allclose(x[:, 0], x[:, 2], atol=1e-6)
@@ -61,7 +61,7 @@ def test_a_parallelogram_stays_one() -> None:
 
 def test_a_step_that_is_solved_again_counts_the_iterations_of_all_its_solves() -> None:
     sim = dojo.Simulator(linkage(PARALLELOGRAM, SIDEWAYS), time_step=0.01, tolerance=1e-11)
-    t = sim.rollout(sim.start([-1.2, 1.2, -1.2], [1.0, -1.0, 1.0]), np.zeros((60, sim.nu)), throw=True)
+    t = sim.rollout(sim.state_from_velocity([-1.2, 1.2, -1.2], [1.0, -1.0, 1.0]), np.zeros((60, sim.nu)), throw=True)
     assert np.median(t.iterations) == 2  # where links come into one line, a step is solved from its guess, and again
     assert t.iterations[np.argmin([strength(x, PARALLELOGRAM) for x in t.x[1:]])] >= 4
 
@@ -104,10 +104,10 @@ def test_the_short_way_of_a_rollout_is_the_long_way_of_single_steps() -> None:
 def test_energy_is_bounded_over_1e5_steps(lengths: tuple[float, float, float, float]) -> None:
     """The motion is chaotic, so its mean energy wanders: the median of three nearly equal starts must not drift."""
     sim = dojo.Simulator(linkage(lengths, (0.0, 0.0, -9.81)), time_step=0.01, tolerance=1e-9)
-    first = whirling(sim) if lengths == GRASHOF else sim.start([-1.2, 1.2, -1.2], [6.5, -6.5, 6.5])
+    first = whirling(sim) if lengths == GRASHOF else sim.state_from_velocity([-1.2, 1.2, -1.2], [6.5, -6.5, 6.5])
     q, v, drifts = first[: sim.nq], sim.velocity(first), []
     for share in (0.0, 1e-9, 2e-9):
-        x, kinetic, energies = sim.start(q, (1.0 + share) * v), 0.0, []
+        x, kinetic, energies = sim.state_from_velocity(q, (1.0 + share) * v), 0.0, []
         for _ in range(20):
             t = sim.rollout(x, np.zeros((5000, 3)), throw=True)
             x = t.x[-1]
@@ -127,8 +127,8 @@ def test_motions_too_fast_for_the_time_step_are_refused() -> None:
     x = coarse.neutral()
     x[coarse.nq :] = 0.3 * np.random.default_rng(0).normal(size=coarse.nv)
     t = coarse.rollout(coarse.close(x), np.zeros((200, coarse.nu)))
-    energy = coarse.energy(t.x[1 : t.knot + 1])
-    assert t.status == Status.LOOP_STEP and 50 < t.knot < 100
+    energy = coarse.energy(t.x[1 : t.solved_steps + 1])
+    assert t.status == Status.LOOP_STEP and 50 < t.solved_steps < 100
     assert np.abs(energy - energy[0]).max() < 0.1  # of 14 J; 39 J were gained
 
 
@@ -149,7 +149,7 @@ def test_velocity_and_energy_at_the_nodes_of_loops() -> None:
     errors = []
     for h in (0.02, 0.01):
         sim = dojo.Simulator(linkage(PARALLELOGRAM, (0.0, 0.0, 0.0)), time_step=h, tolerance=1e-12)
-        x = sim.start([0.7, -0.7, 0.7], [3.0, -3.0, 3.0])
+        x = sim.state_from_velocity([0.7, -0.7, 0.7], [3.0, -3.0, 3.0])
         t = sim.rollout(x, np.zeros((round(0.2 / h), 3)), throw=True)
         v = sim.velocity(t.x)
         np.testing.assert_allclose(v[0], [3.0, -3.0, 3.0], atol=1e-9)

@@ -33,9 +33,9 @@ def minimal(sim: dojo.Simulator, x: np.ndarray) -> Any:
 CALLS: dict[str, Callable[[dojo.Simulator, np.ndarray], Any]] = {
     "close": lambda s, x: s.close(x),
     "loop_gaps": lambda s, x: np.concatenate([*s.loop_gaps(x).values(), [0.0]]),
-    "start": lambda s, x: s.start(x[: s.nq], x[s.nq :]),
+    "state_from_velocity": lambda s, x: s.state_from_velocity(x[: s.nq], x[s.nq :]),
     "velocity": lambda s, x: s.velocity(x),
-    "bodies": lambda s, x: s.bodies(x[: s.nq], x[s.nq :]),
+    "body_states": lambda s, x: s.body_states(x[: s.nq], x[s.nq :]),
     "integrate": lambda s, x: s.integrate(x, x[-1] * np.ones(s.ndx)),
     "integrate from neutral": lambda s, x: s.integrate(s.neutral(), np.abs(x).max() * np.ones(s.ndx)),
     "difference": lambda s, x: s.difference(x, s.neutral()),

@@ -24,7 +24,7 @@ def sim():
     return dojo.Simulator(dojo.models.ant(), time_step=0.02, kappa=1e-4)
 
 
-def test_a_row_is_the_rollout_of_its_state_whatever_its_neighbours(sim):
+def test_a_row_is_the_rollout_of_its_state_whatever_its_neighbors(sim):
     X, U = _rows(sim)
     found = sim.step_batch(X, U, substeps=3, derivatives=True)
     assert found.success

@@ -66,7 +66,7 @@ def test_a_taut_string_keeps_the_energy_to_second_order(speed: float) -> None:
     spreads = []
     for h in (0.02, 0.01):
         sim = pendulum(h)
-        t = sim.rollout(sim.start(*hanging(0.7, speed)), np.zeros((round(10.0 / h), 0)), throw=True)
+        t = sim.rollout(sim.state_from_velocity(*hanging(0.7, speed)), np.zeros((round(10.0 / h), 0)), throw=True)
         assert np.abs(np.linalg.norm(t.x[1:, :3], axis=1) - 1.0).max() < 1e-7
         energy = sim.energy(t.x[2:])
         fifth = len(energy) // 5
@@ -78,7 +78,7 @@ def test_a_taut_string_keeps_the_energy_to_second_order(speed: float) -> None:
 def test_a_conical_pendulum_goes_round_in_its_period() -> None:
     sim = pendulum(0.01)
     q, v = hanging(0.7, CIRCLE)
-    x = sim.rollout(sim.start(q, v), np.zeros((1000, 0)), throw=True).x
+    x = sim.rollout(sim.state_from_velocity(q, v), np.zeros((1000, 0)), throw=True).x
     assert np.abs(x[1:, 2] + np.cos(0.7)).max() < 1e-4
     turned = np.unwrap(np.arctan2(x[:, 1], x[:, 0]))[-1]
     assert turned == pytest.approx(10.0 * CIRCLE / np.sin(0.7), rel=2e-4)
@@ -91,7 +91,7 @@ def test_a_string_that_was_slack_gains_nothing() -> None:
         q = rng.normal(size=3)
         q *= rng.uniform(0.1, 0.99) / np.linalg.norm(q)
         v = rng.normal(size=3) * rng.choice([1.0, 5.0, 20.0])
-        x = sim.start(np.r_[q, 1, 0, 0, 0], np.r_[v, 0, 0, 0])
+        x = sim.state_from_velocity(np.r_[q, 1, 0, 0, 0], np.r_[v, 0, 0, 0])
         t = sim.rollout(x, np.zeros((200, 0)))
         assert t.success, t.message
         energy = sim.energy(t.x[1:])

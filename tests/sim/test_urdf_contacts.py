@@ -215,7 +215,7 @@ def test_wheels_roll_without_loss(tmp_path: Path) -> None:
     sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-8)
     v = np.zeros(sim.nv)
     v[0], v[6:] = 1.2, 1.2 / 0.3
-    t = sim.rollout(sim.start(sim.neutral()[: sim.nq], v), np.zeros((200, 4)), throw=True)
+    t = sim.rollout(sim.state_from_velocity(sim.neutral()[: sim.nq], v), np.zeros((200, 4)), throw=True)
     np.testing.assert_allclose(t.x[-1, 0], 2.4, rtol=2e-3)
     np.testing.assert_allclose(t.x[:, 2], 0.3, atol=1e-5)
     np.testing.assert_allclose(t.x[-1, 7 : sim.nq], 8.0, rtol=2e-3)

@@ -38,7 +38,7 @@ def test_one_body_by_name_and_as_a_table_are_the_same(rng):
     np.testing.assert_array_equal(sim.rollout(x, us, wrenches={"body1": np.tile(wrench, (20, 1))}).x, expected)
     np.testing.assert_array_equal(sim.rollout(x, us, wrenches=table[0]).x, expected)
     np.testing.assert_array_equal(sim.step(x, wrenches={"body1": wrench}).x, expected[1])
-    shot = sim.closed_loop(x, us, wrenches=table)
+    shot = sim.rollout_feedback(x, us, wrenches=table)
     np.testing.assert_allclose(shot.x, expected, atol=1e-7)
     assert shot.u.shape == (20, sim.nu)
 
@@ -67,10 +67,10 @@ def test_derivatives_agree_with_the_pushed_step(rng):
     np.testing.assert_allclose(lines.B[0], B, atol=1e-9)
     K = np.zeros((3, sim.nu, sim.ndx))
     K[:, 2, 2] = -50.0
-    shot = sim.closed_loop(
+    shot = sim.rollout_feedback(
         x, np.zeros((3, sim.nu)), xs=np.tile(x, (4, 1)), Ks=K, limits=(-1.0, 1.0), wrenches={"ball": (1, 0, 0, 0, 0, 0)}
     )
-    assert shot.knot == 3 and shot.x[-1, sim.nq] > 0.02 and np.abs(shot.u).max() <= 1.0
+    assert shot.solved_knots == 3 and shot.x[-1, sim.nq] > 0.02 and np.abs(shot.u).max() <= 1.0
 
 
 @pytest.mark.parametrize(

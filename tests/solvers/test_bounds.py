@@ -84,7 +84,7 @@ def test_a_negative_index_that_is_not_written_as_a_number_is_refused(plain):
 def test_a_users_function_counts_negative_indices_from_the_end(boundscheck):
     """As Numba does, with checks and without; -1 is no literal here."""
 
-    @dojo.kernel(boundscheck=boundscheck)
+    @dojo.jit(boundscheck=boundscheck)
     def last(x, u, out):
         i = u.shape[0] - 2
         out[i] = 10.0 * x[i] + x[i - 1]
@@ -95,7 +95,7 @@ def test_a_users_function_counts_negative_indices_from_the_end(boundscheck):
 
 
 def test_a_users_function_is_refused_an_index_before_the_begin():
-    @dojo.kernel
+    @dojo.jit
     def before(x, u, out):
         out[0] = x[-1 - x.shape[0]]
 

@@ -240,7 +240,7 @@ def test_columns_by_name_take_the_instructions_of_numbers():
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="looks at compiled code")
 @pytest.mark.skipif(os.environ.get("DOJO_OPT_PLAIN_NUMBA", "0") not in ("", "0"), reason="Numba writes sixty")
-def test_a_loop_over_a_range_takes_few_instructions_before_it_is_optimised():
+def test_a_loop_over_a_range_takes_few_instructions_before_it_is_optimized():
     def total(n: int) -> int:
         found = 0
         for i in range(n):

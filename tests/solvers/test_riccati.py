@@ -17,10 +17,10 @@ def random_model(T, n, m, seed, limit=np.inf):
     return Quadratic(A, B, g, H, rng.normal(size=(T + 1, n)), np.full((T, m), -limit), np.full((T, m), limit))
 
 
-def run(model, control=0.0, value=0.0, damping=None):
+def run(model, control=0.0, value=0.0, unit=None):
     T, n, m = model.B.shape
     K, k = np.full((T, m, n), np.nan), np.zeros((T, m))
-    reg = Regularization(control, value, np.ones(m) if damping is None else damping)
+    reg = Regularization(control, value, np.ones(m) if unit is None else unit)
     buffer = np.full(work_size(n, m), np.nan)
     return backward(model, reg, K, k, np.zeros(m, dtype=np.int64), buffer), K, k
 

@@ -27,13 +27,13 @@ def loop(kind: str, tree: str = "spherical") -> Case:
     """A floating ring of four bodies, moving."""
     bodies = [Body(f"b{k}", 1.0 + 0.3 * k, (0.02, 0.03, 0.04)) for k in range(4)]
     corners = np.array([(0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (-0.5, 0.0, 0.0), (0.0, -0.5, 0.0)])
-    centres = 0.5 * (corners + np.roll(corners, -1, axis=0))
+    centers = 0.5 * (corners + np.roll(corners, -1, axis=0))
     joints = [Joint("floating", None, "b0")]
     for k in range(1, 4):
         at = corners[k]
-        ends = (at - centres[k - 1], at - centres[k])
+        ends = (at - centers[k - 1], at - centers[k])
         joints.append(Joint(tree if k == 1 else "spherical", f"b{k - 1}", f"b{k}", "", *ends, damper=0.1))
-    ends = (corners[0] - centres[3], corners[0] - centres[0])
+    ends = (corners[0] - centers[3], corners[0] - centers[0])
     pitch = 0.7 if kind == "screw" else 0.0
     joints.append(Joint(kind, "b3", "b0", "last", *ends, axis=(0.6, 0.0, 0.8), close=True, pitch=pitch))
     sim = Simulator(Mechanism(bodies, joints), time_step=0.01, tolerance=1e-12)

@@ -18,7 +18,7 @@ class Shot(NamedTuple):
     x: Any
     u: Any
     status: Status
-    knot: int
+    solved_knots: int
     residual: float
 
 
@@ -26,7 +26,7 @@ class Trial(NamedTuple):
     x: Any
     u: Any
     status: Status
-    knot: int
+    solved_knots: int
     steps: Any = None
 
 
@@ -89,7 +89,9 @@ class System:
                 return None
         return x
 
-    def closed_loop(self, x0, us, xs=None, ks=None, Ks=None, gaps=None, alpha=1.0, limits=None, substeps=1, kappa=None):
+    def rollout_feedback(
+        self, x0, us, xs=None, ks=None, Ks=None, gaps=None, alpha=1.0, limits=None, substeps=1, kappa=None
+    ):
         T = len(us)
         x, u = np.full((T + 1, self.nx), np.nan), np.full((T, self.nu), np.nan)
         x[0] = x0
@@ -146,8 +148,8 @@ class Horizon:
 
     def roll(self, x0, xs, us, kappa, *, k=None, K=None, gaps=None, alpha=1.0, **hints):
         gaps = gaps if alpha < 1.0 else None
-        shot = self.system.closed_loop(x0, us, xs, k, K, gaps, alpha, self.limits, self.substeps, kappa)
-        return Trial(shot.x, shot.u, shot.status, shot.knot)
+        shot = self.system.rollout_feedback(x0, us, xs, k, K, gaps, alpha, self.limits, self.substeps, kappa)
+        return Trial(shot.x, shot.u, shot.status, shot.solved_knots)
 
     def linearize(self, xs, us, kappa, guess=None):
         return self.system.linearize_trajectory(xs, us, self.substeps, kappa)

@@ -11,7 +11,7 @@ def upright(x):
 def replayed(problem, plan):
     """The plan under its own gains, at a fifth of its time step."""
     fine = problem.sim.replace(time_step=problem.sim.time_step / 5)
-    shot = fine.closed_loop(
+    shot = fine.rollout_feedback(
         problem.start, plan.u, xs=plan.x, Ks=plan.K, substeps=5 * problem.substeps, limits=problem.control_limits
     )
     assert shot.status == 0
@@ -33,7 +33,7 @@ def check(problem, plan, iterations, tilt=0.99, off=0.02):
 def lands(problem, plan, off=5e-3):
     """On its feet and near the plan's end, at 1 ms and with hard contacts."""
     hard = problem.sim.replace(time_step=1e-3, kappa=1e-8)
-    shot = hard.closed_loop(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=20, limits=problem.control_limits)
+    shot = hard.rollout_feedback(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=20, limits=problem.control_limits)
     assert shot.status == 0 and upright(shot.x).min() > 0.98
     assert np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < off
 

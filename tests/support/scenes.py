@@ -150,8 +150,8 @@ def gaps(sim: dojo.Simulator, x: np.ndarray) -> np.ndarray:
         z = sim.maximal(state)
         for c, contact in enumerate(mech.contacts):
             body = z[mech.body_names.index(contact.body)]
-            centre = body[:3] + rot.rotate(body[6:10], np.asarray(contact.point))
-            out[t, c] = centre @ np.asarray(contact.normal) - contact.radius - contact.height
+            center = body[:3] + rot.rotate(body[6:10], np.asarray(contact.point))
+            out[t, c] = center @ np.asarray(contact.normal) - contact.radius - contact.height
     return out[0] if np.ndim(x) == 1 else out
 
 
@@ -159,7 +159,7 @@ def run(sim: dojo.Simulator, x: np.ndarray, steps: int, u: np.ndarray | None = N
     """States of a rollout under a constant input, (steps + 1, nx); every step must be solved."""
     us = np.zeros((steps, sim.nu)) if u is None else np.tile(u, (steps, 1))
     trajectory = sim.rollout(x, us)
-    assert trajectory.status == 0, (trajectory.status, trajectory.knot)
+    assert trajectory.status == 0, (trajectory.status, trajectory.solved_steps)
     return np.asarray(trajectory.x)
 
 

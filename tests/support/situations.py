@@ -69,7 +69,7 @@ def _random_state(sim: Simulator, rng: np.random.Generator, speed: float, spread
     return sim.integrate(x, dx)
 
 
-def _centre(sim: Simulator, x: Floats, foot: Contact) -> Floats:
+def _center(sim: Simulator, x: Floats, foot: Contact) -> Floats:
     """Where the centre of a contact on the second body is [m]."""
     z = sim.maximal(x)[1]
     return np.asarray(z[:3] + rotated(z[6:10], np.asarray(foot.point)))
@@ -86,7 +86,7 @@ def _resting(kind: str, height: float, friction: float, speed: float, kappa: flo
     mech = replace(mech, contacts=[foot])
     far = Simulator(mech, time_step=H, kappa=1e-12, tolerance=3e-14)
     x, u = _random_state(far, rng, speed, 0.4), 0.1 * rng.normal(size=far.nu)
-    lowest = _centre(far, far.step(x, u, throw=True).x, foot) @ np.asarray(foot.normal) - foot.radius
+    lowest = _center(far, far.step(x, u, throw=True).x, foot) @ np.asarray(foot.normal) - foot.radius
     mech = replace(mech, contacts=[replace(foot, height=float(lowest) - height)])
     return Case(Simulator(mech, time_step=H, kappa=kappa, tolerance=3e-14), x, u)
 
@@ -120,10 +120,10 @@ def falling(
     far = Simulator(mech, time_step=H, kappa=1e-12, tolerance=3e-14)
     x, u = _random_state(far, rng, 1.0, 0.4), 0.1 * rng.normal(size=far.nu)
     x[far.nq + 2] -= 3.0
-    centre = _centre(far, far.step(x, u, throw=True).x, foot)
+    center = _center(far, far.step(x, u, throw=True).x, foot)
     level = replace(foot, height=0.0)
-    steep = level.normal_at(centre)[2] if terrain else 1.0
-    foot = replace(foot, height=float(level.gap(centre) / steep) + sunk)
+    steep = level.normal_at(center)[2] if terrain else 1.0
+    foot = replace(foot, height=float(level.gap(center) / steep) + sunk)
     mech = replace(mech, contacts=[foot])
     return Case(Simulator(mech, time_step=H, kappa=1e-4, tolerance=3e-14), x, u)
 

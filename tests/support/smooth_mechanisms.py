@@ -45,7 +45,7 @@ def end(mech: Mechanism, order: int, h: float, duration: float, u: np.ndarray | 
     q, v = random_state(np.random.default_rng(3), mech, speed=1.0)
     steps = round(duration / h)
     us = np.zeros((steps, sim.nu)) if u is None else np.tile(u, (steps, 1))
-    return np.asarray(sim.rollout(sim.start(q, v), us, throw=True).x[-1])
+    return np.asarray(sim.rollout(sim.state_from_velocity(q, v), us, throw=True).x[-1])
 
 
 def apart(mech: Mechanism, a: np.ndarray, b: np.ndarray) -> float:

@@ -140,7 +140,7 @@ def compare_with_mujoco(path: Path, rng: np.random.Generator, states: int = 3) -
         M = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, M)
         theirs = 0.5 * data.qvel @ M @ data.qvel
-        energy = sim.kinetic_energy(sim.start(q, v * 0.1)) * 100.0
+        energy = sim.kinetic_energy(sim.state_from_velocity(q, v * 0.1)) * 100.0
         worst[2] = max(worst[2], abs(energy - theirs) / theirs)
     moving = sum(b.mass for b in mech.bodies)
     theirs = sum(model.body_mass[bodies[n]] for n, f in mech.report.links.items() if n in bodies and f.body)

@@ -60,11 +60,11 @@ def _bars(ax: Any, results: dict[str, dict[str, Any]], step: str) -> None:
 
 
 def _lines(ax: Any, results: dict[str, dict[str, Any]], key: str, xlabel: str, ylabel: str) -> None:
-    colours = palette(results)
+    colors = palette(results)
     for name, found in results.items():
         x = [float(value) for value in found[key]]
         style = {"marker": "o", "lw": 2.0} if is_ours(name) else {"marker": "x", "lw": 1.0, "ls": "--"}
-        ax.loglog(x, list(found[key].values()), label=name, ms=4, color=colours[name], **style)
+        ax.loglog(x, list(found[key].values()), label=name, ms=4, color=colors[name], **style)
     ax.set_xticks(x, [f"{value:g}" for value in x])
     ax.minorticks_off()
     ax.set_xlabel(xlabel)

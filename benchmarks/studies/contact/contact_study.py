@@ -160,17 +160,17 @@ def _tables(results: Results, steps: Sequence[str]) -> list[Table]:
         Table(
             "A quadruped dropped from 0.1 m: trunk height against the same engine at 2 kHz, largest distance [mm]",
             ("", *(f"{rate} Hz" for rate in rates)),
-            [[engine, *(_millimetres(found["rates"][r]) for r in rates)] for engine, found in results.items()],
+            [[engine, *(_millimeters(found["rates"][r]) for r in rates)] for engine, found in results.items()],
         ),
         Table(
             "A tossed cube: mean distance from the same engine at a fine step [mm]",
             ("", *(f"{float(h) * 1e3:g} ms" for h in tosses)),
-            [[engine, *(_millimetres(found["toss"][h]) for h in tosses)] for engine, found in results.items()],
+            [[engine, *(_millimeters(found["toss"][h]) for h in tosses)] for engine, found in results.items()],
         ),
     ]
 
 
-def _millimetres(value: float) -> Cell:
+def _millimeters(value: float) -> Cell:
     """A length [mm], 'failed' where the engine stopped."""
     return "failed" if np.isnan(value) else 1e3 * value
 

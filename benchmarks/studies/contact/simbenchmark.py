@@ -122,7 +122,7 @@ def bouncing(time_step: float, side: int = 7, duration: float = 20.0) -> float:
         neutral={n: (x, y, 5.0 + RADIUS, 1.0, 0.0, 0.0, 0.0) for n, (x, y) in zip(names, places, strict=True)},
     )
     sim = Simulator(mech, time_step=time_step, kappa=KAPPA)
-    x = sim.start(sim.neutral()[: sim.nq], np.zeros(sim.nv))
+    x = sim.state_from_velocity(sim.neutral()[: sim.nq], np.zeros(sim.nv))
     t = sim.rollout(x, np.zeros((round(duration / time_step), sim.nu)), throw=True)
     energy = sim.energy(t.x)
     return float(np.abs(energy - energy[0]).max() / (len(names) * 10.0 * G * 5.0))

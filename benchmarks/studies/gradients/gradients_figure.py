@@ -52,8 +52,8 @@ def _motions(axes: Any, found: Sequence[Derivative]) -> None:
         look: dict[str, Any] = {"color": "C3", "linewidth": 2, "alpha": {1e-6: 0.4, 1e-8: 1.0}.get(kappa or 0.0, 0.7)}
         label = f"dojo-opt, (A, B) chained, kappa {kappa:g}" if kappa else f"{engine}: {how}"
         if kappa is None:
-            colour = f"C{[0, 1, 2, 4, 5, 6, 7, 8, 9][engines.index(engine) % 9]}"
-            look = {"color": colour, "linestyle": "-" if "differences" in how else ":"}
+            color = f"C{[0, 1, 2, 4, 5, 6, 7, 8, 9][engines.index(engine) % 9]}"
+            look = {"color": color, "linestyle": "-" if "differences" in how else ":"}
         axes.plot(1e3 * np.array(x), y, marker="o", markersize=3.5, label=label, **look)
     axes.plot(1e3 * np.array(steps), steps, color="0.2", linewidth=1, linestyle=(0, (1, 3)), label="h / 1 s")
     axes.set(xscale="log", yscale="log", xlabel="time step [ms]", ylabel="worst relative error of five derivatives")
@@ -69,15 +69,15 @@ def _touchdown(axes: Any, result: tuple[Any, list[touchdown.Curve]]) -> None:
 
     heights, curves = result
     ours = [curve for curve in curves if curve.kappa is not None]
-    colours = dict(zip((c.label for c in ours), colormaps["viridis"](np.linspace(0.85, 0.05, len(ours))), strict=True))
-    greys = iter((("0.6", "-"), ("0.45", "--"), ("0.2", ":"), ("0.3", "-.")))
+    colors = dict(zip((c.label for c in ours), colormaps["viridis"](np.linspace(0.85, 0.05, len(ours))), strict=True))
+    grays = iter((("0.6", "-"), ("0.45", "--"), ("0.2", ":"), ("0.3", "-.")))
     h = touchdown.H
     for curve in curves:
         if curve.kappa is None:
-            colour, style = next(greys)
-            axes.plot(1e3 * heights, h * curve.gradient, color=colour, linestyle=style, label=curve.label, zorder=1)
+            color, style = next(grays)
+            axes.plot(1e3 * heights, h * curve.gradient, color=color, linestyle=style, label=curve.label, zorder=1)
         else:
-            axes.plot(1e3 * heights, h * curve.gradient, color=colours[curve.label], linewidth=2, label=curve.label)
+            axes.plot(1e3 * heights, h * curve.gradient, color=colors[curve.label], linewidth=2, label=curve.label)
     axes.axvline(1e3 * touchdown.TOUCH, color="0.8", zorder=0)
     axes.set(xlabel="height before the step [mm]", ylabel="h d(velocity after the step)/d(height)", ylim=(-1.3, 0.15))
     axes.set_title(f"Touch-down of a ball at {touchdown.SPEED:g} m/s, one step of {1e3 * h:g} ms")

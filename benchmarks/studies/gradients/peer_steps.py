@@ -26,7 +26,7 @@ from sim.simulator.simulator import Simulator
 INTEGRATOR = "discrete"  # MuJoCo's only integrator that holds the scenes
 _CALLS = 10  # Jacobians of Drake's per clocked call
 AUTODIFF = "AutoDiffXd, by the state alone"
-MUJOCO_FORWARD, MUJOCO_CENTRED = "mjd_transitionFD, one-sided", "mjd_transitionFD, centred"
+MUJOCO_FORWARD, MUJOCO_CENTERED = "mjd_transitionFD, one-sided", "mjd_transitionFD, centred"
 
 
 def installed_steps() -> list[Peer]:
@@ -45,7 +45,9 @@ def scenes() -> list[StepScene]:
     drop = robot.rollout(robot.neutral(), np.zeros((200, robot.nu)), throw=True).x[-1].copy()
     drop[2] += 0.1
     drop[robot.nq] = 1.0
-    slide = block.start(block.neutral()[:7], [3.0 * np.cos(np.pi / 6), 3.0 * np.sin(np.pi / 6), 0, 0, 0, 0])
+    slide = block.state_from_velocity(
+        block.neutral()[:7], [3.0 * np.cos(np.pi / 6), 3.0 * np.sin(np.pi / 6), 0, 0, 0, 0]
+    )
     return [
         StepScene("block, sliding", block, slide, np.zeros(3), 10),
         StepScene("hopper, standing", hop.sim.replace(time_step=0.01), hop.start, hop.controls0[0], 50),
@@ -64,8 +66,8 @@ def _mujoco(scene: StepScene) -> tuple[list[JacobianPoint], Cases]:
     n, m = 2 * model.nv, model.nu
     A, B = np.zeros((n, n)), np.zeros((n, m))
 
-    def jacobian(eps: float, centred: bool) -> Vector:
-        mujoco.mjd_transitionFD(model, data, eps, centred, A, B if m else None, None, None)
+    def jacobian(eps: float, centered: bool) -> Vector:
+        mujoco.mjd_transitionFD(model, data, eps, centered, A, B if m else None, None, None)
         return np.concatenate([A, B], axis=1)
 
     default = model.opt.tolerance, model.opt.iterations
@@ -74,14 +76,14 @@ def _mujoco(scene: StepScene) -> tuple[list[JacobianPoint], Cases]:
     model.opt.tolerance, model.opt.iterations = default
     points: list[JacobianPoint] = []
     cases: Cases = {}
-    for name, centred in ((MUJOCO_FORWARD, False), (MUJOCO_CENTRED, True)):
+    for name, centered in ((MUJOCO_FORWARD, False), (MUJOCO_CENTERED, True)):
         for eps in EPS:
-            error = relative_error(jacobian(eps, centred), reference.value)
+            error = relative_error(jacobian(eps, centered), reference.value)
             points.append(JacobianPoint(name, None, eps, error, reference.doubt, np.nan))
 
-        def clocked(centred: bool = centred) -> None:
+        def clocked(centered: bool = centered) -> None:
             for _ in range(KNOTS):
-                jacobian(CLOCKED_EPS, centred)
+                jacobian(CLOCKED_EPS, centered)
 
         cases[f"{name} None"] = clocked, KNOTS
     return points, cases

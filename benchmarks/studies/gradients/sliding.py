@@ -163,7 +163,7 @@ def _start(sim: Simulator, motion: SlidingMotion, p: float) -> tuple[Vector, Vec
     if motion.pulled:
         us[:, :3] = p * motion.direction
         return sim.neutral(), us
-    return sim.start(sim.neutral()[: sim.nq], [*(p * motion.direction), 0.0, 0.0, 0.0]), us
+    return sim.state_from_velocity(sim.neutral()[: sim.nq], [*(p * motion.direction), 0.0, 0.0, 0.0]), us
 
 
 def _start_slope(sim: Simulator, motion: SlidingMotion) -> Vector:

@@ -21,7 +21,7 @@ from benchmarks.studies.lean.lean_scenes import features, pendulum_scene
 scene = pendulum_scene("", dict(features())[sys.argv[1]])
 sim, us = scene.simulator, np.zeros((3, 1))
 path = sim.rollout(scene.state, us)
-sim.closed_loop(scene.state, us)
+sim.rollout_feedback(scene.state, us)
 sim.linearize_trajectory(path.x, us)
 seconds = time.process_time() - start
 from solvers.compiler import compiled_signatures

@@ -98,7 +98,7 @@ def moving(sim: Simulator, speed: float, spread: float = 0.1) -> tuple[Floats, F
 def momentum(kind: str) -> float:
     """See above."""
     sim = Simulator(_free(pair(kind)), time_step=0.01, tolerance=1e-12)
-    x = sim.start(*moving(sim, 1.0))
+    x = sim.state_from_velocity(*moving(sim, 1.0))
     angular = sim.momentum(sim.rollout(x, np.zeros((100, sim.nu)), throw=True).x)[1]
     return float(np.abs(angular - angular[0]).max())
 
@@ -108,7 +108,7 @@ def energy(kind: str) -> float:
     errors = []
     for h in (0.02, 0.01):
         sim = Simulator(_free(pair(kind, damper=0.0)), time_step=h, tolerance=1e-12)
-        t = sim.rollout(sim.start(*moving(sim, 0.7)), np.zeros((round(0.6 / h), sim.nu)), throw=True)
+        t = sim.rollout(sim.state_from_velocity(*moving(sim, 0.7)), np.zeros((round(0.6 / h), sim.nu)), throw=True)
         values = sim.energy(t.x)
         errors.append(float(np.abs(values - values[0]).max()))
     return float(np.log2(errors[0] / errors[1])) if errors[1] > 1e-11 else float("inf")
@@ -133,7 +133,9 @@ def limits(kind: str) -> float:
     for d in range(sim.nv):
         for side in (-1.0, 1.0):
             us = np.tile(side * np.eye(sim.nv)[d], (100, 1))
-            q = sim.rollout(sim.start(sim.neutral()[: sim.nq], 3.0 * us[0]), us, throw=True).x[:, : sim.nq]
+            q = sim.rollout(sim.state_from_velocity(sim.neutral()[: sim.nq], 3.0 * us[0]), us, throw=True).x[
+                :, : sim.nq
+            ]
             excess = float((_tilt(joint, q[:, ntrans:]) - 2.0 * STOP if d >= plain else np.abs(q[:, d]) - STOP).max())
             about_axis = d >= plain and abs(np.asarray(joint.axis)[d - plain]) > 0.999
             worst = max(worst, 1.0 if excess < -0.01 and not about_axis else excess)
@@ -171,7 +173,7 @@ def damper(kind: str) -> float:
     worst = 0.0
     for d in range(sim.nv):
         v = 0.7 * np.eye(sim.nv)[d]
-        x = sim.rollout(sim.start(sim.neutral()[: sim.nq], v), np.zeros((400, sim.nu)), throw=True).x[-1]
+        x = sim.rollout(sim.state_from_velocity(sim.neutral()[: sim.nq], v), np.zeros((400, sim.nu)), throw=True).x[-1]
         way = np.linalg.norm(sim.difference(x, sim.neutral())[: sim.nv])
         mass = 1.0 if d < ntrans else INERTIA + sim.mechanism.joints[0].lead ** 2
         worst = max(worst, abs(float(way) * DAMPER / (0.7 * mass) - 1.0))

@@ -59,7 +59,7 @@ def peer(problem: Problem, settings: MujocoSettings) -> PlanOutcome:
     seconds = time.process_time() - start
     xs, us = solver.replay(solution, REFINE)
     name = f"steps of {1e3 * solver.time_step:g} ms"
-    name += ", centred" * settings.centred + ", solimp[0] = 0" * settings.smooth
+    name += ", centred" * settings.centered + ", solimp[0] = 0" * settings.smooth
     message, found = solution.message, (solution.cost, solution.violation)
     history = (
         np.column_stack([np.cumsum(solution.seconds), solution.history]) if solution.iterations else np.zeros((0, 4))
@@ -97,7 +97,7 @@ def _replay(plan: Plan, refine: int) -> tuple[float, float]:
     problem = plan.problem
     sim = problem.sim.replace(kappa=HARD, time_step=problem.sim.time_step / refine)
     steps, limits = refine * problem.substeps, problem.control_limits
-    shot = sim.closed_loop(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=steps, limits=limits)
+    shot = sim.rollout_feedback(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=steps, limits=limits)
     return _judged(problem, shot.x, shot.u) if shot.status == 0 else (np.nan, np.nan)
 
 

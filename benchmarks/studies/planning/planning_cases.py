@@ -108,6 +108,6 @@ def settings(*, quick: bool) -> list[Setting]:
         Setting("solver", f"stages end at {d:g}", {"stages": tuple(s._replace(decrease=d) for s in CONTINUATION)})
         for d in (0.1, 0.01)
     ]
-    every += [Setting("solver", "gaps reopened", {"reopen": "gaps"})]
+    every += [Setting("solver", "gaps reopened", {"on_kappa_change": "gaps"})]
     few = ("default", "kappa_grad 0.0001", "kappa_eval = kappa_grad = 0.001")
     return [setting for setting in every if setting.name in few] if quick else every

@@ -13,7 +13,7 @@ from benchmarks.studies.planning.setting_families import Score
 
 _CLOSED = 1e-6  # gap up to which a trajectory has a cost
 _LEAST = 1e-7  # violations are drawn from here
-_COLOURS = {"default": "C3", "one stage": "C0", "soft": "C1", "schedule": "C2", "last stage": "C4", "solver": "C5"}
+_COLORS = {"default": "C3", "one stage": "C0", "soft": "C1", "schedule": "C2", "last stage": "C4", "solver": "C5"}
 
 
 def draw(
@@ -32,8 +32,8 @@ def draw(
         curves = [("dojo-opt, default", "C3", "-", own), (f"dojo-opt, {alone[name].setting}", "C0", "-", alone[name])]
         for plan, style in zip(peers.get(name, ()), ("-", "--", ":", "-."), strict=False):
             curves.append((f"MuJoCo, {plan.setting}", "0.35", style, plan))
-        for label, colour, style, plan in curves:
-            _history(axes[0, column], axes[1, column], plan, label, {"color": colour, "linestyle": style})
+        for label, color, style, plan in curves:
+            _history(axes[0, column], axes[1, column], plan, label, {"color": color, "linestyle": style})
         times = _decades([1e3 * t for _, _, _, plan in curves for t in plan.history[:, 0]])
         axes[0, column].set(title=name, xscale="log", yscale="log", xlim=times)
         axes[1, column].set(xscale="log", yscale="log", xlabel="processor time [ms]", ylim=(_LEAST, None), xlim=times)
@@ -63,13 +63,13 @@ def _scatter(axes: Any, scores: Sequence[Score]) -> None:
     """Settings: filled if every variant has a plan that holds when replayed, else the number of variants with one."""
     named = set()
     for s in scores:
-        colour = _COLOURS[s.setting.group]
+        color = _COLORS[s.setting.group]
         label = None if s.setting.group in named else s.setting.group
         named.add(s.setting.group)
         x, y = 1e3 * s.seconds, max(s.excess, 1e-4) if np.isfinite(s.excess) else np.nan
-        face = colour if s.true == s.variants else "none"
+        face = color if s.true == s.variants else "none"
         size = 11 if s.setting.group == "default" else 6
-        axes.plot(x, y, "o", color=colour, markerfacecolor=face, markersize=size, label=label)
+        axes.plot(x, y, "o", color=color, markerfacecolor=face, markersize=size, label=label)
         if s.true < s.variants:
             axes.annotate(f"{s.true}/{s.variants}", (x, y), (5, 3), textcoords="offset points", fontsize=7, color="0.3")
     times = _decades([1e3 * s.seconds for s in scores])

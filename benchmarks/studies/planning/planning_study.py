@@ -25,7 +25,7 @@ BARS: dict[str, tuple[int, float | None, float | None]] = {
     "trot, damping 5, 1 x 50 ms": (8, None, None),
 }
 VIOLATION, UPRIGHT, TARGETS = 1e-3, 0.99, 26
-PEERS = (MujocoSettings(), MujocoSettings(step=5e-3), MujocoSettings(centred=True), MujocoSettings(smooth=True))
+PEERS = (MujocoSettings(), MujocoSettings(step=5e-3), MujocoSettings(centered=True), MujocoSettings(smooth=True))
 _ROUNDS = 3
 
 

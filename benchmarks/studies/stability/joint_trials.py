@@ -66,7 +66,7 @@ def damper(coefficient: float, time_step: float) -> StabilityTrial:
         (1.0,),
         time_step,
         1.0,
-        scene_measures.travelled(0, 0, 1.0 / coefficient),
+        scene_measures.traveled(0, 0, 1.0 / coefficient),
         0.1,
     )
 

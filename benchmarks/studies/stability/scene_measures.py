@@ -49,7 +49,7 @@ def standing_at(body: int, height: float) -> Measure:
     return measure
 
 
-def travelled(body: int, axis: int, distance: float) -> Measure:
+def traveled(body: int, axis: int, distance: float) -> Measure:
     """Error of the displacement along an axis, over `distance` [m]; one more for every motion back."""
 
     def measure(_: Mechanism, run: Run) -> float:

@@ -240,5 +240,5 @@ def _batch(report: Report, rounds: int) -> None:
 def _solved(name: str, trajectory: Any) -> Any:
     """The trajectory, or an error, because the time of a failed step is meaningless."""
     if trajectory.status != 0:
-        raise RuntimeError(f"report timing: {name}: step {trajectory.knot} ended with {trajectory.status!r}")
+        raise RuntimeError(f"report timing: {name}: step {trajectory.solved_steps} ended with {trajectory.status!r}")
     return trajectory

@@ -99,7 +99,7 @@ def _converged(mechanism: Mechanism, q: Floats, v: Floats, quick: bool) -> Conve
     for fine, kappa in _SHARP[1:] if quick else _SHARP:
         sim = Simulator(mechanism, time_step=fine, kappa=kappa)
         every = round(PIECE / fine)
-        motion = sim.rollout(sim.start(q, v), np.zeros((PIECES * every, sim.nu)))
+        motion = sim.rollout(sim.state_from_velocity(q, v), np.zeros((PIECES * every, sim.nu)))
         if motion.success:
             x = motion.x[::every]
             return Converged(x[:, : sim.nq], sim.velocity(x), sim.maximal(x)[..., :3], fine, kappa)

@@ -72,9 +72,9 @@ def _inside(sim: Simulator, q: Floats) -> Floats:
 
 def gaps(sim: Simulator, q: Floats) -> list[float]:
     """Distance of every contact from its ground [m]."""
-    z, model = sim.bodies(q, np.zeros(sim.nv)), sim.model
+    z, model = sim.body_states(q, np.zeros(sim.nv)), sim.model
     out = []
     for c, body in enumerate(model.contact_body):
-        centre = z[body, BodyState.POSITION] + rotated(z[body, BodyState.QUATERNION], model.contact_point[c])
-        out.append(float(centre @ model.contact_frame[c, :3] - model.contact_radius[c] - model.contact_height[c]))
+        center = z[body, BodyState.POSITION] + rotated(z[body, BodyState.QUATERNION], model.contact_point[c])
+        out.append(float(center @ model.contact_frame[c, :3] - model.contact_radius[c] - model.contact_height[c]))
     return out

@@ -57,11 +57,11 @@ class Stepper:
         self._sim, self._x, self._u = sim, np.asarray(x), np.asarray(u)
         self._origin = sim.step(x, u, throw=True).x
 
-    def points(self, eps: float, *, centred: bool) -> tuple[Matrix, Matrix]:
+    def points(self, eps: float, *, centered: bool) -> tuple[Matrix, Matrix]:
         """States and inputs beside (x, u), a row or two per column; one-sided: and (x, u) itself, last."""
         n, m = self._sim.ndx, self._sim.nu
         d = eps * np.eye(n + m)
-        d = np.concatenate([d, -d if centred else np.zeros((1, n + m))])
+        d = np.concatenate([d, -d if centered else np.zeros((1, n + m))])
         xs = np.array([self._sim.integrate(self._x, dx) for dx in d[:, :n]])
         return xs, self._u + d[:, n:]
 
@@ -72,10 +72,10 @@ class Stepper:
         ends[batch.status != 0] = np.nan
         return ends
 
-    def jacobian(self, eps: float, *, centred: bool = True) -> Matrix:
+    def jacobian(self, eps: float, *, centered: bool = True) -> Matrix:
         """Central or one-sided differences."""
-        ends = self.step(*self.points(eps, centred=centred))
+        ends = self.step(*self.points(eps, centered=centered))
         columns = self._sim.ndx + self._sim.nu
-        if centred:
+        if centered:
             return (ends[:columns] - ends[columns:]).T / (2.0 * eps)
         return (ends[:columns] - ends[columns]).T / eps

@@ -29,7 +29,7 @@ TIGHT = (
 KNOTS, _BATCHES = 50, 5  # Jacobians per clocked call: implicit, by differences
 
 IMPLICIT, TIGHTLY = "implicit", "implicit, solved to 1e-13"
-FORWARD, CENTRED = "differences, one-sided", "differences, centred"
+FORWARD, CENTERED = "differences, one-sided", "differences, centred"
 
 
 Cases = dict[str, tuple[Callable[[], Any], int]]  # timed call, and the number of Jacobians that it computes
@@ -110,8 +110,8 @@ def _ours(scene: StepScene) -> tuple[list[JacobianPoint], Cases]:
             cases[f"{name} {kappa}"] = _implicit(solved, x, scene.u), KNOTS
         if kappa == DIFFERENCED:
             points += _differences(tight, x, scene.u, reference)
-            for name, centred in ((FORWARD, False), (CENTRED, True)):
-                cases[f"{name} {kappa}"] = _batch(tight, x, scene.u, centred=centred), _BATCHES
+            for name, centered in ((FORWARD, False), (CENTERED, True)):
+                cases[f"{name} {kappa}"] = _batch(tight, x, scene.u, centered=centered), _BATCHES
     return points, cases
 
 
@@ -135,9 +135,9 @@ def smoothed(scene: StepScene, kappas: Sequence[float] = KAPPAS) -> list[float]:
 def _differences(sim: Simulator, x: Vector, u: Vector, reference: Any) -> list[JacobianPoint]:
     stepper = Stepper(sim, x, u)
     points = []
-    for name, centred in ((FORWARD, False), (CENTRED, True)):
+    for name, centered in ((FORWARD, False), (CENTERED, True)):
         for eps in EPS:
-            error = relative_error(stepper.jacobian(eps, centred=centred), reference.value)
+            error = relative_error(stepper.jacobian(eps, centered=centered), reference.value)
             points.append(JacobianPoint(name, sim.kappa, eps, error, reference.doubt, np.nan))
     return points
 
@@ -147,7 +147,7 @@ def _implicit(sim: Simulator, x: Vector, u: Vector) -> Callable[[], Any]:
     return lambda: sim.linearize_trajectory(xs, us, kappa=sim.kappa)
 
 
-def _batch(sim: Simulator, x: Vector, u: Vector, *, centred: bool) -> Callable[[], Any]:
-    xs, us = Stepper(sim, x, u).points(CLOCKED_EPS, centred=centred)
+def _batch(sim: Simulator, x: Vector, u: Vector, *, centered: bool) -> Callable[[], Any]:
+    xs, us = Stepper(sim, x, u).points(CLOCKED_EPS, centered=centered)
     xs, us = np.tile(xs, (_BATCHES, 1)), np.tile(us, (_BATCHES, 1))[:, None]
     return lambda: sim.rollout_batch(xs, us)

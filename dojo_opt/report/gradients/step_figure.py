@@ -52,15 +52,15 @@ def draw_steps(axes: Any, measured: Mapping[str, Any]) -> None:
     scene, points = list(measured)[-1], list(measured.values())[-1]["points"]
     looks = {
         one_step.FORWARD: ("C0", "v", "our step, one-sided differences"),
-        one_step.CENTRED: ("C0", "s", "our step, centred differences"),
+        one_step.CENTERED: ("C0", "s", "our step, centred differences"),
     }
     others = dict.fromkeys(p.method for p in points if p.kappa is None and p.eps is not None)
     looks |= {method: ("0.45", marker, method) for method, marker in zip(others, "vsP", strict=False)}
-    for method, (colour, marker, label) in looks.items():
+    for method, (color, marker, label) in looks.items():
         own = [p for p in points if p.method == method]
         if own:
             x, y = [p.microseconds for p in own], [max(p.error, _LEAST) for p in own]
-            axes.plot(x, y, marker, color=colour, label=label, alpha=0.75)
+            axes.plot(x, y, marker, color=color, label=label, alpha=0.75)
             best = min(own, key=lambda p: p.error)
             axes.annotate(f"eps {best.eps:.0e}", (best.microseconds, best.error), (4, -10), **_SMALL)
     for p, marker in zip((p for p in points if p.kappa is None and p.eps is None), "^DP", strict=False):

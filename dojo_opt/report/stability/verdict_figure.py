@@ -21,8 +21,8 @@ def picture(trials: Sequence[StabilityTrial], verdicts: Mapping[str, Sequence[Tr
     rows, columns = len(trials), len(verdicts)
     figure = Figure(figsize=(6.5 + 1.15 * columns, 1.6 + 0.26 * rows), layout="constrained")
     ax = figure.subplots()
-    colours = np.array([[_colour(verdict) for verdict in found] for found in verdicts.values()]).T
-    ax.imshow(colours, cmap=ListedColormap(["#e8a49c", "#ece0a4", "#a9d8b0", "#e4e4e4"]), vmin=0, vmax=3, aspect="auto")
+    colors = np.array([[_color(verdict) for verdict in found] for found in verdicts.values()]).T
+    ax.imshow(colors, cmap=ListedColormap(["#e8a49c", "#ece0a4", "#a9d8b0", "#e4e4e4"]), vmin=0, vmax=3, aspect="auto")
     for column, found in enumerate(verdicts.values()):
         for row, verdict in enumerate(found):
             ax.text(column, row, verdict.text, ha="center", va="center", fontsize=7)
@@ -39,7 +39,7 @@ def picture(trials: Sequence[StabilityTrial], verdicts: Mapping[str, Sequence[Tr
     return figure
 
 
-def _colour(verdict: TrialVerdict) -> int:
+def _color(verdict: TrialVerdict) -> int:
     if verdict.text == NOT_GIVEN:
         return 3
     return 1 if verdict.text == "refused" else 2 * verdict.passed

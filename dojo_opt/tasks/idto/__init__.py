@@ -6,7 +6,7 @@ Every builder returns a `SuiteTask`:
     loop = task.run()
     print(task.outcome(loop))
 
-Theirs are contacts by springs that act at a distance, where ours are hard; the plans of both take effect one tick after
+The publication uses spring contacts that act at a distance; ours are hard. In both, plans take effect one tick after
 the measurement, and PD controllers follow them in between. The publication gives rates and no rates of success:
 the criteria are ours, and each task states its own. Models are typed from their files, in axes of our own.
 """

@@ -8,7 +8,7 @@ import numpy as np
 
 from dojo_opt.cost import Clearance, Effort
 from dojo_opt.mpc.controller import MPC
-from dojo_opt.mpc.moving_reference import Sampled
+from dojo_opt.mpc.moving_reference import SampledReference
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.closed_loop import ClosedLoop
@@ -86,7 +86,7 @@ def air_hockey(**settings: Any) -> SuiteTask:
     ends = np.array([0.0, _KNOT * _HORIZON])
     speed = (goal - start)[: sim.nq] / ends[1]
     begin = np.concatenate([start[: sim.nq], speed])
-    target = Sampled([*ends, ends[1] + _KNOT], [begin, np.concatenate([goal[: sim.nq], speed]), goal], sim)
+    target = SampledReference([*ends, ends[1] + _KNOT], [begin, np.concatenate([goal[: sim.nq], speed]), goal], sim)
     pusher, puck = np.zeros(3), np.ones(3)
     running = np.concatenate([pusher, 0.1 * puck]), np.concatenate([pusher + 0.5, 0.1 * puck])
     end = np.concatenate([pusher, 10.0 * puck]), np.ones(6)

@@ -8,7 +8,7 @@ import numpy as np
 
 from dojo_opt.cost import Effort
 from dojo_opt.mpc.controller import MPC
-from dojo_opt.mpc.moving_reference import Onward
+from dojo_opt.mpc.moving_reference import AnchoredReference
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.tasks.suite import SuiteTask, quadratic, timed
@@ -77,7 +77,7 @@ def spinner(**settings: Any) -> SuiteTask:
     goal[2], goal[_RATE_OF_DISC] = 2.0, 1.0
     begin = start.copy()
     begin[_RATE_OF_DISC] = 1.0
-    target = Onward(sim, begin, goal, _KNOT * _HORIZON, anchored=[2])
+    target = AnchoredReference(sim, begin, goal, _KNOT * _HORIZON, anchored=[2])
     cost = [
         quadratic(begin, _KNOT, _HORIZON, ([1.0, 1.0, 1.0], 0.1), ([10.0, 10.0, 10.0], 0.1)),
         Effort(_KNOT * 0.1),

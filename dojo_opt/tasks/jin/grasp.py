@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dojo_opt.cost import ResidualCost
-from dojo_opt.planning.residual import kernel
+from dojo_opt.planning.residual import jit
 
 __all__ = ["grasp", "place_of_ball"]
 
@@ -39,7 +39,7 @@ def grasp(tips: int, joints: int, place: Callable[..., Any], near: float, around
 
 
 def _residual(tips: int, place: Callable[..., Any]) -> Callable[..., Any]:
-    @kernel
+    @jit
     def residual(x, u, out):  # type: ignore[no-untyped-def]
         out[3 * tips :] = 0.0
         for k in range(tips):
@@ -54,7 +54,7 @@ def _residual(tips: int, place: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _slope(tips: int, joints: int, place: Callable[..., Any]) -> Callable[..., Any]:
-    @kernel
+    @jit
     def slope(x, u, out):  # type: ignore[no-untyped-def]
         out[:, :] = 0.0
         for k in range(tips):
@@ -75,7 +75,7 @@ def _slope(tips: int, joints: int, place: Callable[..., Any]) -> Callable[..., A
     return slope
 
 
-@kernel
+@jit
 def place_of_ball(x: Any, k: int) -> Any:
     """Place and its derivatives of a tip whose coordinates are its place.
 

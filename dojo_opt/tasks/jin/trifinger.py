@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.cost import Effort
-from dojo_opt.planning.residual import kernel
+from dojo_opt.planning.residual import jit
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
 from dojo_opt.tasks.jin.grasp import grasp
 from dojo_opt.tasks.jin.reposing import HORIZON, Aim, reposing
@@ -139,7 +139,7 @@ def mechanism(item: str, damped: bool = False) -> Mechanism:
     )
 
 
-@kernel
+@jit
 def place_of_tip(x: Any, k: int) -> Any:
     """Place of the tip of a finger, and its derivatives by the joints of the finger.
 

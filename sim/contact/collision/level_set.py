@@ -29,7 +29,7 @@ _HALVINGS = 30
 _RETURNS = 40  # steps along the gradient to the level set
 _STRIDE = 4.0  # [cells] longest step
 _CONVERGED = 1e-8  # [cells] a step of Newton's method after which the next one would be rounding
-_CREEPING = 1e-13  # [cells] the same of steps with another matrix
+_CONVERGED_LINEARLY = 1e-13  # [cells] the same of steps with another matrix
 _STUCK = 1e-5  # [cells] a step that may come to nothing for rounding, at a cell from the level set
 _ROUNDING = 1e-13  # of squared distances, relative
 _NOTHING = 1e-300
@@ -186,7 +186,7 @@ def nearest(hull: Matrix, o: int, c: Vec3) -> tuple[float, Vec3, Bend, bool]:
         a, b, positive = solved(d, S, dot(t, e), dot(u, e))
         size = sqrt(a * a + b * b) * hull[o, 3]
         at, moved = stepped(hull, o, c, at, (a, b))
-        found = size < (_CONVERGED if positive else _CREEPING)
+        found = size < (_CONVERGED if positive else _CONVERGED_LINEARLY)
         if not moved:
             return d, n, S, found or size < _STUCK * (1.0 + abs(d) * hull[o, 3])
     return d, at[1], at[2], found

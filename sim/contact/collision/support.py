@@ -23,7 +23,7 @@ _STEPS = 60  # of Newton's method
 _HALVINGS = 30
 _STRIDE = 0.5  # [rad] longest step
 _CONVERGED = 1e-10  # [rad] a step of Newton's method after which the next one would be rounding
-_CREEPING = 1e-15  # [rad] the same of steps with another matrix
+_CONVERGED_LINEARLY = 1e-15  # [rad] the same of steps with another matrix
 _ROUNDING = 1e-15  # of s, relative to the sizes
 _TILT = 0.01  # [rad] from the axis of a circle where a search begins, and more by factors of two
 _TILTS = 8
@@ -157,7 +157,7 @@ def climbed(n: Vec3, c: Vec3, da: Vec3, R: Vector, db: Vec3) -> Vec3:
         M = stiffness(n, dot(n, w), da, R, db)
         small = _CONVERGED
         if not (M[0] * M[2] - M[1] * M[1] > 0.0 and M[0] + M[2] > 0.0):
-            M, small = stiffness(n, 0.0, da, R, db), _CREEPING
+            M, small = stiffness(n, 0.0, da, R, db), _CONVERGED_LINEARLY
         step = solved(M, n, w)
         n = ascended(n, step, c, da, R, db)
         if dot(step, step) < small * small:
@@ -211,6 +211,6 @@ def farthest_across(x: Vec3, u: Vec3, R: Vector, db: Vec3) -> Vec3:
         step = dot(t, w) / (h + s if newton else h)
         m = ascended(n, (step * t[0], step * t[1], step * t[2]), x, none, R, db)
         n = unit(along(m, -dot(m, u), u), n)
-        if abs(step) < (_CONVERGED if newton else _CREEPING):
+        if abs(step) < (_CONVERGED if newton else _CONVERGED_LINEARLY):
             break
     return n

@@ -5,7 +5,8 @@ iterate, gaps and normals would jump, and at a corner that slides over an edge t
 are chosen where an attempt starts, and kept: the equations are smooth. A solution at which the shapes overlap in other
 features is refused; these become active, and the step is solved again.
 
-Where a solution with some features overlaps in others, and the one with these overlaps in the first, both are taken.
+If the solution with one set of features overlaps in another set, and the solution with that set overlaps in the first,
+both sets become active.
 
 Only features that did not overlap when the step began are chosen: a contact pushes along its normal at the end of the
 step, and where its two features, extended to lines and planes, had to move apart to get there, it adds energy. That is
@@ -173,7 +174,7 @@ def overlapping(model: Model, data: Data) -> int:
                 continue
             place_shapes(model, data, j, data.pos3, data.rot3)
             if not signed and passed_through(model, data, j):
-                return Verdict.TUNNELLED.value
+                return Verdict.TUNNELED.value
             lenient = data.feature_choice[0] == FeatureChoice.EVERY_POSE or data.overlap_allowed[0] == 1
             part = _LAST_RESORT if lenient else _OVERLAP
             if distance(model, data, j) < -part * least_size(model, j) - rounding_of_rims(model, j):

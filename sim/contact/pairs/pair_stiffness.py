@@ -14,7 +14,7 @@ from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, pair_arm,
 from sim.contact.pairs.pair_jacobian import pair_jacobian
 from sim.contact.pairs.taut_string import is_taut
 from sim.contact.pairs.taut_string_stiffness import add_string_stiffness, add_string_turn
-from sim.contact.pairs.wrench_columns import add_wrench_column, centre_shift, point_shift, unit_vector
+from sim.contact.pairs.wrench_columns import add_wrench_column, center_shift, point_shift, unit_vector
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import NewtonTarget
@@ -63,7 +63,7 @@ def add_pair_stiffness(model: Model, data: Data, j: int, indefinite: float) -> N
         g = impulse_rate(data, c, j, data.pair_Ca[j], k, p)
         e = pair_force(data, j, g[0], g[1], g[2])
         r = cross(turn[0], turn[1], turn[2], f[0], f[1], f[2])
-        x = centre_shift(data, data.pos3, a, k)
+        x = center_shift(data, data.pos3, a, k)
         df = (e[0] + r[0], e[1] + r[1], e[2] + r[2])
         dP = (shift[0] - wa * x[0], shift[1] - wa * x[1], shift[2] - wa * x[2])
         add_wrench_column(Ka, k, f, df, P, dP)
@@ -74,7 +74,7 @@ def add_pair_stiffness(model: Model, data: Data, j: int, indefinite: float) -> N
         u = unit_vector(k - 3)
         r = cross(u[0] - turn[0], u[1] - turn[1], u[2] - turn[2], f[0], f[1], f[2])
         s = point_shift(k, F[PairFrame.POINT] - o[0], F[PairFrame.POINT + 1] - o[1], F[PairFrame.POINT + 2] - o[2])
-        x = centre_shift(data, data.pos3, b, k)
+        x = center_shift(data, data.pos3, b, k)
         df = (e[0] + r[0], e[1] + r[1], e[2] + r[2])
         dP = (s[0] - shift[0] - wb * x[0], s[1] - shift[1] - wb * x[1], s[2] - shift[2] - wb * x[2])
         add_wrench_column(Kb, k, f, df, P, dP)
@@ -152,7 +152,7 @@ def add_earlier_slip(model: Model, data: Data, h: float, j: int, K2: Matrix) -> 
             F[PairFrame.POINT + 2] - data.pos3[i, 2],
         )
         for k in range(6):
-            x = centre_shift(data, data.pos2, i, k)
+            x = center_shift(data, data.pos2, i, k)
             e = unit_vector(k - 3)
             s1 = slip_rate(F[3], F[4], F[5], r, w, x, e) * sign / h
             s2 = slip_rate(F[6], F[7], F[8], r, w, x, e) * sign / h

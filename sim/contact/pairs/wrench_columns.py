@@ -24,7 +24,7 @@ def point_shift(k: int, x: float, y: float, z: float) -> Vec3:
 
 
 @kernel
-def centre_shift(data: Data, pos: Matrix, i: int, k: int) -> Vec3:
+def center_shift(data: Data, pos: Matrix, i: int, k: int) -> Vec3:
     """Displacement of the centre of mass of body i by the unit twist k about O."""
     o = data.origin
     return point_shift(k, pos[i, 0] - o[0], pos[i, 1] - o[1], pos[i, 2] - o[2])

@@ -10,7 +10,7 @@ from sim.contact.collision.witness import dot
 from sim.contact.contact_law import contact_impulse, law_of
 from sim.contact.pairs.pair_contact import is_absent, pair_arm, pair_force
 from sim.contact.pairs.wrench_columns import unit_vector
-from sim.contact.terrain_contact import centre
+from sim.contact.terrain_contact import center
 from sim.derivatives.parameters.body_columns import add_wrench, moment
 from sim.model.data import Data
 from sim.model.model import Law, Model
@@ -212,8 +212,8 @@ def add_normal(model: Model, data: Data, h: float, c: int, k: int, w: float, col
         F = data.contact_frame[c]
         e = unit_vector(k)
         n = cross(e[0], e[1], e[2], F[0], F[1], F[2])
-        gap = dot(n, centre(model, c, data.pos3, data.rot3))
-        before = dot(n, centre(model, c, data.pos1, data.rot1)), dot(n, centre(model, c, data.pos2, data.rot2))
+        gap = dot(n, center(model, c, data.pos3, data.rot3))
+        before = dot(n, center(model, c, data.pos1, data.rot1)), dot(n, center(model, c, data.pos2, data.rot2))
         add_turn(model, data, h, c, e, gap - floor_change(data, c, before[0], before[1]), w, col)
 
 

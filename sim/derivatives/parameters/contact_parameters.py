@@ -13,7 +13,7 @@ from sim.derivatives.parameters.tree_parameters import frame_turns
 from sim.mechanism.axes import contact_frame
 from sim.mechanism.collision import Collision
 from sim.mechanism.contact import Contact
-from sim.mechanism.contact_candidates import Touch
+from sim.mechanism.contact_candidates import ContactCandidate
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import HalfSpace, Solid, String
@@ -53,7 +53,7 @@ def collision_parameters(mech: Mechanism) -> Iterator[Parameter]:
     ground = len(mech.contacts)
     index = {name: i for i, name in enumerate(mech.body_names)}
     for collision in mech.collisions:
-        mine = [j for j, touch in enumerate(mech.touches) if touch.collision == collision.name]
+        mine = [j for j, candidate in enumerate(mech.contact_candidates) if candidate.collision == collision.name]
         if not mine:  # of two parts that are fixed to one another
             continue
         for kind, effect, value in (
@@ -62,17 +62,19 @@ def collision_parameters(mech: Mechanism) -> Iterator[Parameter]:
         ):
             if kind == "restitution" or not isinstance(collision.shape_a, String):  # a string does not rub
                 yield Parameter(kind, collision.name, "", value, tuple((effect, ground + j, 0, 1.0) for j in mine))
-        firsts = [j for j in mine if mech.touches[j].feature == 0]  # the corners of a polytope are one by one
-        swapped = mech.touches[mine[0]].bodies[0] != index.get(collision.a, -1)
+        firsts = [
+            j for j in mine if mech.contact_candidates[j].feature == 0
+        ]  # the corners of a polytope are one by one
+        swapped = mech.contact_candidates[mine[0]].bodies[0] != index.get(collision.a, -1)
         for side, letter in enumerate("ba" if swapped else "ab"):
             shape = shape_of(mech, collision, letter)
-            yield from _centre(f"shape_{letter}", collision.name, shape, side, firsts)
-            touches = {j: mech.touches[j] for j in firsts}
-            for label, value, terms in _sizes(collision, letter, shape, side, touches):
+            yield from _center(f"shape_{letter}", collision.name, shape, side, firsts)
+            candidates = {j: mech.contact_candidates[j] for j in firsts}
+            for label, value, terms in _sizes(collision, letter, shape, side, candidates):
                 yield Parameter(f"size_{letter}", collision.name, label, value, terms)
 
 
-def _centre(kind: str, name: str, shape: Solid, side: int, firsts: list[int]) -> list[Parameter]:
+def _center(kind: str, name: str, shape: Solid, side: int, firsts: list[int]) -> list[Parameter]:
     """Where a shape sits, of a collision with these first pairs."""
     return vector(kind, name, shape.center, lambda k: [(Effect.SHAPE_SHIFT, j, 3 * side + k, 1.0) for j in firsts])
 
@@ -85,23 +87,23 @@ def shape_of(mech: Mechanism, collision: Collision, letter: str) -> Solid:
 
 
 def _sizes(
-    collision: Collision, letter: str, shape: Solid, side: int, touches: dict[int, Touch]
+    collision: Collision, letter: str, shape: Solid, side: int, candidates: dict[int, ContactCandidate]
 ) -> Iterator[tuple[str, float, tuple[Term, ...]]]:
     """(component, value, terms) of the sizes of a shape; a polytope has one factor of its corners, 1 by default."""
     if isinstance(shape, String):
         if letter == "a":  # that of b has no meaning
-            ends = [(Effect.SHAPE_SIZE, j, SIDE * s + Size.STRING, 1.0) for j in touches for s in (0, 1)]
+            ends = [(Effect.SHAPE_SIZE, j, SIDE * s + Size.STRING, 1.0) for j in candidates for s in (0, 1)]
             yield "length", shape.length, tuple(ends)
         return
     against = collision.shape_b if letter == "a" else collision.shape_a
     if isinstance(shape, Polytope) and isinstance(against, HalfSpace):  # each corner is a point at its place
         moves = [
             (Effect.SHAPE_SHIFT, j, 3 * side + k, float(x))
-            for j, touch in touches.items()
-            for k, x in enumerate(touch.places[side, :3] - np.asarray(shape.center))
+            for j, candidate in candidates.items()
+            for k, x in enumerate(candidate.places[side, :3] - np.asarray(shape.center))
         ]
         yield "scale", 1.0, tuple(moves)
         return
     for label, (size, unit) in shape.surface.items():
         value = float(getattr(shape, label, 1.0))
-        yield label, value, tuple((Effect.SHAPE_SIZE, j, SIDE * side + size, unit) for j in touches)
+        yield label, value, tuple((Effect.SHAPE_SIZE, j, SIDE * side + size, unit) for j in candidates)

@@ -66,7 +66,7 @@ def damper_inertia_rates(model: Model, dofs: NDArray[np.int64]) -> Rates:
 
 def _body_rates(at: Bent, i: int, V: Floats) -> Rates:
     """By mass and inertia of body i: |v|^2 of its centre, w w^T in its axes."""
-    v, w = V[:, :3] + np.cross(V[:, 3:], at.centre[i]), V[:, 3:] @ at.rotation[i]
+    v, w = V[:, :3] + np.cross(V[:, 3:], at.center[i]), V[:, 3:] @ at.rotation[i]
     out: Rates = {(int(Effect.MASS), i, 0): np.sum(v * v, axis=1)}
     for k, (a, b) in enumerate(_INERTIA):
         out[int(Effect.INERTIA), i, k] = (1.0 if a == b else 2.0) * w[:, a] * w[:, b]

@@ -14,7 +14,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.height_field import cell, height_field, weight
-from sim.contact.terrain_contact import centre
+from sim.contact.terrain_contact import center
 from sim.derivatives.parameters.directions import At
 from sim.derivatives.parameters.parameter_jacobian import coordinate_rows
 from sim.derivatives.parameters.residual_columns import clear_columns
@@ -64,7 +64,7 @@ def spread_earlier(model: Model, data: Data, c: int, configuration: int, X: Matr
         (b[Bounce.RESTITUTION], b[Bounce.GAP1]) if configuration == 1 else (1.0 - b[Bounce.RESTITUTION], b[Bounce.GAP2])
     )
     pos, rot = (data.pos1, data.rot1) if configuration == 1 else (data.pos2, data.rot2)
-    at = centre(model, c, pos, rot)
+    at = center(model, c, pos, rot)
     _, Fx, Fy, _, _, _ = height_field(model, k, at[0], at[1])
     i = 1.0 / sqrt(1.0 + Fx * Fx + Fy * Fy)
     t = -weight * i / data.contact_frame[c, 2]
@@ -77,7 +77,7 @@ def spread_contacts(model: Model, data: Data, X: Matrix, out: Matrix) -> None:
     """out (n, ncoefficient) += d/d(coefficients) from the columns X (n, 3 nground) by F, F_x and F_y."""
     for c in range(model.contact_terrain.shape[0]):
         if is_on_terrain(model, data, c):
-            at = centre(model, c, data.pos3, data.rot3)
+            at = center(model, c, data.pos3, data.rot3)
             spread(model, model.contact_terrain[c] - 1, at, (0.0, 0.0, 0.0), X, 3 * c, out)
             if data.bounce[c, Bounce.RESTITUTION] > 0.0:
                 spread_earlier(model, data, c, 1, X, out)

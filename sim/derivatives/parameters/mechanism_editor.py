@@ -39,7 +39,7 @@ class Draft:
             self.gravity = _entries(self.gravity, entries)
         elif kind == "com":
             for name in parts_of(self.mech.loops, part):
-                self._move_centre(name, _entries(np.zeros(3), entries))
+                self._move_center(name, _entries(np.zeros(3), entries))
         elif kind in ("mass", "inertia"):
             self._change_body(kind, part, entries)
         elif kind in ("shape_a", "shape_b", "size_a", "size_b"):
@@ -87,7 +87,7 @@ class Draft:
             changed = replace(joint, **{kind: _entries(getattr(joint, kind), entries)})
         self.joints[name] = changed
 
-    def _move_centre(self, name: str, d: Floats) -> None:
+    def _move_center(self, name: str, d: Floats) -> None:
         """The centre of mass moves by d, body axes; elements of the body stay in place."""
         body = self.bodies[name]
         if body.shapes or body.visuals:

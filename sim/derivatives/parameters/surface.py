@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.height_field import field_values, height_field
-from sim.contact.terrain_contact import centre, frame_turn
+from sim.contact.terrain_contact import center, frame_turn
 from sim.derivatives.parameters.contact_columns import add_impulse, add_turn, floor_change, impulse_change, is_active
 from sim.model.data import Data
 from sim.model.model import Model
@@ -44,7 +44,7 @@ def add_ground_place(model: Model, data: Data, h: float, c: int, k: int, col: in
 def earlier_rate(model: Model, c: int, phi: float, pos: Matrix, rot: Matrix) -> float:
     """d(phi)/d(radius) at an earlier configuration, by its poses."""
     k = model.contact_terrain[c] - 1
-    x, y, _ = centre(model, c, pos, rot)
+    x, y, _ = center(model, c, pos, rot)
     _, Fx, Fy, _, _, _ = height_field(model, k, x, y)
     G, Gx, Gy, _, _, _ = field_values(model, model.terrain_rates, k, x, y)
     i = 1.0 / sqrt(1.0 + Fx * Fx + Fy * Fy)
@@ -56,7 +56,7 @@ def add_surface_radius(model: Model, data: Data, h: float, c: int, w: float, col
     """The surface on which the centre of contact c is, made for a larger radius."""
     if not is_on_terrain(model, data, c):
         return
-    x, y, _ = centre(model, c, data.pos3, data.rot3)
+    x, y, _ = center(model, c, data.pos3, data.rot3)
     G, Gx, Gy, _, _, _ = field_values(model, model.terrain_rates, model.contact_terrain[c] - 1, x, y)
     n = data.contact_frame[c]
     b = data.bounce[c]

@@ -54,10 +54,10 @@ def _on_body(mech: Mechanism, i: int, k: int) -> Iterator[Term]:
     for c, contact in enumerate(mech.contacts):
         if contact.body == name:
             yield Effect.POINT, c, k, -1.0
-    for j, touch in enumerate(mech.touches):
-        if touch.feature == 0:
+    for j, candidate in enumerate(mech.contact_candidates):
+        if candidate.feature == 0:
             for side in range(2):
-                if touch.bodies[side] == i:
+                if candidate.bodies[side] == i:
                     yield Effect.SHAPE_SHIFT, j, 3 * side + k, -1.0
 
 

@@ -21,9 +21,9 @@ from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.types import Matrix, Vector
 
-_MEETING = 0.02  # |w| / |dw|
+_MEETING_RESIDUAL = 0.02  # |w| / |dw|
 _ROUNDING = 1e-10  # share of the largest w
-_SPOKEN = 0.1  # share of dw in the change of a row; less is a redundant one whose combination changes
+_MIN_ROW_CHANGE = 0.1  # share of dw in the change of a row; less is a redundant one whose combination changes
 
 
 @kernel
@@ -116,12 +116,12 @@ def lead_loops(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None
         size = max(size, _largest(data.bifurcation_row[row]))
     for _ in range(first, last):
         row, col, best, change = _next_pivot(data, first, last)
-        if row < 0 or best < _MEETING * change:
+        if row < 0 or best < _MEETING_RESIDUAL * change:
             break
         _eliminate(data, first, last, row, col)
     for row in range(first, last):
         dw = _largest(data.bifurcation_direction[row])
-        led = data.loop_used[row] == 0 and dw > max(_SPOKEN * data.loop_scale[row], _ROUNDING * size)
+        led = data.loop_used[row] == 0 and dw > max(_MIN_ROW_CHANGE * data.loop_scale[row], _ROUNDING * size)
         for d in range(data.bifurcation_direction.shape[1]):
             data.bifurcation_direction[row, d] = data.bifurcation_direction[row, d] / dw if led else 0.0
         for c in range(6):

@@ -29,7 +29,7 @@ from solvers.types import Vector
 
 _CLOSER = 0.5  # share of a least pivot
 _REGULAR = 5e-3  # a pivot above this is far from a bifurcation
-_ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were not closed
+_MAX_TRANSVERSE_SHARE = 0.5  # share of a velocity across its loops; of more, the loops were not closed
 
 
 @optional(Slot.LOOPS_REGULAR, default=True)
@@ -80,7 +80,7 @@ def predict_loops(model: Model, data: Data, h: float, q: Vector, v: Vector, gues
         across = max(across, abs(v[d] - data.loop_velocity[d]))
         whole = max(whole, abs(v[d]))
     for d in range(v.shape[0]):
-        if across < _ACROSS * whole:
+        if across < _MAX_TRANSVERSE_SHARE * whole:
             data.loop_velocity[d] += data.loop_velocity[d] - v[d]
     data.loop_pivot[0] = data.couple_rank[CoupleRank.PIVOT]
     _no_step(data)

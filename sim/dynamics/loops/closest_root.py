@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Error = Callable[[Floats], Floats]  # (m, k) of m places (m, n)
 
-CLOSED = 1e-11  # [m], and as much of an angle
+CLOSED = 1e-11  # [m, rad]
 _STEP = 1e-6  # of central differences [m, rad]
 _ITERATIONS = 50  # of Newton's method
-_IDLE = 12  # of them in a row that bring nothing
-_LONGEST = 0.5  # step of Newton's method [m, rad]
+_MAX_IDLE_ITERATIONS = 12  # in a row, without a smaller error
+_MAX_STEP = 0.5  # step of Newton's method [m, rad]
 _RANK = 1e-9  # singular values below this share of the largest belong to directions without effect
 _FAR = 1.0  # [m, rad] a zero further away than this may not be the nearest
 _AROUND = (0.1, 0.4, 1.6)  # standard deviations of the starts [m, rad]
 STARTS = 6  # of each of them
 _EVALUATIONS = 40  # of least squares from each
 _SLOW = 1e-3  # least relative reduction of the sum of squares by a step of least squares
-_NEAR = 1e-2  # [m, rad] from a minimum above this, no zero is within the reach of Newton's method
-_BACK = 30  # steps along the zeros
+_NEWTON_REACH = 1e-2  # [m, rad] from a minimum above this, no zero is within the reach of Newton's method
+_HOMING_STEPS = 30  # along the zeros, towards the start
 
 
 class Zero(NamedTuple):
@@ -64,10 +64,10 @@ def newton(error: Error, d: Floats) -> Zero:
         g, J = linearized(error, d)
         size = float(np.abs(g).max())
         best, idle = (Zero(d, size), 0) if size < best.left else (best, idle + 1)
-        if best.found or idle == _IDLE:
+        if best.found or idle == _MAX_IDLE_ITERATIONS:
             break
         step = np.linalg.lstsq(J, -g, rcond=_RANK)[0]
-        d = d + step * min(1.0, _LONGEST / max(np.abs(step).max(), 1e-300))
+        d = d + step * min(1.0, _MAX_STEP / max(np.abs(step).max(), 1e-300))
     return best
 
 
@@ -112,7 +112,7 @@ def _settled(error: Error, d: Floats) -> Zero:
 
     end = least_squares(here, d, slope, ftol=_SLOW, max_nfev=_EVALUATIONS)
     left = float(np.abs(end.fun).max())
-    return Zero(end.x, left) if end.status > 0 and left > _NEAR else newton(error, end.x)
+    return Zero(end.x, left) if end.status > 0 and left > _NEWTON_REACH else newton(error, end.x)
 
 
 def _led_back(error: Error, zero: Zero) -> Zero:
@@ -121,7 +121,7 @@ def _led_back(error: Error, zero: Zero) -> Zero:
     d <- the point nearest to 0 of the tangent J (d' - d) = 0 at d, or a part of the way to it, and back to a zero.
     """
     step_size = 1.0
-    for _ in range(_BACK):
+    for _ in range(_HOMING_STEPS):
         J = jacobian(error, zero.d)
         goal = np.linalg.lstsq(J, J @ zero.d, rcond=_RANK)[0]
         nearer = newton(error, zero.d + step_size * (goal - zero.d))

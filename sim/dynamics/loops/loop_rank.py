@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-_NEAR = 0.1  # `weakest` of configurations close to a singular one, over that next to them
+_NEARLY_SINGULAR = 0.1  # `weakest` of configurations close to a singular one, over that next to them
 
 
 class LoopRank(NamedTuple):
@@ -45,6 +45,6 @@ class LoopRank(NamedTuple):
             return (
                 f"; singular: {self.singular} of the redundant ones count nearby, branches of the motion may meet here"
             )
-        if self.weakest < _NEAR * self.nearby:
+        if self.weakest < _NEARLY_SINGULAR * self.nearby:
             return f", nearby {self.nearby:.1e}: close to a singular configuration"
         return ""

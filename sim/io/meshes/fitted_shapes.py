@@ -52,9 +52,9 @@ def _sphere(corners: Floats, middles: Floats) -> Fitted:
     radius = float(np.sqrt(solved[3] + solved[:3] @ solved[:3]))
     if not np.isfinite(radius) or radius > np.linalg.norm(y, axis=1).max() or np.linalg.norm(solved[:3]) > radius:
         solved, radius = np.zeros(4), float(np.linalg.norm(y, axis=1).mean())  # a surface that is not round
-    centre = origin + solved[:3]
-    error = float(np.abs(np.linalg.norm(corners - centre, axis=1) - radius).max())
-    return Fitted("sphere", (radius,), Pose(np.eye(3), centre), error)
+    center = origin + solved[:3]
+    error = float(np.abs(np.linalg.norm(corners - center, axis=1) - radius).max())
+    return Fitted("sphere", (radius,), Pose(np.eye(3), center), error)
 
 
 def _box(corners: Floats, normals: Floats) -> tuple[Pose, Floats]:

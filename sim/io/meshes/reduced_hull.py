@@ -48,13 +48,13 @@ def _reduced(data: bytes, corners: int) -> tuple[Floats, float]:
 
 def _extremes(full: Floats) -> list[int]:
     """Indices of at least four points that span a volume: the extremes along the principal axes, and one off them."""
-    centred = full - full.mean(axis=0)
-    axes = np.linalg.svd(centred, full_matrices=False)[2]
-    along = centred @ axes.T
+    centered = full - full.mean(axis=0)
+    axes = np.linalg.svd(centered, full_matrices=False)[2]
+    along = centered @ axes.T
     chosen = list(dict.fromkeys(int(i) for k in range(3) for i in (along[:, k].argmin(), along[:, k].argmax())))
-    while np.linalg.matrix_rank(full[chosen[1:]] - full[chosen[0]], tol=1e-9 * np.abs(centred).max()) < 3:
+    while np.linalg.matrix_rank(full[chosen[1:]] - full[chosen[0]], tol=1e-9 * np.abs(centered).max()) < 3:
         base = full[chosen[1:]] - full[chosen[0]]
-        rows = np.linalg.svd(base)[2][: np.linalg.matrix_rank(base, tol=1e-9 * np.abs(centred).max())]
+        rows = np.linalg.svd(base)[2][: np.linalg.matrix_rank(base, tol=1e-9 * np.abs(centered).max())]
         off = (full - full[chosen[0]]) - (full - full[chosen[0]]) @ rows.T @ rows
         chosen.append(int(np.linalg.norm(off, axis=1).argmax()))
     return chosen
@@ -62,11 +62,11 @@ def _extremes(full: Floats) -> list[int]:
 
 def _with_volume(points: Floats) -> Floats:
     """The points; where they lie in a plane or on a line, twice, THIN to either side of it."""
-    centre = points.mean(axis=0)
-    sizes, axes = np.linalg.svd(points - centre, full_matrices=False)[1:]
+    center = points.mean(axis=0)
+    sizes, axes = np.linalg.svd(points - center, full_matrices=False)[1:]
     if len(sizes) < 3:  # fewer points than dimensions
-        axes = np.linalg.svd(points - centre)[2]
-    along = (points - centre) @ axes.T
+        axes = np.linalg.svd(points - center)[2]
+    along = (points - center) @ axes.T
     out = points
     for k in range(3):
         if np.ptp(along[:, k]) < 2.0 * THIN * 1e-3:

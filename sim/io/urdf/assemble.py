@@ -185,8 +185,8 @@ def _repaired(body: MergedLinks, part: RigidInertia) -> tuple[RigidInertia, str]
     if not shapes or np.abs(part.inertia).max() > _NOTHING * part.mass:  # more than the rounding of a shifted zero
         return repaired(part), ""
     mass = part.mass or DENSITY * sum(shape.volume() for shape in shapes)
-    centre, inertia = composite(shapes, mass)
-    whole = RigidInertia(mass, part.com if part.mass else part.com + centre, inertia)
+    center, inertia = composite(shapes, mass)
+    whole = RigidInertia(mass, part.com if part.mass else part.com + center, inertia)
     whole = repaired(whole) if fault(whole) else whole
     return whole, f", from the collision shapes, with {DENSITY:g} kg/m^3 where there is no mass"
 

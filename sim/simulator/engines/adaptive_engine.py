@@ -161,7 +161,6 @@ class AdaptiveEngine(PythonLoopEngine):
 
     def part(self, x: Vector, held: Held, h: float, order: int, kappa: float | None = None) -> Vector:
         """The node one sub-step of a length and order after x (nx,); NaN where it is not solved."""
-        u, wrench = held
         if order == 8:
             return self._long(x, held, h, False)[0]
         for _ in range(2):
@@ -173,7 +172,7 @@ class AdaptiveEngine(PythonLoopEngine):
         (u, wrench), xs = held, np.zeros((2, self.nx))
         xs[0] = self._mean(x, held, h)
         contacts = np.zeros((1, self.sizes.ncontact, CONTACT))
-        line = MotionBuffers(xs, u[None], wrench, np.zeros((1, REPORT)), contacts, *self.unknown[:2])
+        line = MotionBuffers(xs, u[None], wrench, np.zeros((1, REPORT)), contacts, *self.no_predictions[:2])
         model, data = self._second.step_table(), self._scratch.table()
         if roll(model, data, self._part_settings(h, kappa), line, 0, None, None) < 1:
             return np.full(self.nx, np.nan)
@@ -205,7 +204,7 @@ class AdaptiveEngine(PythonLoopEngine):
         """As part_slopes, of order 8; without derivatives these are empty."""
         (u, wrench), settings = held, self.settings.array()
         settings[StepSetting.TIME_STEP] = h
-        data, reports, (contacts, A, B) = self._scratch.table(), np.zeros((1, REPORT)), self.unkept
+        data, reports, (contacts, A, B) = self._scratch.table(), np.zeros((1, REPORT)), self.no_outputs
         if derivatives:
             A, B, ends = np.zeros((1, self.ndx, self.ndx)), np.zeros((1, self.ndx, self.nu)), np.zeros((1, self.nx))
             line = Linearized(x[None], u[None], wrench, A, B, ends, reports)
@@ -316,12 +315,12 @@ class AdaptiveEngine(PythonLoopEngine):
             return self._roll_slopes(x, us, wrenches, kappa)
         steps, external = len(us), self.external(wrenches)
         (models, errors, line), settings, works = self._line(), self.settings.array(kappa), self._scratch.tables(2)
-        goal, (A, B) = self._goal(settings), self.unknown[:2]
+        goal, (A, B) = self._goal(settings), self.no_predictions[:2]
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
         contacts, division = np.zeros((steps, self.sizes.ncontact, CONTACT)), Division.none(steps)
         xs[0], line.clock[Clock.BEGUN], knot = x, 0.0, 0
         line = line._replace(wrench=np.zeros_like(external[:1]))
-        path = SubstepMotion(us, external, xs, reports, contacts, division.substeps, division.errors)
+        path = SubstepMotion(us, external, xs, reports, contacts, division.parts, division.errors)
         try:
             for _ in pieces(settings, steps + 1):
                 knot = int(roll_substeps(models, works, settings, goal, errors, line, path, knot))
@@ -350,7 +349,7 @@ class AdaptiveEngine(PythonLoopEngine):
             if reports[t, StepReport.STATUS] != Status.SOLVED:
                 break
             xs[t + 1], contacts[t] = path.x, path.contacts
-            division.substeps[t], division.errors[t], knot = len(path.lengths), path.error, t + 1
+            division.parts[t], division.errors[t], knot = len(path.lengths), path.error, t + 1
         return Rolled(knot, xs, reports, contacts, A, B, division)
 
     def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Vector) -> Floats:

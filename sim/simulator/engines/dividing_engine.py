@@ -15,13 +15,13 @@ import threading
 
 import numpy as np
 
-from sim.integrators.feedback import Following
+from sim.integrators.feedback import FeedbackRun
 from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.record_columns import StepReport
 from sim.simulator.engines.division import DIVISIBLE, Division
-from sim.simulator.engines.engine import REPORT, Divided, Engine, Floats, chained, knot_inputs, refuse
+from sim.simulator.engines.engine import REPORT, DividedStep, Engine, Floats, chained, knot_inputs, refuse
 from sim.simulator.engines.interval_states import IntervalStates
 from sim.simulator.engines.intervals import Intervals
 from sim.simulator.link_kernels import link_step
@@ -70,17 +70,17 @@ class DividingEngine(Engine):
         self._engines: dict[int, Engine] = {}  # by the number of parts of a step
         self._ended = threading.local()  # `parts`: the engine of the last step of this thread, if that was divided
 
-    def whole(self) -> Engine:
+    def undivided(self) -> Engine:
         """As Engine.whole."""
         if 1 not in self._engines:
             self._engines[1] = Engine(self.model, self.settings._replace(loss=math.inf))
         return self._engines[1]
 
-    def renew(self) -> None:
+    def refresh(self) -> None:
         """As Engine.renew."""
-        super().renew()
+        super().refresh()
         for engine in self._engines.values():
-            engine.renew()
+            engine.refresh()
 
     def part(self, parts: int) -> Engine:
         """The engine of the parts of a step."""
@@ -94,7 +94,7 @@ class DividingEngine(Engine):
 
     def divide(
         self, x: Vector, u: Vector, wrench: Cube, kappa: float | None = None, *, derivatives: bool = False
-    ) -> Divided | None:
+    ) -> DividedStep | None:
         """The step from x (nx,) under u (nu,) and external wrenches (1 or 0, nbody, 6) in as few parts as possible.
 
         None where LARGEST_DIVISION parts are not enough; with derivatives also where the end loses momentum, which has
@@ -116,7 +116,7 @@ class DividingEngine(Engine):
         kappa: float | None = None,
         *,
         derivatives: bool = False,
-    ) -> Divided | None:
+    ) -> DividedStep | None:
         """The step in the given number of parts; None if one of them is not solved. given: input, external wrenches."""
         engine = self.part(parts)
         part, (u, wrench) = engine.settings.time_step, given
@@ -126,21 +126,21 @@ class DividingEngine(Engine):
         us, wrenches = np.repeat(u[None], parts, axis=0), np.repeat(wrench, parts, axis=0)
         level = None if kappa is None else kappa / parts
         rolled = engine.roll(first, us, wrenches, kappa=level, derivatives=derivatives)
-        if rolled.knot < parts:
+        if rolled.solved_steps < parts:
             return None
         last = rolled.xs[-1]
         end = self.intervals.from_part(last, part)
         if end is not None:
-            return Divided(engine, rolled, end, 1.0)
+            return DividedStep(engine, rolled, end, 1.0)
         slowed = self.intervals.slowed(last, part)
-        return None if slowed is None else Divided(engine, rolled, *slowed)
+        return None if slowed is None else DividedStep(engine, rolled, *slowed)
 
-    def conversions(self, x: Vector, divided: Divided) -> tuple[Floats, Floats]:
+    def conversions(self, x: Vector, divided: DividedStep) -> tuple[Floats, Floats]:
         """Derivatives of the conversions at both ends of a divided step from x, (ndx, ndx)."""
         xs, part = divided.rolled.xs, divided.engine.settings.time_step
         return self.intervals.slopes(x, part, xs[0]), self.intervals.slopes_back(xs[-1], part, divided.x)
 
-    def slopes(self, x: Vector, divided: Divided) -> tuple[Floats, Floats]:
+    def slopes(self, x: Vector, divided: DividedStep) -> tuple[Floats, Floats]:
         """(A, B) of a divided step from x: the product of the derivatives of its parts and of both conversions."""
         ahead, back = self.conversions(x, divided)
         A, B = chained(ahead, divided.rolled)
@@ -163,7 +163,7 @@ class DividingEngine(Engine):
         motion: MotionBuffers,
         kappa: float | None,
         division: Division,
-        following: Following | None = None,
+        following: FeedbackRun | None = None,
         first: int = 0,
         max_iterations: int | None = None,
     ) -> int:
@@ -171,10 +171,10 @@ class DividingEngine(Engine):
         self._ended.parts = None
         done = super().take_steps(model, motion, kappa, division, following, first, max_iterations)
         if following is None:
-            return self._go_on(model, motion, kappa, division, done)
+            return self._continue_after(model, motion, kappa, division, done)
         steps = len(motion.us) * following.substeps
         try:
-            while done < steps and self._divide_followed(motion, kappa, following, done):
+            while done < steps and self._divide_feedback_step(motion, kappa, following, done):
                 done += 1
                 if done < steps:
                     done = super().take_steps(model, motion, kappa, division, following, done, max_iterations)
@@ -182,7 +182,9 @@ class DividingEngine(Engine):
             raise (stop if isinstance(stop, Interrupted) else Interrupted(done)) from None
         return done
 
-    def _go_on(self, model: Table, motion: MotionBuffers, kappa: float | None, division: Division, knot: int) -> int:
+    def _continue_after(
+        self, model: Table, motion: MotionBuffers, kappa: float | None, division: Division, knot: int
+    ) -> int:
         """Go on from the step `knot`, which was not solved."""
         steps, piece = len(motion.us), _PIECE
         try:
@@ -212,7 +214,7 @@ class DividingEngine(Engine):
         motion.xs[knot + 1] = divided.x
         self._ended.parts = divided.engine
         report[:] = divided.report()
-        division.substeps[knot], division.shares[knot] = divided.parts, divided.share
+        division.parts[knot], division.momentum_fractions[knot] = divided.parts, divided.share
         if len(motion.contacts):
             motion.contacts[knot] = divided.contacts()
         if derivatives:
@@ -220,7 +222,9 @@ class DividingEngine(Engine):
             return refuse(report[None], 1, motion.A[knot : knot + 1], motion.B[knot : knot + 1]) == 1
         return True
 
-    def _divide_followed(self, motion: MotionBuffers, kappa: float | None, following: Following, done: int) -> bool:
+    def _divide_feedback_step(
+        self, motion: MotionBuffers, kappa: float | None, following: FeedbackRun, done: int
+    ) -> bool:
         """Divide the unsolved step after `done` solved ones of a motion that follows a law; False as in _divide_row."""
         law, alpha, report = following.law, following.alpha, motion.reports[0]
         if int(report[StepReport.STATUS]) not in DIVISIBLE:
@@ -254,9 +258,9 @@ class DividingEngine(Engine):
         for i in _divisible(status):
             report = np.zeros((1, REPORT))
             report[0, StepReport.STATUS] = status[i]
-            motion = MotionBuffers(xs[i], us[i], self.no_wrenches, report, self._no_contacts, *self.unknown[:2])
+            motion = MotionBuffers(xs[i], us[i], self.no_wrenches, report, self._no_contacts, *self.no_predictions[:2])
             try:
-                knots[i] = self._go_on(model, motion, None, Division.none(len(us[i])), int(knots[i]))
+                knots[i] = self._continue_after(model, motion, None, Division.none(len(us[i])), int(knots[i]))
             except Interrupted as stop:
                 knots[i], status[i] = stop.result, Status.INTERRUPTED
                 raise Interrupted((xs, status, knots)) from None

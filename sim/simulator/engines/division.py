@@ -31,10 +31,10 @@ _PARTS, _WHOLE = np.ones(_FEW, dtype=np.int64), np.ones(_FEW)
 
 
 class Division(NamedTuple):
-    """The divided steps of a motion, and the share of the momentum that each conserved."""
+    """The divided steps of a motion, and the fraction of the relative momentum that each conserved."""
 
-    substeps: Integers  # (T,) steps that each was divided into, 1 for whole ones
-    shares: Floats  # (T,) of the momentum of bodies against each other, 1 where all was handed on
+    parts: Integers  # (T,) steps that each was divided into, 1 for whole ones
+    momentum_fractions: Floats  # (T,) conserved, of the momentum of bodies relative to each other
     errors: Floats  # (T,) estimated, over those that an accuracy allows; 0 without one
 
     @classmethod

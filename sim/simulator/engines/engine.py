@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.integrators import parallel_loops, rollout
-from sim.integrators.feedback import FeedbackLaw, Following, Path
+from sim.integrators.feedback import FeedbackLaw, FeedbackRun, Path
 from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
 from sim.model.interruptible_loops import pieces
@@ -39,7 +39,7 @@ _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 
 
-class Divided(NamedTuple):
+class DividedStep(NamedTuple):
     """A divided step; see dividing_engine.py."""
 
     engine: Engine  # that of its parts
@@ -83,7 +83,7 @@ _UNDIVIDED = Division.none(0)
 class Rolled(NamedTuple):
     """A rollout; rows after the solved steps are undefined."""
 
-    knot: int  # number of solved steps
+    solved_steps: int
     xs: Floats  # (T + 1, nx)
     reports: Floats  # (T, 6)
     contacts: Floats  # (T, ncontact, 11), or (0, ncontact, 11) beside derivatives
@@ -156,8 +156,8 @@ class Engine(LinkedModel):
             )
         ]
         self.no_wrenches, self._no_contacts = nothing[:2]
-        self.unknown = tuple(nothing[2:])  # derivatives and cone variables of steps that a policy does not know
-        self.unkept = self._no_contacts, *self.unknown[:2]  # contacts and derivatives of motions without
+        self.no_predictions = tuple(nothing[2:])  # derivatives and cone variables of steps that a policy does not know
+        self.no_outputs = self._no_contacts, *self.no_predictions[:2]  # contacts and derivatives of motions without
 
     def _settings_of(self, steps: int, kappa: float | None, max_iterations: int | None = None) -> Vector:
         """Settings of a call with a given number of steps; those of a single step have no deadline, and are shared."""
@@ -187,7 +187,7 @@ class Engine(LinkedModel):
         xs = np.empty((steps + 1, self.nx))
         reports = np.zeros((steps, REPORT))
         xs[0] = x
-        A, B = self.unknown[:2]
+        A, B = self.no_predictions[:2]
         contacts = self._no_contacts
         if derivatives:
             A, B = np.empty((steps, self.ndx, self.ndx)), np.empty((steps, self.ndx, self.nu))
@@ -214,7 +214,7 @@ class Engine(LinkedModel):
         motion: MotionBuffers,
         kappa: float | None,
         division: Division,
-        following: Following | None = None,
+        following: FeedbackRun | None = None,
         first: int = 0,
         max_iterations: int | None = None,
     ) -> int:
@@ -240,7 +240,7 @@ class Engine(LinkedModel):
 
     def divide(
         self, x: Vector, u: Vector, wrench: Cube, kappa: float | None = None, *, derivatives: bool = False
-    ) -> Divided | None:
+    ) -> DividedStep | None:
         """None: this engine refuses steps that it cannot solve. See dividing_engine.py."""
         return None
 
@@ -251,11 +251,11 @@ class Engine(LinkedModel):
     def forget_parts(self) -> None:
         """Let `last` be that of a step as a whole; only engines that divide steps have parts."""
 
-    def whole(self) -> Engine:
+    def undivided(self) -> Engine:
         """The engine that refuses steps which it cannot solve as a whole."""
         return self
 
-    def conversions(self, x: Vector, divided: Divided) -> tuple[Floats, Floats]:
+    def conversions(self, x: Vector, divided: DividedStep) -> tuple[Floats, Floats]:
         """Derivatives at both ends of a divided step from x; only engines that divide steps make one."""
         raise NotImplementedError
 
@@ -271,7 +271,7 @@ class Engine(LinkedModel):
             np.zeros(REPORT + 1),
         )
 
-    def closed_loop(
+    def roll_feedback(
         self,
         x: Vector,
         policy: FeedbackLaw,
@@ -287,8 +287,8 @@ class Engine(LinkedModel):
         knots = len(policy.us)
         path = self._path(knots, keep=keep)
         path.xs[0], steps = x, knots * substeps
-        motion = MotionBuffers(path.xs, path.us, policy.wrenches, path.report[None], *self.unkept)
-        following = Following(policy, float(alpha), *limits, substeps, path.cones, path.bounds)
+        motion = MotionBuffers(path.xs, path.us, policy.wrenches, path.report[None], *self.no_outputs)
+        following = FeedbackRun(policy, float(alpha), *limits, substeps, path.cones, path.bounds)
         try:
             done = self.take_steps(self.step_table(), motion, kappa, _UNDIVIDED, following, 0, max_iterations)
         except Interrupted as stop:
@@ -353,8 +353,8 @@ class Engine(LinkedModel):
         """
         us, wrenches = given
         rolled = self.roll(x, us, wrenches, kappa=kappa, derivatives=True)
-        report = rolled.reports[min(rolled.knot, len(us) - 1)]
-        if rolled.knot < len(us):
+        report = rolled.reports[min(rolled.solved_steps, len(us) - 1)]
+        if rolled.solved_steps < len(us):
             return np.zeros((self.ndx, self.ndx)), np.zeros((self.ndx, self.nu)), np.zeros(self.nx), report
         report[StepReport.ACCURACY] = rolled.reports[:, StepReport.ACCURACY].max()
         return *chained(np.eye(self.ndx), rolled), rolled.xs[-1], report
@@ -371,7 +371,7 @@ class Engine(LinkedModel):
         n, steps = us.shape[:2]
         xs, reports, knots = np.zeros((n, steps + 1, self.nx)), np.zeros((n, 1, REPORT)), np.zeros(n, dtype=np.int64)
         motions = parallel_loops.BatchBuffers(
-            xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.unknown[:2]
+            xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.no_predictions[:2]
         )
         model, works, settings = self.step_table(), self._scratch.chunks(n), self.settings.array()
         status = reports[:, 0, StepReport.STATUS]

@@ -75,8 +75,8 @@ class LinkedModel:
     def turn_ground(self, frame: Floats) -> None:
         """Give all contacts with half-spaces the frame (3, 3): rows normal and two tangents."""
         self.model.contact_frame[self.model.contact_terrain == 0] = frame.ravel()
-        self.renew()
+        self.refresh()
 
-    def renew(self) -> None:
+    def refresh(self) -> None:
         """Reload the copies of model arrays in Data after the model changed."""
-        self._scratch.turn()
+        self._scratch.refresh_contact_frames()

@@ -39,7 +39,7 @@ class MeanStates:
         status, x = self.start(q, v, h)
         if status != Status.SOLVED:
             reason = Status(status)
-            raise SimulationError(f"Simulator.start: {MESSAGES[reason]}", reason)
+            raise SimulationError(f"Simulator.state_from_velocity: {MESSAGES[reason]}", reason)
         return x
 
     def along_loops(self, x: Vector) -> Vector | None:
@@ -78,10 +78,10 @@ class MeanStates:
             state_manifold.state_differences(self._kernels.linked(), x0s[part], x1s[part], out[part])
         return out
 
-    def normalise(self, xs: Floats, tolerance: float) -> int:
+    def normalize(self, xs: Floats, tolerance: float) -> int:
         """Normalise quaternions in place; see `normalise_quaternions`."""
         for part in rows(len(xs)):
-            found = int(state_manifold.normalise_quaternions(self._kernels.linked(), xs[part], tolerance))
+            found = int(state_manifold.normalize_quaternions(self._kernels.linked(), xs[part], tolerance))
             if found >= 0:
                 return part.start * self._sizes.nbody + found
         return -1

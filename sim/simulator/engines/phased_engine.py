@@ -41,7 +41,7 @@ from solvers.types import Cube, Vector
 class March(NamedTuple):
     """Steps from one state on; rows after the last solved step are undefined."""
 
-    knot: int  # number of solved steps
+    solved_steps: int
     xs: Floats  # (T + 1, nx)
     reports: Floats  # (T, 6)
     contacts: Floats  # (T, ncontact, 11)
@@ -66,7 +66,7 @@ class PhasedEngine(PythonLoopEngine):
         steps, t = len(us), 0
         xs, means, near = np.zeros((steps + 1, self.nx)), np.zeros((steps + 1, self.nx)), np.zeros(steps, np.int64)
         reports, contacts = np.zeros((steps, REPORT)), np.zeros((steps, self.sizes.ncontact, CONTACT))
-        motion = MotionBuffers(means, us, self.external(wrenches), reports, contacts, *self.unknown[:2])
+        motion = MotionBuffers(means, us, self.external(wrenches), reports, contacts, *self.no_predictions[:2])
         path = Phases(xs, motion, near, not self.second_order, self.settings.divide)
         xs[0], settings, (models, works) = x, self._second.settings.array(kappa), self._lines()
         self._second.forget_parts()
@@ -105,7 +105,7 @@ class PhasedEngine(PythonLoopEngine):
             motion.wrenches[row],
             motion.reports[row],
             motion.contacts[row],
-            *self.unknown[:2],
+            *self.no_predictions[:2],
         )
         if self._second.take_steps(self._second.step_table(), one, kappa, Division.none(1)) == 0:
             return False
@@ -127,12 +127,12 @@ class PhasedEngine(PythonLoopEngine):
             m = self.march(x, us, wrenches, kappa)
         except Interrupted as stop:
             knot, xs, reports, contacts = stop.result
-            none, whole = self.unknown[:2], Division.none(len(us))
+            none, whole = self.no_predictions[:2], Division.none(len(us))
             raise Interrupted(Rolled(knot, xs, reports, contacts, none[0], none[1], whole)) from None
-        A, B = self.unknown[:2]
+        A, B = self.no_predictions[:2]
         if derivatives:
             A, B, *_ = self.linearize(m.xs[:-1], us, 1, kappa, None, wrenches)
-        return Rolled(m.knot, m.xs, m.reports, m.contacts, A, B, Division.none(len(us)))
+        return Rolled(m.solved_steps, m.xs, m.reports, m.contacts, A, B, Division.none(len(us)))
 
     def inactive(self) -> NDArray[np.bool_]:
         """As Engine.inactive; all of them where the step was of higher order."""
@@ -144,8 +144,8 @@ class PhasedEngine(PythonLoopEngine):
         """As Engine.linearize_knot: products of the derivatives of the steps, each by its own order."""
         us, external = given
         m = self.march(x, us, external, kappa)
-        A, B, report = np.eye(self.ndx), np.zeros((self.ndx, self.nu)), m.reports[min(m.knot, len(us) - 1)]
-        for s in range(len(us) if m.knot == len(us) else 0):
+        A, B, report = np.eye(self.ndx), np.zeros((self.ndx, self.nu)), m.reports[min(m.solved_steps, len(us) - 1)]
+        for s in range(len(us) if m.solved_steps == len(us) else 0):
             dx, du, found = self._step_slopes(m, s, (us[s], external[s : s + 1]), kappa)
             A, B = dx @ A, dx @ B + du
             if found[StepReport.STATUS] != Status.SOLVED:

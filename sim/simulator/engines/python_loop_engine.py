@@ -27,16 +27,18 @@ class PythonLoopEngine(HighOrderEngine):
         for i in range(n):
             try:
                 rolled = self.roll(x0s[i], us[i])
-                knots[i], xs[i] = rolled.knot, rolled.xs
+                knots[i], xs[i] = rolled.solved_steps, rolled.xs
             except KeyboardInterrupt as stop:
                 status[i:] = Status.INTERRUPTED
                 if isinstance(stop, Interrupted):
-                    knots[i], xs[i] = stop.result.knot, stop.result.xs
+                    knots[i], xs[i] = stop.result.solved_steps, stop.result.xs
                 raise Interrupted((xs, status, knots)) from None
-            status[i] = rolled.reports[min(rolled.knot, steps - 1), StepReport.STATUS] if steps else Status.SOLVED
+            status[i] = (
+                rolled.reports[min(rolled.solved_steps, steps - 1), StepReport.STATUS] if steps else Status.SOLVED
+            )
         return xs, status, knots
 
-    def closed_loop(
+    def roll_feedback(
         self,
         x: Vector,
         policy: FeedbackLaw,
@@ -48,7 +50,7 @@ class PythonLoopEngine(HighOrderEngine):
         keep: bool = False,
         max_iterations: int | None = None,
     ) -> tuple[int, Path]:
-        """As Engine.closed_loop; warm starts of the policy and another limit of iterations are not used."""
+        """As Engine.roll_feedback; warm starts of the policy and another limit of iterations are not used."""
         knots = len(policy.us)
         path = self._path(knots, keep=keep, cones=False)
         path.xs[0], total = x, 0.0
@@ -60,8 +62,8 @@ class PythonLoopEngine(HighOrderEngine):
             except KeyboardInterrupt:
                 interrupted(path.report[None], 0)
                 raise Interrupted((t, path)) from None
-            path.report[:REPORT] = rolled.reports[min(rolled.knot, substeps - 1)]
-            if rolled.knot < substeps:
+            path.report[:REPORT] = rolled.reports[min(rolled.solved_steps, substeps - 1)]
+            if rolled.solved_steps < substeps:
                 return t, path
             total += rolled.reports[:, StepReport.ITERATIONS].sum()
             path.xs[t + 1] = rolled.xs[-1]

@@ -147,17 +147,7 @@ def _function(model: Model, h: float, quantity: int, body: int, place: Floats) -
     first, end = size + nx, size + nx + rows * columns
     code = int(quantity)
 
-    def values(x: Any, out: Any) -> None:
-        scratch, table = np.zeros(end), np.empty(words, np.int64)
-        put_table(layout, whole.ctypes.data, numbers.ctypes.data, scratch.ctypes.data, table)
-        for k in range(nx):
-            scratch[size + k] = x[k]
-        result = scratch[first:end].reshape(rows, columns)
-        evaluate(code, table, arrays, h, body, place, scratch[size:first], result)
-        for k in range(columns):
-            out[k] = result[0, k]
-
-    def derivatives(x: Any, out: Any) -> None:
+    def function(x: Any, out: Any) -> None:
         scratch, table = np.zeros(end), np.empty(words, np.int64)
         put_table(layout, whole.ctypes.data, numbers.ctypes.data, scratch.ctypes.data, table)
         for k in range(nx):
@@ -166,9 +156,12 @@ def _function(model: Model, h: float, quantity: int, body: int, place: Floats) -
         evaluate(code, table, arrays, h, body, place, scratch[size:first], result)
         for row in range(rows):
             for k in range(columns):
-                out[row, k] = result[row, k]
+                if single:  # a constant: Numba compiles the branch that fits the dimension of out
+                    out[k] = result[row, k]
+                else:
+                    out[row, k] = result[row, k]
 
-    return values if single else derivatives
+    return function
 
 
 class CompiledKinematics:

@@ -8,7 +8,7 @@ _FACTOR = 2.0  # of the schedule, growing geometrically with repeated use: Tassa
 _USEFUL = 1.0  # smallest mu above zero: an increase starts here, and a decrease below it gives zero
 
 
-class Damping:
+class RegularizationSchedule:
     """Schedule of the regularisation, in units of the mean control weight."""
 
     def __init__(self, options: Options) -> None:

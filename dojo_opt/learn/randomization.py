@@ -1,4 +1,4 @@
-"""Randomisation: models that a policy learns on, drawn around that of a task."""
+"""Randomization: models that a policy learns on, drawn around that of a task."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from sim.mechanism import checks
 from sim.mechanism.memory_limit import room_for
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.contact_groups import ContactGroups
-from sim.simulator.row_batch import BatchStep
+from sim.simulator.row_batch import StepBatch
 from sim.simulator.row_impulses import RowImpulses
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
-__all__ = ["Models", "Randomisation"]
+__all__ = ["Models", "Randomization"]
 
 
 @dataclass(frozen=True)
-class Randomisation:
+class Randomization:
     """Ranges of uniformly drawn models; without any, all rows have the model of the task.
 
     Attributes:
@@ -55,52 +55,52 @@ class Randomisation:
 
     def __post_init__(self) -> None:
         for field_ in ("values", "factors"):
-            for name, pair in checks.mapping(f"Randomisation({field_}=...)", getattr(self, field_)).items():
-                low, high = checks.vector(f"Randomisation({field_}=...): {name!r}", pair, 2)
+            for name, pair in checks.mapping(f"Randomization({field_}=...)", getattr(self, field_)).items():
+                low, high = checks.vector(f"Randomization({field_}=...): {name!r}", pair, 2)
                 if not low <= high:
-                    raise ValueError(f"Randomisation: {name!r}: expected low <= high, got {low} and {high}")
+                    raise ValueError(f"Randomization: {name!r}: expected low <= high, got {low} and {high}")
         if set(self.values) & set(self.factors):
-            raise ValueError("Randomisation(values=..., factors=...): a parameter is in both")
+            raise ValueError("Randomization(values=..., factors=...): a parameter is in both")
         for field_, least in (("substeps", 1), ("delays", 0)):
             counts = getattr(self, field_)
             if isinstance(counts, str) or not isinstance(counts, Sequence):
-                raise TypeError(f"Randomisation({field_}=...): expected whole numbers, got {checks.shown(counts)}")
+                raise TypeError(f"Randomization({field_}=...): expected whole numbers, got {checks.shown(counts)}")
             for count in counts:
-                checks.whole_number(f"Randomisation({field_}=...)", count, least)
+                checks.whole_number(f"Randomization({field_}=...)", count, least)
         if self.kappa is not None:
-            low, high = checks.vector("Randomisation(kappa=...)", self.kappa, 2)
+            low, high = checks.vector("Randomization(kappa=...)", self.kappa, 2)
             if not 0.0 < low <= high:
-                raise ValueError(f"Randomisation(kappa=...): expected 0 < low <= high, got {self.kappa}")
-        checks.number("Randomisation(noise=...)", self.noise, at_least=0.0)
-        room_for("Randomisation(models=...)", self.models, 8.0 * (1 + len(self.values) + len(self.factors)))
+                raise ValueError(f"Randomization(kappa=...): expected 0 < low <= high, got {self.kappa}")
+        checks.number("Randomization(noise=...)", self.noise, at_least=0.0)
+        room_for("Randomization(models=...)", self.models, 8.0 * (1 + len(self.values) + len(self.factors)))
         if self.pushes is not None:
             if not isinstance(self.pushes, tuple | list) or len(self.pushes) != 2:
-                raise TypeError(f"Randomisation(pushes=...): expected (time, deviations), got {self.pushes!r}")
-            checks.number("Randomisation(pushes=...)", self.pushes[0], above=0.0)
-            checks.floats("Randomisation(pushes=...)", self.pushes[1])
+                raise TypeError(f"Randomization(pushes=...): expected (time, deviations), got {self.pushes!r}")
+            checks.number("Randomization(pushes=...)", self.pushes[0], above=0.0)
+            checks.floats("Randomization(pushes=...)", self.pushes[1])
 
 
 class Models:
     """The models of a randomisation, and those of the rows of an epoch."""
 
-    def __init__(self, task: Task, randomisation: Randomisation, rng: np.random.Generator) -> None:
-        self._task, self._given = task, randomisation
-        self._choices = randomisation.substeps or (task.substeps,)
-        sim, count = task.sim, randomisation.models
-        if randomisation.pushes is not None and np.size(randomisation.pushes[1]) > sim.nv:
+    def __init__(self, task: Task, randomization: Randomization, rng: np.random.Generator) -> None:
+        self._task, self._given = task, randomization
+        self._choices = randomization.substeps or (task.substeps,)
+        sim, count = task.sim, randomization.models
+        if randomization.pushes is not None and np.size(randomization.pushes[1]) > sim.nv:
             raise ValueError(
-                f"Randomisation(pushes=...): expected at most {sim.nv} deviations, as velocities, got "
-                f"{np.size(randomisation.pushes[1])}"
+                f"Randomization(pushes=...): expected at most {sim.nv} deviations, as velocities, got "
+                f"{np.size(randomization.pushes[1])}"
             )
         self._sims: dict[int, Simulator] = {}
         self._tables: dict[int, dict[str, Floats]] = {}
         for substeps in dict.fromkeys(self._choices):
             self._sims[substeps] = sim.replace(time_step=task.knot_time / substeps, kappa=sim.kappa)
             table = {}
-            for name, (low, high) in randomisation.values.items():
+            for name, (low, high) in randomization.values.items():
                 size = len(sim.parameters((name,)).values)
                 table[name] = np.repeat(rng.uniform(low, high, (count, 1)), size, axis=1)
-            for name, (low, high) in randomisation.factors.items():
+            for name, (low, high) in randomization.factors.items():
                 table[name] = rng.uniform(low, high, (count, 1)) * sim.parameters((name,)).values
             self._tables[substeps] = table
 
@@ -144,7 +144,7 @@ class Drawn:
         derivatives: bool = False,
         kappa: float | None = None,
         impulses: RowImpulses | None = None,
-    ) -> BatchStep:
+    ) -> StepBatch:
         """One action of every row, from states of the task to states of the task; a kappa instead of that of rows, and
         the impulses of the actions before, as for `Simulator.step_batch`.
 

@@ -1,0 +1,63 @@
+"""AdjustableSimulator: a simulator whose model changes in place, for loops that estimate it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sim.mechanism import checks
+from sim.mechanism.axes import contact_frame
+from sim.simulator.simulator import Simulator
+
+__all__ = ["AdjustableSimulator"]
+
+
+class AdjustableSimulator(Simulator):
+    """A simulator that its owner changes in place, because a new one for every measurement would take too long.
+
+    Only motions change: `mechanism`, `parameters`, `describe` and copies keep the values that it was made with.
+    """
+
+    @classmethod
+    def like(cls, sim: Simulator) -> AdjustableSimulator:
+        """A copy of a simulator.
+
+        Args:
+            sim: the simulator, which stays as it is.
+
+        Returns:
+            The copy.
+        """
+        return cls(*sim.__reduce__()[1])
+
+    def turn_ground(self, normal: ArrayLike) -> None:
+        """Turn the half-spaces under all contacts; heights along the normals stay.
+
+        Args:
+            normal: (3,) outward normal.
+
+        Raises:
+            ValueError: the normal is zero, a body that cannot move freely has a contact, or the simulator has steps of
+                a higher order or an accuracy.
+        """
+        call = "AdjustableSimulator.turn_ground"
+        unit = checks.direction(f"{call}(normal)", normal)
+        if np.any(self.model.contact_hold) or self.order != 2 or self.accuracy:
+            raise ValueError(f"{call}: expected steps of order 2, and contacts that move freely")
+        self._engine.turn_ground(contact_frame(unit))
+
+    def set_parameters(self, values: Mapping[str, ArrayLike]) -> None:
+        """Give parameters other values; those that are not named have the values that the simulator was made with.
+
+        Kappa stays. `with_parameters` returns a new simulator instead.
+
+        Args:
+            values: {name: value}, with the names of `parameters`.
+
+        Raises:
+            ValueError: for an unknown name, a value that no mechanism has, or one that changes the structure of the
+                model, such as a damper where there was none; the simulator has steps of a higher order or an accuracy.
+        """
+        self._by_parameters.adopt("AdjustableSimulator.set_parameters(values)", values)

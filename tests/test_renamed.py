@@ -1,0 +1,82 @@
+"""Old names work for one version, and say the new ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+
+SIM = dojo.Simulator(dojo.models.npendulum(2), time_step=0.02)
+X, US = SIM.neutral(), np.zeros((3, SIM.nu))
+Q, V = X[: SIM.nq], X[SIM.nq :]
+
+
+def swingup() -> dojo.Problem:
+    return dojo.Problem(SIM, X, 3, cost=dojo.cost.Effort(1.0))
+
+
+OLD: dict[str, tuple[Callable[[], Any], Callable[[], Any], str]] = {
+    "closed_loop": (lambda: SIM.closed_loop(X, US).x, lambda: SIM.rollout_feedback(X, US).x, "rollout_feedback"),
+    "start": (lambda: SIM.start(Q, V), lambda: SIM.state_from_velocity(Q, V), "state_from_velocity"),
+    "bodies": (lambda: SIM.bodies(Q, V), lambda: SIM.body_states(Q, V), "body_states"),
+    "trajectory.knot": (lambda: SIM.rollout(X, US).knot, lambda: 3, "Trajectory.solved_steps"),
+    "trajectory.substeps": (lambda: SIM.rollout(X, US).substeps, lambda: np.ones(3), "Trajectory.parts"),
+    "trajectory.shares": (lambda: SIM.rollout(X, US).shares, lambda: np.ones(3), "Trajectory.momentum_fractions"),
+    "step.substeps": (lambda: SIM.step(X).substeps, lambda: 1, "StepResult.parts"),
+    "step.share": (lambda: SIM.step(X).share, lambda: 1.0, "StepResult.momentum_fraction"),
+    "feedback.knot": (lambda: SIM.rollout_feedback(X, US).knot, lambda: 3, "FeedbackRollout.solved_knots"),
+    "batch.knot": (lambda: SIM.rollout_batch([X], [US]).knot, lambda: [3], "RolloutBatch.solved_steps"),
+    "keyword of ilqr": (
+        lambda: dojo.ilqr(swingup(), violation=1e-4, shooting=0.0).x,
+        lambda: dojo.ilqr(swingup(), violation_tolerance=1e-4, multiple_shooting_below=0.0).x,
+        "violation_tolerance=",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", OLD)
+def test_old_names_of_simulators_and_results(name: str) -> None:
+    old, new, word = OLD[name]
+    with pytest.warns(DeprecationWarning) as told:
+        found = old()
+    assert any(word in str(warning.message) and warning.filename == __file__ for warning in told)
+    np.testing.assert_array_equal(found, new())
+
+
+def test_old_names_of_modules() -> None:
+    for place, old, new in (
+        (dojo, "Sampled", dojo.SampledReference),
+        (dojo, "kernel", dojo.jit),
+        (dojo.models, "catalogue", dojo.models.catalog),
+        (dojo.learn, "Randomisation", dojo.learn.Randomization),
+    ):
+        with pytest.warns(DeprecationWarning, match=f"{old} is now .*{new.__name__}"):
+            assert getattr(place, old) is new
+    wrong, keywords = "Randomisations", {"randomisation": 3}
+    with pytest.raises(AttributeError, match=wrong):
+        getattr(dojo.learn, wrong)
+    with pytest.warns(DeprecationWarning, match="randomization="), pytest.raises(TypeError, match="randomization="):
+        dojo.learn.ars(dojo.learn.pendulum(), **keywords)  # type: ignore[arg-type]
+
+
+def test_files_of_trajectories_with_old_names(tmp_path: Any) -> None:
+    """A file from before the names changed has the same content under old keys."""
+    import json
+
+    motion = SIM.rollout(X, US)
+    motion.save(tmp_path / "new.npz")
+    with np.load(tmp_path / "new.npz") as file:
+        entries = dict(file)
+    old = {"parts": "substeps", "momentum_fractions": "shares"}
+    entries = {old.get(name, name): value for name, value in entries.items()}
+    (head,) = (name for name, value in entries.items() if value.dtype.kind in "US" and "solved_steps" in str(value))
+    content = json.loads(str(entries[head]))
+    content["knot"] = content.pop("solved_steps")
+    entries[head] = np.array(json.dumps(content))
+    np.savez(tmp_path / "old.npz", **entries)
+    again = dojo.Trajectory.load(tmp_path / "old.npz")
+    assert again.solved_steps == 3 and np.array_equal(again.parts, motion.parts)
