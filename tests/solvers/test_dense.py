@@ -8,16 +8,19 @@ from solvers import dense
 pytestmark = pytest.mark.kernel
 
 
-@pytest.mark.parametrize("n, p, m", [(1, 1, 1), (3, 4, 5), (7, 9, 2), (14, 14, 17), (12, 8, 6)])
+@pytest.mark.parametrize("n, p, m", [(1, 1, 1), (3, 4, 5), (7, 9, 2), (14, 14, 17), (12, 8, 6), (13, 6, 8), (9, 5, 23)])
 def test_add_mul_tn(n, p, m):
     rng = np.random.default_rng(0)
     A, B, start = rng.normal(size=(p, n)), rng.normal(size=(p, m)), rng.normal(size=(n, m))
-    out = start.copy()
+    memory = np.full(n * m + 16, np.nan)
+    out = memory[8:-8].reshape(n, m)
+    out[:] = start
     dense.add_mul_tn(A, B, out, False)
     np.testing.assert_allclose(out, start + A.T @ B, rtol=1e-12, atol=1e-12)
+    assert np.isnan(memory[:8]).all() and np.isnan(memory[-8:]).all()
 
 
-@pytest.mark.parametrize("p, n", [(1, 1), (4, 3), (6, 7), (14, 17), (8, 12)])
+@pytest.mark.parametrize("p, n", [(1, 1), (4, 3), (6, 7), (14, 17), (8, 12), (5, 8), (7, 22)])
 def test_add_mul_tn_symmetric(p, n):
     rng = np.random.default_rng(1)
     A, S = rng.normal(size=(p, n)), rng.normal(size=(p, p))
