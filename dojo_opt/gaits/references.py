@@ -235,7 +235,8 @@ def jump(
     speed = float(np.sqrt(2.0 * 9.81 * height))
     durations = before, 2.0 * crouch / speed, 2.0 * speed / 9.81, after
     sink, push, fly, rest = (max(1, round(min(d / h, 1e300))) for d in durations)
-    check_room(f"{call}: time steps", sink + 2 * push + fly + rest, 8.0 * sim.nx, "jump in less time")
+    each = 8.0 * (sim.nx + sim.ndx * (sim.ndx + sim.nu))  # with derivatives, which its torques and plans need
+    check_room(f"{call}: time steps", sink + 2 * push + fly + rest, each, "jump in less time")
     ends = np.cumsum([0, sink, push, fly, push, rest]) * h
     t = h * np.arange(-1, round(ends[-1] / h) + 1)
     forward, up = _jump_path(np.clip(t, 0.0, None), ends, distance, crouch, height)
