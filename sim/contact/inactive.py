@@ -6,8 +6,10 @@ large gap that force hardly changes within a step. Such a contact is inactive: i
 one direction are a cluster, tested as one ball.
 
 Of a cluster that is near, as the corners of a foot, those contacts are inactive whose e, for the n contacts of their
-body, is at most 1e-2: the matrix may omit it, as Newton's method converges all the same. Derivatives may not; they
-take these contacts as active (`all_stiff`).
+body, is at most 1e-2: the matrix may omit it, as Newton's method converges all the same. Of a cluster of many, as the
+corners of a mesh, e is added up over the inactive contacts, each at its own gap, and may be 0.1: the rollouts of a Go2
+on feet with 32 corners then need no more iterations. Derivatives may not omit them; they take these contacts as active
+(`all_stiff`).
 
 As a whole, a cluster is inactive when its stiffness, relative to the inertia behind it, is below the tolerance of the
 step:
@@ -41,11 +43,14 @@ from sim.mechanism.pack_clusters import STIFFNESS
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import StepOptions
-from sim.model.record_columns import Cluster, Inactive
+from sim.model.record_columns import Cluster, Inactive, Kin
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import rotate, three
 from solvers.types import Matrix
+
+_FEW = 8  # contacts of a cluster, as of a box, for which the nearest may stand for all
+_COUPLED_MANY = 0.1  # largest sum of e over the inactive contacts of a body with more
 
 
 @kernel
@@ -121,21 +126,52 @@ def choose_active(model: Model, data: Data, options: StepOptions) -> None:
 @kernel
 def _leave_out(model: Model, data: Data, options: StepOptions, c: int) -> float:
     """contact_out of the contacts of a cluster that hardly slow Newton's method down; half their least gap, or 0."""
-    p = model.cluster[c]
-    mu, h = p[Cluster.FRICTION], options.h
-    n = p[Cluster.CONTACTS] * options.kappa / COUPLED
-    b = 0.5 * n * h * (1.0 + mu) * p[Cluster.TURNING]
-    a = b + sqrt(b * b + n * (mu * mu + h * (1.0 + mu)) * p[Cluster.MOBILITY])
-    least = 2.0 * a + _travel(model, data, c)
-    found = False
+    travel, found = _travel(model, data, c), False
     for k in range(c, model.cluster_end[c]):
-        if contact_gap(model, data.pos2, data.rot2, k) > least:
+        data.contact_kin[k, Kin.GAP] = 0.5 * (contact_gap(model, data.pos2, data.rot2, k) - travel)
+    if model.cluster_end[c] - c > _FEW:
+        a = _radius_of_many(model, data, options, c)
+    else:
+        a = _radius_of_few(model, options, c)
+    for k in range(c, model.cluster_end[c]):
+        if data.contact_kin[k, Kin.GAP] > a:
             data.contact_out[k] = 1
             found = True
     if not found or not a < 1e300:
         return 0.0
     data.inactive[c, Inactive.STIFF] = 1.0
     return a
+
+
+@kernel
+def _radius_of_few(model: Model, options: StepOptions, c: int) -> float:
+    """Half gap a at which e of the contacts of a cluster is COUPLED, if all of its body were as near."""
+    p, h = model.cluster[c], options.h
+    mu = p[Cluster.FRICTION]
+    n = p[Cluster.CONTACTS] * options.kappa / COUPLED
+    b = 0.5 * n * h * (1.0 + mu) * p[Cluster.TURNING]
+    return b + sqrt(b * b + n * (mu * mu + h * (1.0 + mu)) * p[Cluster.MOBILITY])
+
+
+@kernel
+def _radius_of_many(model: Model, data: Data, options: StepOptions, c: int) -> float:
+    """Half gap a beyond which e of the contacts of a cluster, each at its own half gap in contact_kin, adds up to the
+    part of the cluster in _COUPLED_MANY; found from the furthest inwards.
+    """
+    end, furthest, nearest = model.cluster_end[c], 0.0, 1e300
+    for k in range(c, end):
+        furthest, nearest = max(furthest, data.contact_kin[k, Kin.GAP]), min(nearest, data.contact_kin[k, Kin.GAP])
+    left = _COUPLED_MANY * (end - c) / (model.cluster[c, Cluster.CONTACTS] * options.kappa)
+    a = furthest
+    while a > max(nearest, furthest / 64.0):
+        for k in range(c, end):
+            near = data.contact_kin[k, Kin.GAP]
+            if 0.7 * a < near <= a:
+                left -= _stiffness(model, options.h, c, near) / (near * near)
+        if not left >= 0.0:
+            return a
+        a *= 0.7
+    return a if a > 0.0 else 1e300
 
 
 @kernel

@@ -211,6 +211,28 @@ def test_corners_of_a_body_that_touches_are_inactive_one_by_one(rng):
     )
 
 
+def test_corners_of_a_mesh_count_with_their_own_gaps(rng):
+    """The stiffness of the inactive ones, relative to the inertia, adds up to a tenth at most, and nearly to that."""
+    points = rng.normal(size=(96, 3))
+    points *= 0.05 / np.linalg.norm(points, axis=1)[:, None]
+    contacts = [dojo.Contact("body0", p, friction=0.6) for p in points]
+    mech = dataclasses.replace(chain("floating", 0, gravity=(0.0, 0.0, -9.81)), contacts=contacts)
+    h, kappa = 0.01, 1e-7
+    sim = dojo.Simulator(mech, time_step=h, kappa=kappa, tolerance=1e-11)
+    x = sim.neutral()
+    x[2] = 1e-4 - points[:, 2].min()
+    sim.step(x, throw=True)
+    data = sim._engine.last()
+    active = data.active[: int(data.active_ground_count[0])]
+    inactive = np.setdiff1d(np.arange(96), active)
+    _, _, _, _, _, mobility, mu, turning, _ = sim.model.cluster[0]
+    a = 0.5 * (x[2] + points[inactive, 2])
+    e = kappa * ((mu**2 + h * (1.0 + mu)) * mobility / a**2 + h * (1.0 + mu) * turning / a)
+    assert 0.03 < e.sum() < 0.1
+    assert (x[2] + points[active, 2]).max() < (x[2] + points[inactive, 2]).min()
+    assert 0 < len(active) < 48
+
+
 def test_names_and_distances_of_omitted_contacts():
     mech = dataclasses.replace(
         block(), contacts=[*block().contacts, dojo.Contact("block", height=-50.0, name="wall", normal=(1.0, 0.0, 0.0))]
