@@ -1,6 +1,6 @@
-"""A local Dask cluster finds what one process finds, though a worker is killed while it works.
+"""A local Dask cluster finds what one process finds, though workers are killed while they work.
 
-Directions of random search are in test_learn.py, Monte Carlo studies in test_monte_carlo.py.
+One cluster for all studies: to start a worker takes longer than a study.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt.learn.registration import task_of
 
-_MOMENT = 0.05  # [s] after which the worker is killed
-_PATIENCE = 120.0  # [s] until both workers are there
+_MOMENT = 0.05  # [s] after which a worker is killed
+_PATIENCE = 120.0  # [s] until all workers are there
 
 
 def _plans(executor=None):
@@ -56,8 +56,22 @@ def _lift(executor=None):
     return [plan.u]
 
 
+def _directions(executor=None):
+    """Random search asks for the returns of its directions in every epoch."""
+    models = dojo.learn.Randomization(values={"mass:*": (0.9, 1.1)}, substeps=(1, 2), noise=0.02, models=3)
+    options = {"epochs": 4, "directions": 20, "randomization": models, "evaluations": 1, "episodes": 2}
+    return [dojo.learn.ars(task_of("Pendulum"), seed=3, executor=executor, **options).policy.weights]
+
+
+def _closed_loops(executor=None):
+    mpc = dojo.tasks.hopper_mpc(substeps=2)
+    sampler = dojo.Disturbances(7, velocity=0.15, push=(2.0, 4.0), push_time=(0.1, 0.2))
+    study = mpc.monte_carlo(dojo.tasks.plant(mpc, 5e-3), sampler, 0.3, runs=2, seed=2, executor=executor)
+    return [outcome.x for outcome in study.outcomes]
+
+
 class Killing:
-    """An executor that kills a worker soon after the first call."""
+    """An executor that kills a worker soon after the first call, which takes longer, as workers import their modules."""
 
     def __init__(self, executor, pid):
         self.executor, self.pid = executor, pid
@@ -74,16 +88,21 @@ class Killing:
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning", "ignore::UserWarning")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_a_cluster_finds_the_same_though_workers_are_killed():
+    """One worker is lost while directions are tried, another while plans are made; Dask may put others in their place."""
     distributed = pytest.importorskip("distributed")
-    for study in (_seeds, _starts, _plans):  # each on its own: Dask does not always put another worker in the place
-        with (
-            distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
-            distributed.Client(cluster) as client,
-        ):
-            client.wait_for_workers(2, timeout=_PATIENCE)
-            pid = next(iter(client.run(os.getpid).values()))
-            there = study(Killing(client.get_executor(), pid))
-            assert pid not in client.run(os.getpid).values(), study
+    with (
+        distributed.LocalCluster(n_workers=3, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        client.wait_for_workers(3, timeout=_PATIENCE)
+        pids = list(client.run(os.getpid).values())
+        pool, found = client.get_executor(), {}
+        for study, lost in ((_directions, pids[0]), (_plans, pids[1])):
+            found[study] = study(Killing(pool, lost))
+            assert lost not in client.run(os.getpid).values(), study
+        for study in (_seeds, _starts, _closed_loops):
+            found[study] = study(pool)
+    for study, there in found.items():
         for a, b in zip(study(), there, strict=True):
             np.testing.assert_array_equal(a, b, err_msg=study.__name__)
 

@@ -58,12 +58,14 @@ def test_people_watch_in_the_browser(monkeypatch):
         view.show(np.zeros(2))
 
 
+# one of each kind of state and observation: joints, commands, waypoints, forces of contacts, Dojo's own observation
+KINDS = ("HalfCheetah", "Quadruped", "QuadrotorWaypoint", "Ant, forces", "AntArs")
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*NAMES, "Ant, forces"])
-def test_every_batch_is_its_environments_one_by_one(name):
+@pytest.mark.parametrize("name", KINDS)
+def test_batches_of_every_kind_are_their_environments_one_by_one(name):
     """Ten actions from the seeds of the batch, in Gymnasium's own SyncVectorEnv."""
-    if name == "Go2" and not has_robots():
-        pytest.skip("example-robot-data is not installed")
     options = {"include_cfrc_ext_in_observation": True} if name.endswith("forces") else {}
     made = f"dojo_opt.learn:dojo/{name.partition(',')[0]}-v0"
     batch = gymnasium.make_vec(made, num_envs=2, **options)

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import io
-import os
-import signal
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
-from threading import Timer
 
 import numpy as np
 import pytest
@@ -274,32 +271,6 @@ def test_workers_find_the_same_policies(task):
         np.testing.assert_array_equal(run.state["sums"], other.state["sums"])
         assert run.policy.task is task and (run.steps, run.best) == (other.steps, other.best)
     assert np.abs(runs[0].policy.weights - runs[1].policy.weights).max() > 1e-6
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning", "ignore::UserWarning")
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-def test_a_dask_cluster_finds_the_same_policy_though_a_worker_is_killed(task):
-    distributed = pytest.importorskip("distributed")
-    options = {"epochs": 4, "directions": 40, "randomization": MODELS, "evaluations": 1, "episodes": 2}
-    alone = dojo.learn.ars(task, seed=3, **options)
-    with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        first, killed = client.run(os.getpid), []
-
-        def kill(record):
-            if record["epoch"] == 2:  # while the calls of the third are under way
-                killed.append(next(iter(first.values())))
-                Timer(0.02, os.kill, (killed[0], signal.SIGKILL)).start()
-
-        together = dojo.learn.ars(task, seed=3, executor=client.get_executor(), callback=kill, **options)
-        client.wait_for_workers(2)
-        assert killed[0] not in client.run(os.getpid).values()
-    np.testing.assert_array_equal(together.policy.weights, alone.policy.weights)
-    np.testing.assert_array_equal(together.state["sums"], alone.state["sums"])
-    assert (together.steps, together.best) == (alone.steps, alone.best)
 
 
 @pytest.mark.slow

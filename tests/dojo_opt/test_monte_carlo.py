@@ -77,20 +77,3 @@ def test_monte_carlo_of_mpc_is_the_same_in_processes():
     _same(here, there)
     assert here.milliseconds.size == 3 * 7
     assert np.isfinite(here.rms).all()
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning", "ignore::UserWarning")
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-def test_monte_carlo_is_the_same_on_a_dask_cluster():
-    distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        mpc = dojo.tasks.hopper_mpc(substeps=2)
-        plant = dojo.tasks.plant(mpc, 5e-3)
-        sampler = dojo.Disturbances(7, velocity=0.15, push=(2.0, 4.0), push_time=(0.1, 0.2))
-        here = mpc.monte_carlo(plant, sampler, 0.3, runs=2, seed=2)
-        there = mpc.monte_carlo(plant, sampler, 0.3, runs=2, seed=2, executor=client.get_executor())
-    _same(here, there)
