@@ -38,7 +38,7 @@ _DAMPER = 0.12  # share of the usual damper of a gait
 _BEND, _LEAD = 0.7, 0.032  # [rad], [m]
 _HARD = 0.1  # of the kappa of plans: the equilibrium whose torques are the reference
 _UPRIGHT, _ABOUT = np.eye(4)[[0, 3]]  # quaternions: no turn, half a turn about z
-_CAREFUL = 0.9  # share of the friction that plans assume
+_CAREFUL = 0.75  # share of the friction that plans assume
 
 
 class SteppingPose(Lead):
@@ -113,8 +113,9 @@ def humanoid_mpc(
     1 and .03; all of them ten times as much at the end. The slip of feet near the ground weighs 34, torques 1e-6
     around those of the stance. Other robots have these weights in units of their height and weight. Plans are made at
     a kappa of .11 N s m for Atlas: there the ground acts on feet centimetres before they touch it, and with half of it
-    the robot falls more often. With a tenth of the weight of the slip it walks as fast, and slides its feet. The gains
-    of the plans act on the plant, whose contact is hard.
+    the robot falls more often. With a tenth of the weight of the slip it walks as fast, and slides its feet. Plans
+    assume three quarters of the friction, and torques within the limits of the inputs. Their gains act on the plant,
+    whose contact is hard.
 
     Args:
         velocity: (3,) velocity forward and to the left, and rate of the heading [m/s, m/s, rad/s].
@@ -153,8 +154,11 @@ def humanoid_mpc(
     bends = np.pad(legs.bends(), ((0, 0), (0, sim.nv)))
     command = checks.array(f"{call}(velocity)", velocity, (3,))
     march = SteppingPose(pose, command, _LEAD * size, bends, (cycle, _SWING, bend))
-    problem = Problem(sim, pose, _HORIZON, cost=cost, controls0=held)
+    limits = sim.mechanism.input_limits
+    bounded = limits if np.isfinite(limits).any() else None
+    problem = Problem(sim, pose, _HORIZON, cost=cost, control_limits=bounded, controls0=np.clip(held, *limits))
     usual: dict[str, Any] = {"iterations": _ITERATIONS, "kappa": kappa}
+    usual |= {"friction": _CAREFUL * min(contact.friction for contact in sim.mechanism.contacts)}
     usual |= {"first": Options(stages=(Stage(kappa, kappa),))}
     return MPC(problem, reference={0: march}, **{**usual, **settings})
 
