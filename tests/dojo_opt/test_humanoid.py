@@ -1,5 +1,8 @@
 """`tasks.humanoid_mpc`: a cadence and a velocity, and no footholds."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,6 +10,12 @@ import dojo_opt as dojo
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.legs import Legs
 from dojo_opt.tasks.walking import SteppingPose
+from support.benchmark import loaded
+
+
+@pytest.fixture(scope="module")
+def bench():
+    yield from loaded("humanoids")
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +60,40 @@ def test_a_robot_on_four_feet_is_refused():
         dojo.tasks.humanoid_mpc(robot=dojo.models.quadruped())
     with pytest.raises(ValueError, match="velocity"):
         dojo.tasks.humanoid_mpc((0.3, 0.0))
+
+
+def test_plans_know_the_limits_of_the_inputs(legs):
+    """A robot with limits of torque plans within them; Atlas has none."""
+    assert dojo.tasks.humanoid_mpc().problem.control_limits is None
+    weak = [replace(part, limits=(-300.0, 300.0)) for part in legs.mechanism.inputs]
+    mpc = dojo.tasks.humanoid_mpc(robot=replace(legs.mechanism, inputs=weak))
+    np.testing.assert_array_equal(np.abs(mpc.problem.control_limits), 300.0)
+    assert [contact.friction for contact in mpc.sim.mechanism.contacts] == pytest.approx([0.75 * 0.8] * 8)
+
+
+def test_the_benchmark_measures_speed_along_the_path(bench):
+    """A base that runs a circle of 1.5 m radius at .3 m/s, and turns with it; of a robot that fell nothing counts."""
+    time = np.arange(0.0, 10.0, 1e-3)
+    x = np.zeros((time.size, 14))
+    x[:, 0], x[:, 1] = 1.5 * np.sin(0.2 * time), 1.5 * (1.0 - np.cos(0.2 * time))
+    x[:, 3], x[:, 6] = np.cos(0.1 * time), np.sin(0.1 * time)
+    loop = SimpleNamespace(x=x, simulator=SimpleNamespace(time_step=1e-3), survived=True)
+    assert bench.speeds(loop) == (pytest.approx(0.3, rel=1e-3), pytest.approx(0.2, rel=1e-3))
+    assert not bench.succeeds("walk_4", loop) and not bench.succeeds("turn", loop)  # no turn, and .4 rad/s
+    x[:, 3], x[:, 6] = 1.0, 0.0
+    x[:, 0], x[:, 1] = 0.45 * time, 0.0
+    assert bench.succeeds("walk_4", loop) and not bench.succeeds("walk_2", loop)
+    loop.survived = False
+    assert not bench.succeeds("walk_4", loop)
+
+
+def test_uneven_ground_is_level_at_the_start_and_as_rough_as_it_says(bench):
+    ground = bench.uneven(np.random.default_rng(0))
+    at = np.linspace(-3.0, 3.0, 121)
+    x, y = (part.ravel() for part in np.meshgrid(at, at))
+    z = ground.height(x, y)
+    assert 0.045 < np.ptp(z) < 0.055
+    assert np.abs(z[np.hypot(x, y) < 0.4]).max() < 1e-3
 
 
 @pytest.mark.slow
