@@ -39,7 +39,6 @@ Stack = NDArray[np.float64]
 _SCALES = (1.0, 0.5, 0.0)  # of the gains of the rollouts that guess="feedback" chooses from
 _ROUNDING = 1e-9  # [s] times are sums of floating-point steps
 _LOST = 10.0  # times the merit of the guess of a tick: a rollout worse than that has left it
-_PATIENCE = 3  # ticks in a row without a new plan, after which a tick begins with rollouts
 
 __all__ = ["MPC"]
 
@@ -49,8 +48,7 @@ class MPC:
 
     A tick shifts the plan by the elapsed time and keeps its states as the guess, with the measured state in front: the
     disturbance is then the first gap, which the iteration closes. (A rollout of the shifted inputs would fall over
-    together with the robot.) If the planner rejects a plan, the previous one stays in force; after three ticks of that
-    the next one begins with rollouts from the measured state. `log` has one `Tick` per
+    together with the robot.) If the planner rejects a plan, the previous one stays in force. `log` has one `Tick` per
     plan; `estimator` has the parameters that `adapt` names, None without.
 
     Args:
@@ -287,10 +285,11 @@ class MPC:
     def _guess(self, shifted: Policy) -> Iterate | None:
         """First trajectory of a tick: the shifted plan, or the best rollout under its gains or a share of them.
 
-        A plan that has been in force for several ticks is no guess of states any more.
+        A plan that has been in force for `patience` ticks is no guess of states any more.
         """
-        solver = self._solver
-        stalled = len(self.log) >= _PATIENCE and all(tick.fallback for tick in self.log[-_PATIENCE:])
+        solver, patience = self._solver, self.settings.patience
+        stalled = patience is not None and len(self.log) >= patience
+        stalled = stalled and all(tick.fallback for tick in self.log[-patience:])
         if self.settings.guess == "states" and not stalled:
             xs = shifted.x.copy()
             xs[0] = self.problem.start

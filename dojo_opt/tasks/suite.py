@@ -169,9 +169,9 @@ def timed(rate: float) -> dict[str, Any]:
         rate: plans per second [Hz].
 
     Returns:
-        `period` and `computation`.
+        `period`, `computation` and `patience`.
     """
-    return {"period": 1.0 / rate, "computation": 1.0 / rate}
+    return {"period": 1.0 / rate, "computation": 1.0 / rate, "patience": 3}
 
 
 def quadratic(

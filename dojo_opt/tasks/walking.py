@@ -157,7 +157,7 @@ def humanoid_mpc(
     limits = sim.mechanism.input_limits
     bounded = limits if np.isfinite(limits).any() else None
     problem = Problem(sim, pose, _HORIZON, cost=cost, control_limits=bounded, controls0=np.clip(held, *limits))
-    usual: dict[str, Any] = {"iterations": _ITERATIONS, "kappa": kappa}
+    usual: dict[str, Any] = {"iterations": _ITERATIONS, "kappa": kappa, "patience": 3}
     usual |= {"friction": _CAREFUL * min(contact.friction for contact in sim.mechanism.contacts)}
     usual |= {"first": Options(stages=(Stage(kappa, kappa),))}
     return MPC(problem, reference={0: march}, **{**usual, **settings})

@@ -23,6 +23,7 @@ from support.standing_hopper import HOPPER, standing_problem
         ({"period": 0.0}, "period"),
         ({"gain_scale": float("nan")}, "gain_scale"),
         ({"friction": -0.1}, "friction"),
+        ({"patience": 0}, "patience"),
     ],
 )
 def test_settings_are_checked(settings, message):
@@ -52,6 +53,26 @@ def test_plans_once_per_period_and_one_iteration_each():
     assert all(t.contacts == ("foot",) for t in mpc.log)
     assert mpc.log[3].error.shape == (7,)
     assert np.abs(loop.x[-1, :8] - HOPPER.neutral()[:8]).max() < 5e-3
+
+
+@pytest.mark.parametrize(("patience", "begun"), [(None, [0, 0, 0, 0, 0]), (2, [0, 0, 3, 3, 3])])
+def test_stalled_ticks_begin_with_rollouts_after_the_patience(monkeypatch, patience, begun):
+    """The first plan counts as a new one; rollouts under the gains, half of them, and none are compared."""
+    mpc = dojo.MPC(standing_problem(), patience=patience)
+    x = HOPPER.neutral()
+    mpc(0.0, x)
+    rollouts = []
+    roll = mpc._solver.rollout
+    monkeypatch.setattr(mpc._solver, "rollout", lambda *given: (rollouts.append(1), roll(*given))[1])
+    monkeypatch.setattr(mpc, "_usable", lambda result, guess: False)
+    monkeypatch.setattr(mpc, "_rolled", lambda guess, K: None)
+    counts = []
+    for tick in range(1, 6):
+        del rollouts[:]
+        mpc(tick * mpc.period, x)
+        counts.append(len(rollouts))
+        assert mpc.log[-1].fallback
+    assert counts == begun
 
 
 def test_runs_are_the_same_again_and_after_pickling():

@@ -90,7 +90,7 @@ def reposing(
     )
     problem = Problem(sim, start, HORIZON, cost=[quadratic(goal, 1.0, HORIZON, running, end), *terms])
     given: dict[str, Any] = {"period": 1.0 / _RATE, "iterations": 2, "servo": own, "gain_scale": 0.0}
-    given |= {"kappa": _KAPPA, "friction": _FRICTION}
+    given |= {"kappa": _KAPPA, "friction": _FRICTION, "patience": 3}
     given |= {"first": Options(stages=(Stage(_KAPPA, _KAPPA),), max_iterations=20)}
     placing = Placing(slice(0, 7), trial.goal, aim.near, aim.turned, aim.period)
     return SuiteTask(
