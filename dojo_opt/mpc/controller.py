@@ -288,8 +288,8 @@ class MPC:
         A plan that has been in force for `patience` ticks is no guess of states any more.
         """
         solver, patience = self._solver, self.settings.patience
-        stalled = patience is not None and len(self.log) >= patience
-        stalled = stalled and all(tick.fallback for tick in self.log[-patience:])
+        last = self.log[-patience:] if patience else []
+        stalled = len(last) == patience and all(tick.fallback for tick in last)
         if self.settings.guess == "states" and not stalled:
             xs = shifted.x.copy()
             xs[0] = self.problem.start
