@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,20 +22,39 @@ from sim.simulator.simulator import Simulator
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-__all__ = ["Lead", "free_gait_mpc"]
+__all__ = ["GaitWeights", "Lead", "free_gait_mpc"]
 
-_KNOT, _HORIZON, _ITERATIONS = 0.025, 20, 2  # [s], knots, per tick
+_HORIZON, _ITERATIONS = 20, 2  # knots, per tick
 _KAPPA = 1e-2  # [N s m] at 3e-3 and below the robot leans forward and stands: no gradient lifts a foot
 _POSE = (20.0, 20.0, 80.0, 10.0, 10.0, 10.0)  # [1/m^2], [1/rad^2] of the trunk; joints weigh 1
 _SETTLING = 30.0  # weights of coordinates over those of their rates
 _END = 10.0  # times the weights, at the end
-_ALIKE = 1e-2  # [1/(N m)^2]
-_SLIP, _NEAR = 3.0, 0.03  # [1/(m/s)^2], [m]
 _SERVO = 40.0, 1.0  # [N m/rad], [N m s/rad]
 _DIAGONAL = ((0, 3), (1, 2))  # legs in the order of the inputs
 _LEAD, _AHEAD = 0.35, 1.0  # [m], [s] with .35 m a robot that is asked for .6 m/s walks at .45 to .5
 _CAREFUL = 0.75  # share of the friction that plans assume: with half of it a robot on a slope expects to creep
 _LEG = 3  # inputs of a leg: hip, thigh and calf
+
+
+class GaitWeights(NamedTuple):
+    """Weights of the costs of a gait.
+
+    Attributes:
+        pose: factor of those of the trunk (default 1).
+        effort: of torques [1/(N m)^2] (default 2e-4).
+        slip: of the speed of feet near the ground [1/(m/s)^2] (default 3).
+        near: height that counts as near [m] (default .03).
+        alike: of differences of torques between diagonal legs [1/(N m)^2] (default .01).
+    """
+
+    pose: float = 1.0
+    effort: float = 2e-4
+    slip: float = 3.0
+    near: float = 0.03
+    alike: float = 1e-2
+
+
+_WEIGHTS = GaitWeights()
 
 
 class Lead:
@@ -101,14 +120,15 @@ def free_gait_mpc(
     *,
     robot: Mechanism | None = None,
     lead: float | None = None,
-    effort: float = 2e-4,
+    knot: float = 0.025,
+    weights: GaitWeights = _WEIGHTS,
     **settings: Any,
 ) -> MPC:
     """A quadruped walks at a commanded velocity without a given gait, footholds or swings: 20 knots of 25 ms at 40 Hz.
 
     The reference is one standing pose that moves forward, see `Lead`. Squares of the trunk's position weigh 20, of its
     height 80, of its rotation 10, of joint angles 1, rates a thirtieth of that, all of them ten times as much at the
-    end; torques weigh `effort`, the slip of feet near the ground 3, differences of torques between diagonal legs .01.
+    end; torques weigh 2e-4, the slip of feet near the ground 3, differences of torques between diagonal legs .01.
     Costs are those of Kim et al. 2023 (arXiv 2312.08961), but for a slip that weighs three times as much, and no term
     for long swings. Plans are made at a kappa of .01, where contact acts at a distance of a centimetre; this smoothing
     lets a foot leave the ground. Servos follow them on the plant, whose contact is hard. Plans assume three quarters of
@@ -119,7 +139,8 @@ def free_gait_mpc(
         robot: a mechanism with the joints and inputs of `models.quadruped` (default None: that).
         lead: largest distance from the robot to the pose that it follows [m] (default None: that of one second, and .35
             at least).
-        effort: weight of the torques [1/(N m)^2].
+        knot: length of a knot [s].
+        weights: weights of the costs.
         **settings: settings of `dojo.MPC`.
 
     Returns:
@@ -129,19 +150,19 @@ def free_gait_mpc(
         TypeError: for an unknown setting.
         ValueError: for an argument of the wrong shape or out of range, or a robot with other inputs.
     """
-    sim = Simulator(models.quadruped() if robot is None else robot, time_step=_KNOT, kappa=_KAPPA)
+    sim = Simulator(models.quadruped() if robot is None else robot, time_step=knot, kappa=_KAPPA)
     if sim.nu != 4 * _LEG or sim.nv != 6 + sim.nu:
         raise ValueError(
             f"tasks.free_gait_mpc(robot=...): expected a floating base and 12 driven joints, got {robot!r}"
         )
     pose = Feet(sim).put_down(sim.neutral())
-    weight = np.array([*_POSE, *np.ones(sim.nu)])
+    weight = np.array([*(weights.pose * np.array(_POSE)), *np.ones(sim.nu)])
     running = np.concatenate([weight, weight / _SETTLING])
     cost = [
         Tracking(pose, np.vstack([np.tile(running, (_HORIZON, 1)), _END * running])),
-        Effort(effort),
-        Slip(weight=_SLIP, near=_NEAR),
-        _alike(sim),
+        Effort(weights.effort),
+        Slip(weight=weights.slip, near=weights.near),
+        _alike(sim, weights.alike),
     ]
     problem = Problem(sim, pose, _HORIZON, cost=cost, controls0=equilibrium(sim, pose)[1])
     command = checks.array("tasks.free_gait_mpc(velocity)", velocity, (3,))
@@ -152,7 +173,7 @@ def free_gait_mpc(
     return MPC(problem, reference={0: Lead(pose, command, ahead)}, **{**usual, **settings})
 
 
-def _alike(sim: Simulator) -> ResidualCost:
+def _alike(sim: Simulator, weight: float) -> ResidualCost:
     """sum_t w |u_a - u_b|^2 over thighs and calves of diagonal legs a and b."""
     rows = np.zeros((2 * len(_DIAGONAL), sim.nu))
     for i, (a, b) in enumerate(_DIAGONAL):
@@ -172,4 +193,4 @@ def _alike(sim: Simulator) -> ResidualCost:
             for j in range(nu):
                 out[i, ndx + j] = rows[i, j]
 
-    return ResidualCost(difference, count, _ALIKE, slope, knots=range(_HORIZON))
+    return ResidualCost(difference, count, weight, slope, knots=range(_HORIZON))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dojo_opt.plant.closed_loop import ClosedLoop
-from dojo_opt.tasks.free_gait import free_gait_mpc
+from dojo_opt.tasks.free_gait import GaitWeights, free_gait_mpc
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
 from dojo_opt.tasks.suite import SuiteTask
 from sim.mechanism.checks import whole_number
@@ -25,9 +25,10 @@ _RATE = 60.0  # [Hz]
 _WAY, _LOW, _TILT = 3.2, 0.15, 0.5  # [m] in 10 s, [m] and [rad] of the trunk
 _STANCE = (0.0, -0.8, 1.6)  # [rad] abduction, hip, knee
 _EFFORT = (18.0, 18.0, 26.0)  # [N m]
-_FRICTION = 0.3  # assumed by plans, against slip on the .67 of the plant
-_TORQUE = 5e-4  # [1/(N m)^2]
-_SERVO = 50.0, 2.0  # [N m/rad], [N m s/rad]
+_FRICTION = 0.4  # assumed by plans, against slip on the .67 of the plant
+_KNOT = 0.02  # [s]
+_WEIGHTS = GaitWeights(pose=10.0, effort=1e-4, slip=10.0, near=0.01, alike=0.05)
+_SERVO = 50.0, 1.0  # [N m/rad], [N m s/rad]
 _HILL, _FIRST, _APART, _ROUND = 0.05, 2.0, 1.0, 1.0  # [m] height, place, distance and radius of hills
 _GRID = 0.01  # [m]
 _LEGS = {"fl": (1.0, 1.0), "fr": (1.0, -1.0), "hl": (-1.0, 1.0), "hr": (-1.0, -1.0)}
@@ -112,20 +113,21 @@ def mechanism(friction: float, terrain: Terrain | None = None) -> Mechanism:
 
 
 def mini_cheetah(*, speed: float = 0.4, terrain: Terrain | None = None, **settings: Any) -> SuiteTask:
-    """Walk along x at .4 m/s: 20 knots of 25 ms at 60 Hz, without a contact schedule.
+    """Walk along x at .4 m/s: 20 knots of 20 ms at 60 Hz, without a contact schedule.
 
     A run of 10 s is a success if the trunk advances 3.2 m (in proportion at other speeds) and stays above .15 m, with
     roll and pitch below .5 rad. The trunk has no contacts, because a robot that lies has failed before. The feet start
     on the ground; in the publication they start 5.5 mm inside it.
 
     With hard contact the publication's cost is least for a robot that leans forward and stands. The cost is therefore
-    that of `tasks.free_gait_mpc`, with knots half as long, and plans assume a friction of .3. They act at once: with a
-    delay of one tick the robot jumps at the start. It walks on our plant, and falls on MuJoCo's: dampers of 2 N m s/rad
-    are too large for torques that are held for 1 ms, and the joints chatter.
+    that of `tasks.free_gait_mpc`, with ten times the weights of the trunk, half that of torques, and 10 for slip. Plans
+    make two iterations per tick, assume a friction of .4, and act at once, without the publication's delay of one tick.
+    They take the ground for a plane whose slope is estimated from the stance feet. Dampers of servos have 1 N m s/rad
+    instead of 2, with which the joints chatter when torques are held for 1 ms.
 
     Args:
         speed: speed of the nominal motion [m/s].
-        terrain: the ground of the plant and of the model (default None: level).
+        terrain: the ground of the plant, which plans do not know (default None: level).
         **settings: settings of `dojo.MPC`, instead of the ones of the task.
 
     Returns:
@@ -135,11 +137,15 @@ def mini_cheetah(*, speed: float = 0.4, terrain: Terrain | None = None, **settin
         TypeError: for an unknown setting.
         ValueError: for an argument out of range.
     """
-    own = mechanism(2.0 / 3.0, terrain)
     given: dict[str, Any] = {"period": 1.0 / _RATE, "servo": _SERVO, "friction": _FRICTION}
-    given["learn_ground"] = terrain is not None
-    mpc = free_gait_mpc((speed, 0.0, 0.0), robot=own, effort=_TORQUE, **{**given, **settings})
-    model = Simulator(own, time_step=1e-3, kappa=1e-8)
+    mpc = free_gait_mpc(
+        (speed, 0.0, 0.0),
+        robot=mechanism(2.0 / 3.0),
+        knot=_KNOT,
+        weights=_WEIGHTS,
+        **{**given, **settings},
+    )
+    model = Simulator(mechanism(2.0 / 3.0, terrain), time_step=1e-3, kappa=1e-8)
     spread = np.array([0.05, 0.05, 0.01, 0.05, 0.05, 0.05] + [0.1] * 12 + [0.1] * 18)
     judge = _Walked(_WAY * speed / 0.4)
     return SuiteTask("idto.mini_cheetah", mpc, model, mpc.start, 10.0, spread, judge, _RATE, rise=2)
@@ -166,10 +172,11 @@ def hills(count: int) -> Terrain:
 
 
 def mini_cheetah_hills(*, count: int = 5, speed: float = 0.4, **settings: Any) -> SuiteTask:
-    """Walk over five hills of 50 mm, 1 m apart, at .4 m/s: `mini_cheetah` on that ground, which plans know.
+    """Walk over five hills of 50 mm, 1 m apart, at .4 m/s: `mini_cheetah` on that ground, which plans take for a plane.
 
     A run of 20 s is a success if the trunk passes the last hill, at x = 6.5 m (in proportion at other speeds), and
-    stays above .15 m, with roll and pitch below .5 rad.
+    stays above .15 m, with roll and pitch below .5 rad. The robot feels the hills with its feet only; plans of the
+    publication know them.
 
     Args:
         count: number of hills.
