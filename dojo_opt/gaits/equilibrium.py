@@ -17,6 +17,7 @@ _STEP = 1e-5
 _EVEN = 1e-6  # weight of the sharing of the load against its balance
 _RANK = 1e-7  # singular values below are the noise of differences: balls under one rigid foot do not move one by one
 _ROUNDS = 20
+_LEFT = 1e-3  # largest imbalance, as a share of the weight
 _FEW = 8  # contacts that a message names
 _NEAR = 0.01  # [m] contacts may carry that are not further from the ground than the nearest by more than this
 _LOWEST = (_NEAR, 1e-3, 1e-4)  # [m] likewise, than the nearest of their body: of a round hull few corners touch at once
@@ -138,7 +139,7 @@ def _held(sim: Simulator, state: Array, left: Array, by: str) -> Array:
     """(nu,) inputs that balance the generalised forces `left` (nv,).  ValueError: those that have no input remain."""
     B = input_map(sim)
     free = ~B.any(axis=1)
-    if np.abs(left[free]).max(initial=0.0) > 1e-3 * np.abs(potential_gradient(sim, state)).max(initial=0.0):
+    if np.abs(left[free]).max(initial=0.0) > _LEFT * np.abs(potential_gradient(sim, state)).max(initial=0.0):
         k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
         raise ValueError(
             f"equilibrium({sim.mechanism.name}): the {by} cannot balance the weight: {left[k]:.3g} N (or N m) is left "
@@ -189,15 +190,16 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         return state, _held(sim, state, potential_gradient(sim, state) - stop_torques(sim, state), "inputs")
     feet, weight = Feet(sim, names), float(np.abs(potential_gradient(sim, state)).max())
     for near in _LOWEST:
-        state, force = _standing(sim, feet, state, (free, near), iterations)
-        gap = feet.gaps(state)
-        if gap.min() > 0.0:
+        found, force = _standing(sim, feet, state, (free, near), iterations)
+        gap = feet.gaps(found)
+        left = potential_gradient(sim, found) - stop_torques(sim, found) - _under(feet, found)[1].T @ force
+        if gap.min() > 0.0 and np.abs(left[free]).max(initial=0.0) <= _LEFT * weight:
             break
     if gap.min() <= 0.0:
         name = feet.names[int(gap.argmin())]
         raise ValueError(f"equilibrium({mech.name}): {name!r} is {-gap.min():.3g} m deep in the ground near x")
-    _, up, cosine = _under(feet, state)
-    left = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ force
+    state = found
     u = _held(sim, state, left, f"vertical forces at {_named(feet.names)}")
+    cosine = _under(feet, state)[2]
     _check_friction(mech.name, feet, cosine, np.where(force > 1e-3 * weight, force, 0.0))
     return state, u

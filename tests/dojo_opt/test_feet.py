@@ -184,3 +184,31 @@ def test_round_hulls_stand_on_the_corners_that_are_lowest():
     state, u = dojo.equilibrium(sim)
     after = sim.rollout(state, np.tile(u, (5, 1)), throw=True).x[-1]
     assert np.abs(sim.difference(after, state)).max() < 1e-5
+
+
+def test_a_robot_whose_trunk_has_corners_too_stands_on_its_feet():
+    """With all corners within 1 cm of the ground, Newton's method finds no balance; then fewer may carry."""
+    rng = np.random.default_rng(5)
+
+    def hull(radius: float) -> dojo.Polytope:
+        corners = rng.normal(size=(16, 3))
+        corners *= radius / np.linalg.norm(corners, axis=1)[:, None]
+        return dojo.Polytope(np.vstack([corners, -corners]))
+
+    bodies = [dojo.Body("trunk", 4.0, np.diag([0.1, 0.1, 0.1]), shape=hull(0.15))]
+    joints = [dojo.Joint("floating", None, "trunk")]
+    for k, (x, y) in enumerate([(0.3, 0.2), (0.3, -0.2), (-0.3, 0.2), (-0.3, -0.2)]):
+        bodies.append(dojo.Body(f"foot{k}", 0.2, shape=hull(0.03)))
+        hip, knee = (x, y, -0.05), (0.05, 0.0, 0.2)
+        joints.append(
+            dojo.Joint("revolute", "trunk", f"foot{k}", parent_point=hip, child_point=knee, axis=(0.0, 1.0, 0.0))
+        )
+    mech = dojo.Mechanism(bodies, joints).on(dojo.Terrain(), bodies=[body.name for body in bodies])
+    sim = dojo.Simulator(mech, time_step=0.01)
+    state, u = dojo.equilibrium(sim)
+    after = sim.rollout(state, np.tile(u, (5, 1)), throw=True)
+    assert np.abs(sim.difference(after.x[-1], state)).max() < 1e-9
+    carrying = after.contacts.impulse[-1, :, 2] > 1e-3
+    assert {contact.body for contact, on in zip(mech.contacts, carrying, strict=True) if on} <= {
+        f"foot{k}" for k in range(4)
+    }
