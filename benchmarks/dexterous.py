@@ -52,7 +52,7 @@ def plant_of(task: Any, kind: str) -> Any:
         return task.plant()
     from benchmarks.engines.mujoco_plant import MujocoPlant
 
-    return MujocoPlant(task.model, task.begin())
+    return MujocoPlant(task.model, task.initial_state())
 
 
 def line(case: str, kind: str, trials: int, seconds: float | None) -> tuple[list[Cell], list[Any]]:

@@ -74,7 +74,7 @@ def starts(task: Any, kind: str, perturbed: range) -> list[Any]:
     from benchmarks.engines.mujoco_plant import MujocoPlant
 
     options = {"cone": "elliptic", "impratio": "10"} if kind == FIRM else {}
-    return [MujocoPlant(task.model, task.begin(seed), **options) for seed in seeds]
+    return [MujocoPlant(task.model, task.initial_state(seed), **options) for seed in seeds]
 
 
 def line(task: Any, kind: str, perturbed: range, seconds: float | None) -> tuple[list[Cell], list[Any]]:

@@ -180,7 +180,11 @@ def _run_suite(args: argparse.Namespace) -> int:
         dojo.viewer.save_html(loop, args.html)
     numbers = {"task": args.name, "success": outcome.success, "survived": loop.survived, "message": loop.message}
     numbers |= {"seconds": loop.duration, "measures": outcome.measures, "ticks": len(loop.log)}
-    numbers |= {"tick_median_ms": outcome.median, "tick_99_ms": outcome.late, "fallbacks": outcome.fallbacks}
+    numbers |= {
+        "tick_median_ms": outcome.tick_median_ms,
+        "tick_99_ms": outcome.tick_99_ms,
+        "fallbacks": outcome.fallbacks,
+    }
     numbers |= {"rate_hz": task.rate, "penetration_mm": 1e3 * outcome.penetration}
     if args.json:
         print(json_text(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()}))
@@ -188,7 +192,7 @@ def _run_suite(args: argparse.Namespace) -> int:
         print(f"{'success' if outcome.success else 'no success'}: {loop.message}")
         print("  " + ", ".join(f"{measure} {value:.3g}" for measure, value in outcome.measures.items()))
         ticks = "ticks at {rate_hz:g} Hz: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms of the processor"
-        ticks = ticks if np.isfinite(outcome.median) else "too short for a second tick"
+        ticks = ticks if np.isfinite(outcome.tick_median_ms) else "too short for a second tick"
         print((ticks + ", {fallbacks} fallbacks; penetration {penetration_mm:.2g} mm").format(**numbers))
     return 0 if outcome.success else 1
 

@@ -37,16 +37,16 @@ class TaskOutcome(NamedTuple):
     Attributes:
         success: whether it lasted to its end and achieved the aim of the task.
         measures: numbers that decide it, by name with unit.
-        median: median of the processor times of the ticks [ms].
-        late: 99th percentile of them [ms].
+        tick_median_ms: median of the processor times of the ticks [ms].
+        tick_99_ms: 99th percentile of them [ms].
         penetration: largest depth of a contact [m].
         fallbacks: ticks whose plan was rejected.
     """
 
     success: bool
     measures: dict[str, float]
-    median: float
-    late: float
+    tick_median_ms: float
+    tick_99_ms: float
     penetration: float
     fallbacks: int
 
@@ -84,7 +84,7 @@ class SuiteTask:
 
     __repr__ = short_repr
 
-    def begin(self, seed: int | None = None) -> Vector:
+    def initial_state(self, seed: int | None = None) -> Vector:
         """A first state.
 
         Args:
@@ -99,7 +99,7 @@ class SuiteTask:
         """
         if seed is None:
             return self._raised(self.start)
-        generator = np.random.default_rng(whole_number("SuiteTask.begin(seed)", seed, 0))
+        generator = np.random.default_rng(whole_number("SuiteTask.initial_state(seed)", seed, 0))
         for _ in range(_DRAWS):
             dx = self.spread * generator.uniform(-1.0, 1.0, self.spread.size)
             x = self._raised(self.model.integrate(self.start, dx))
@@ -125,7 +125,7 @@ class SuiteTask:
             TypeError: for an unknown field.
             ValueError: for an argument out of range.
         """
-        return Plant(self.model, self.begin(seed), **perturbation)
+        return Plant(self.model, self.initial_state(seed), **perturbation)
 
     def run(self, seed: int | None = None, plant: Plant | None = None, seconds: float | None = None) -> ClosedLoop:
         """Run the task in closed loop.

@@ -135,7 +135,7 @@ def test_a_lead_moves_on_and_waits():
 
 def test_a_start_is_perturbed_and_lifted_out_of_the_ground():
     task = dojo.tasks.idto.hopper()
-    given, other, same = (task.begin(seed) for seed in (None, 3, 3))
+    given, other, same = (task.initial_state(seed) for seed in (None, 3, 3))
     assert np.array_equal(other, same)
     assert not np.array_equal(given, other)
     sim = task.model
@@ -152,10 +152,10 @@ def test_a_perturbed_start_does_not_overlap():
     for seed in range(5):
         dx = task.spread * np.random.default_rng(seed).uniform(-1.0, 1.0, task.spread.size)
         inside += bool(overlaps(sim.mechanism, sim.integrate(task.start, dx)[: sim.nq]))
-        assert overlaps(sim.mechanism, task.begin(seed)[: sim.nq]) == ()
+        assert overlaps(sim.mechanism, task.initial_state(seed)[: sim.nq]) == ()
     assert inside == 5
     with pytest.raises(ValueError, match="shapes overlap in each"):
-        replace(task, start=task.start - 0.02 * np.eye(sim.nx)[18], spread=1e-9 * task.spread).begin(0)
+        replace(task, start=task.start - 0.02 * np.eye(sim.nx)[18], spread=1e-9 * task.spread).initial_state(0)
 
 
 def test_overlaps_are_those_of_the_shapes():
@@ -217,7 +217,7 @@ def test_mujoco_has_the_same_hills():
 
     task = dojo.tasks.idto.mini_cheetah_hills(count=2)
     terrain = task.model.mechanism.contacts[0].terrain
-    plant = MujocoPlant(task.model, task.begin())
+    plant = MujocoPlant(task.model, task.initial_state())
     hit = np.zeros(1, np.int32)
     for x in (1.0, 1.7, 2.0, 2.25, 2.5, 3.1, 3.6):
         far = mujoco.mj_ray(plant._model, plant._data, np.array([x, 0.3, 1.0]), -np.eye(3)[2], None, 1, -1, hit)
