@@ -36,7 +36,7 @@ CASES: dict[str, tuple[float, float, float]] = {
     "turn": (0.3, 0.0, 0.4),
     "uneven": (0.3, 0.0, 0.0),
 }  # [m/s, m/s, rad/s]
-FILES = {"g1": "g1_29dof_rev_1_0.urdf", "talos": "talos_full_v2_box.urdf"}
+FILES = {"g1": "g1_29dof_rev_1_0.urdf", "talos": "talos_reduced.urdf"}
 PUSH, PAYLOAD, FRICTION, ROUGH = 30.0, 0.05, (0.5, 0.8), 0.05  # [N s], share of the mass, [m]
 OFF, OFF_TURN, ALLOWED = 0.1, 0.1, 20.0  # [m/s], [rad/s], [ms]
 SECONDS, QUICK = 10.0, 0.3

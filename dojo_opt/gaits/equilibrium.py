@@ -65,6 +65,19 @@ def stop_torques(sim: Simulator, x: Array) -> Array:
     return out
 
 
+def _check_stops(sim: Simulator, x: Array) -> None:
+    """Refuse a joint at its stop, which pushes it away with an infinite torque on the central path."""
+    for joint in sim.mechanism.joints:
+        if joint.nrot == 3:
+            continue
+        q = x[sim.mechanism.q_slice(joint.name)]
+        lo, hi = np.array(list(joint.limits or ()), dtype=np.float64).reshape(-1, 2).T
+        if lo.size and not np.all((lo < q) & (q < hi)):
+            raise ValueError(
+                f"equilibrium({sim.mechanism.name}): joint {joint.name!r} is not inside its stops: {q} in [{lo}, {hi}]"
+            )
+
+
 def _under(feet: Feet, state: Array) -> tuple[Array, Array, Array]:
     """d(gaps)/dq (k, nv), generalised forces (k, nv) of unit vertical forces, and the cosines of the slopes (k,)."""
     normal = feet.normals(state)
@@ -175,9 +188,9 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         (state (nx,), input (nu,) [N, N m]).
 
     Raises:
-        ValueError: there is no equilibrium: the centre of mass is not above the feet, a joint without input would have
-            to carry load, the ground is steeper than friction holds, a contact is in the ground, or the smoothing is so
-            large that inactive contacts carry the weight.
+        ValueError: a joint of x is not inside its stops, or there is no equilibrium: the centre of mass is not above
+            the feet, a joint without input would have to carry load, the ground is steeper than friction holds, a
+            contact is in the ground, or the smoothing is so large that inactive contacts carry the weight.
     """
     if not isinstance(sim, Simulator):
         raise TypeError(f"equilibrium(sim): expected a Simulator, got {sim!r}")
@@ -185,6 +198,7 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     names = mech.contact_names[: len(mech.contacts)]
     state = np.array(sim.neutral() if x is None else checks.array("equilibrium(x)", x, (sim.nx,)))
     state[sim.nq :] = 0.0
+    _check_stops(sim, state)
     free = np.asarray(~input_map(sim).any(axis=1))
     if not names:
         return state, _held(sim, state, potential_gradient(sim, state) - stop_torques(sim, state), "inputs")

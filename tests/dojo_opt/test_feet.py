@@ -137,6 +137,16 @@ def on_its_feet(robot, x):
     return feet.place(x, targets[None])[0]
 
 
+def test_a_joint_at_its_stop_is_named():
+    """On the central path its torque would be infinite; beyond the stop it would pull."""
+    robot = dojo.Simulator(dojo.models.atlas(), time_step=0.01)
+    x = robot.neutral()
+    for angle in (0.0, -0.1):  # a knee bends from 0 to 2.36
+        x[robot.mechanism.q_slice("l_leg_kny")] = angle
+        with pytest.raises(ValueError, match="l_leg_kny"):
+            equilibrium(robot, x)
+
+
 def test_an_arm_stays_in_equilibrium_with_and_without_contacts():
     """Nothing touches: the inputs alone hold it; a contact a metre above the ground adds its kappa / gap."""
     bare = dojo.models.panda(gripper=False)

@@ -107,3 +107,19 @@ def test_atlas_walks_and_catches_itself():
     gap = loop.contacts.gap
     assert gap[:, :4].min(axis=1).max() > 0.01 and gap[:, 4:].min(axis=1).max() > 0.01
     assert not any(np.abs(tick.cost) > 1e6 for tick in loop.log)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:load_urdf")  # of grippers whose joints follow none
+@pytest.mark.parametrize("name", ["g1", "talos"])
+def test_robots_of_files_walk(bench, name):
+    """By the same weights in units of height and weight, from a stance off the stops of all joints."""
+    try:
+        robot = bench.robot(name)
+    except SystemExit as needed:
+        pytest.skip(str(needed))
+    mpc = dojo.tasks.humanoid_mpc((0.3, 0.0, 0.0), robot=robot)
+    loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, 2e-3), 2.0)
+    assert loop.survived, loop.message
+    assert loop.x[-1, 0] - loop.x[0, 0] > 0.3
+    assert sum(tick.fallback for tick in loop.log) < 3
