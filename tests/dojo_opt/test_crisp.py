@@ -10,17 +10,28 @@ from dojo_opt.__main__ import main
 from dojo_opt.tasks.crisp import pushing
 
 
-@pytest.mark.parametrize("name", ["cart_pole", "push_box", "push_t"])
+@pytest.mark.parametrize("name", ["cart_pole", "hopper", "push_box", "push_t", "waiter"])
 def test_a_task_is_solved_from_zero_inputs(name):
-    """The motion of the plan is that of the simulator, without gaps, and nothing enters a wall or the table."""
+    """Every knot of the plan is a step of the simulator, and nothing enters a wall, the table or the ground."""
     task = getattr(dojo.tasks.crisp, name)()
     assert not task.problem.controls0.any()
     plan = task.run()
     outcome = task.outcome(plan)
     assert outcome.success, outcome
-    again = task.problem.sim.rollout(plan.x[0], plan.u)
-    np.testing.assert_allclose(again.x, plan.x, atol=1e-6)
-    assert again.contacts.gap.min() > -1e-6
+    sim = task.problem.sim
+    steps = [sim.rollout(x, u[None]) for x, u in zip(plan.x[:-1], plan.u, strict=True)]
+    np.testing.assert_allclose([step.x[-1] for step in steps], plan.x[1:], atol=1e-5)
+    assert min(step.contacts.gap.min() for step in steps) > -1e-6
+
+
+def test_the_hopper_leaves_the_ground_and_lands_ahead():
+    task = dojo.tasks.crisp.hopper()
+    plan = task.run()
+    contacts = task.problem.sim.rollout(plan.x[0], plan.u).contacts.gap[:, 0]
+    stands = contacts < 1e-3
+    assert stands.any() and not stands[0]
+    assert np.flatnonzero(np.diff(stands.astype(int)) == -1).size > 0  # it lifts off again
+    assert plan.u[:, 1].max() <= 0.0
 
 
 def test_the_cargo_slides_by_the_friction_of_the_table_alone():
@@ -31,6 +42,22 @@ def test_the_cargo_slides_by_the_friction_of_the_table_alone():
         acceleration = 3.0 if slides else 1.5
         assert x[2] == pytest.approx(0.2 * acceleration, rel=1e-3)
         assert x[3] == pytest.approx(0.2 * (0.2 * 9.81 - 3.0) if slides else 0.0, abs=1e-3)
+
+
+def test_a_plate_is_drawn_by_a_pusher_that_presses_and_tips_under_one_that_presses_too_much():
+    """Pressed by N it slides at mu N - mu' (m g - N) = (m + m') a, and at more than m g l / reach it tips."""
+    sim = dojo.tasks.crisp.waiter().problem.sim.replace(kappa=1e-8, time_step=1e-3)
+    start = sim.neutral()
+    start[[0, 3]] = -6.0, 0.2
+    press, mass, weight = 4.0, 2.0 + 1.0, 2.0 * 9.81
+    force = 0.1 * (weight - press) + mass * 0.5
+    x = sim.rollout(start, np.tile([force, press], (200, 1))).x[-1]
+    np.testing.assert_allclose(x[[5, 8]], 0.5 * 0.2, rtol=1e-2)
+    assert abs(x[2]) < 1e-5
+    tipping = weight * 7.0 / (0.2 + 6.0 + 7.0)
+    for share, lifts in ((0.95, False), (1.05, True)):
+        x = sim.rollout(start, np.tile([0.0, share * tipping], (200, 1))).x[-1]
+        assert (x[2] < -1e-4) == lifts  # its right end rises
 
 
 def test_forces_at_the_ends_of_a_face_are_a_force_on_it():

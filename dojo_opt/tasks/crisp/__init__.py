@@ -14,12 +14,14 @@ are zero in every guess.
 from typing import TYPE_CHECKING, Any
 
 from dojo_opt.tasks.crisp.cart_pole import cart_pole
+from dojo_opt.tasks.crisp.hopper import hopper
 from dojo_opt.tasks.crisp.push_box import push_box
 from dojo_opt.tasks.crisp.push_t import push_t
 from dojo_opt.tasks.crisp.transport import transport
+from dojo_opt.tasks.crisp.waiter import waiter
 from sim.mechanism.checks import nearest
 
-__all__ = ["cart_pole", "push_box", "push_t", "transport"]
+__all__ = ["cart_pole", "hopper", "push_box", "push_t", "transport", "waiter"]
 
 
 if not TYPE_CHECKING:
