@@ -2,8 +2,8 @@
 
 python benchmarks/evaluate_policy.py HalfCheetah-v5 policy.npz ...      [--episodes 8] [--finer 5] [--output FILE]
 
-Two columns: the original task, and with `--finer` shorter time steps at the same control rate. The tasks need
-`pip install "gymnasium[mujoco]"`, which also brings imageio.
+Three columns: the original task; with shorter time steps at the same control rate; and with elliptic friction cones
+instead of pyramids at its own time step. The tasks need `pip install "gymnasium[mujoco]"`, which also brings imageio.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+ELLIPTIC = 1  # mujoco.mjtCone.mjCONE_ELLIPTIC
 OPTIONS = {"Ant-v5": {"include_cfrc_ext_in_observation": False, "contact_cost_weight": 0.0}}
 
 
@@ -41,8 +42,8 @@ def load(path: str) -> Callable[[Floats], Floats]:
     return act
 
 
-def returns(task: str, act: Callable[[Floats], Floats], episodes: int, finer: int) -> Floats:
-    """(episodes,) returns, with time steps shorter by this factor."""
+def returns(task: str, act: Callable[[Floats], Floats], episodes: int, finer: int, elliptic: bool = False) -> Floats:
+    """(episodes,) returns, with time steps shorter by this factor, and the task's friction cones or elliptic ones."""
     try:
         env = gymnasium.make(task, **OPTIONS.get(task, {}))
     except (ImportError, gymnasium.error.DependencyNotInstalled) as error:
@@ -51,6 +52,8 @@ def returns(task: str, act: Callable[[Floats], Floats], episodes: int, finer: in
     low, high = env.action_space.low, env.action_space.high
     inner.model.opt.timestep /= finer  # type: ignore[attr-defined]
     inner.frame_skip *= finer  # type: ignore[attr-defined]
+    if elliptic:
+        inner.model.opt.cone = ELLIPTIC  # type: ignore[attr-defined]
     out = np.zeros(episodes)
     for k in range(episodes):
         observation, _ = env.reset(seed=1000 + k)
@@ -71,12 +74,13 @@ def main() -> None:
     parser.add_argument("policies", nargs="+")
     parser.add_argument("--episodes", type=int, default=8)
     parser.add_argument("--finer", type=int, default=5)
-    parser.add_argument("--output", default="", help="JSON file: {policy: [mean return, mean return at finer steps]}")
+    parser.add_argument("--output", default="", help="JSON file: {policy: [mean return of each column]}")
     given = parser.parse_args()
     table: dict[str, list[float]] = {}
-    print(f"{'policy':40} {given.task:>20} {'time step / ' + str(given.finer):>20}")
+    print(f"{'policy':40} {given.task:>20} {'time step / ' + str(given.finer):>20} {'elliptic cones':>20}")
     for path in given.policies:
-        columns = [returns(given.task, load(path), given.episodes, finer) for finer in (1, given.finer)]
+        act, variants = load(path), ((1, False), (given.finer, False), (1, True))
+        columns = [returns(given.task, act, given.episodes, *variant) for variant in variants]
         table[path] = [float(c.mean()) for c in columns]
         print(f"{path[-40:]:40} " + " ".join(f"{c.mean():12.1f} +-{c.std():5.0f}" for c in columns), flush=True)
     if given.output:

@@ -4,12 +4,11 @@ python benchmarks/learning.py DIR HalfCheetah --algorithms shac ars --seeds 0 1 
 python benchmarks/learning.py DIR HalfCheetah --only-figure                                 draws saved results
 python benchmarks/learning.py DIR HalfCheetah --beside Hopper --table       and tabulates it, in DIR/learning.json
 
-`best_of` with seed k begins with the seeds 3k, 3k + 1, 3k + 2 of SHAC; curves and returns after 60 s count the time of
-the chosen one alone, the whole time counts all three. A run is DIR/TASK_ALGORITHM_SEED.npz, and its
-policy DIR/....policy.npz. For one core, set NUMBA_NUM_THREADS=1 and OPENBLAS_NUM_THREADS=1. The table has the returns
-of policies at a time step and a smoothing that they have not learnt on, and in MuJoCo, by
-benchmarks/evaluate_policy.py, which imports nothing of dojo-opt. Runs of other libraries are those of
-benchmarks/learning_peers.py in the same folder.
+`best_of` with seed k begins with the seeds 3k, 3k + 1, 3k + 2 of SHAC, and its times count all three. A run is
+DIR/TASK_ALGORITHM_SEED.npz, and its policy DIR/....policy.npz. For one core, set NUMBA_NUM_THREADS=1 and
+OPENBLAS_NUM_THREADS=1. The table has the returns of policies at a time step and a smoothing that they have not learnt
+on, and in MuJoCo, by benchmarks/evaluate_policy.py, which imports nothing of dojo-opt. Runs of other libraries are
+those of benchmarks/learning_peers.py in the same folder.
 """
 
 from __future__ import annotations
@@ -70,8 +69,9 @@ BARS: dict[str, list[tuple[str, float]]] = {  # of shac: quantity of its seeds, 
 }  # fmt: skip
 _HEADER = (
     "algorithm", "seed", "return", "after 60 s", "unseen step and smoothing", "MuJoCo", "MuJoCo, time step / 5",
-    "time [s]", "control steps", "unsolved", "gradients not finite",
+    "MuJoCo, elliptic cones", "time [s]", "control steps", "unsolved", "gradients not finite",
 )  # fmt: skip
+_COUNTS = {"unsolved steps": -2, "gradients not finite": -1}  # columns
 
 
 def run(folder: Path, name: str, algorithm: str, seed: int, given: dict[str, Any]) -> None:
@@ -106,9 +106,12 @@ def curve(path: Path) -> Floats:
 
 
 def figure(folder: Path, names: list[str]) -> None:
-    """Median and range over seeds of each algorithm, of the saved results; one panel per task."""
+    """Median and range over seeds of each algorithm, of the saved results; one panel per task that has any."""
     from matplotlib.figure import Figure
 
+    names = [name for name in names if any(saved(folder, name, a) for a in (*SETTINGS[name], *PEERS))]
+    if not names:
+        return
     page = Figure(figsize=(5.0 * len(names) + 1.0, 4.0), layout="constrained")
     for axes, name in zip(page.subplots(1, len(names), squeeze=False)[0], names, strict=True):
         for algorithm in (*SETTINGS[name], *PEERS):
@@ -118,8 +121,7 @@ def figure(folder: Path, names: list[str]) -> None:
             rows = min(map(len, curves))
             seconds = np.median([c[:rows, 0] for c in curves], axis=0)
             returns = np.array([c[:rows, 1] for c in curves])
-            clock = ", clock of the chosen seed" if algorithm == "best_of" else ""
-            label = f"{algorithm}, {len(curves)} seed{'s' if len(curves) > 1 else ''}{clock}"
+            label = f"{algorithm}, {len(curves)} seed{'s' if len(curves) > 1 else ''}"
             axes.plot(seconds, np.median(returns, axis=0), marker=".", label=label)
             axes.fill_between(seconds, returns.min(axis=0), returns.max(axis=0), alpha=0.2)
         axes.set(xlabel="processor time [s]", ylabel="return in the task", title=name, xlim=(0.0, None))
@@ -131,9 +133,11 @@ def figure(folder: Path, names: list[str]) -> None:
 
 
 def in_mujoco(name: str, policies: list[Path]) -> list[list[float]]:
-    """(return in Gymnasium's environment, at a fifth of its time step) of policies, where Gymnasium has the task."""
+    """Returns of policies in Gymnasium's environment, at a fifth of its time step, and with elliptic friction cones,
+    where Gymnasium has the task.
+    """
     if name not in JUDGED:
-        return [[float("nan")] * 2] * len(policies)
+        return [[float("nan")] * 3] * len(policies)
     judge = Path(__file__).with_name("evaluate_policy.py")
     with tempfile.TemporaryDirectory() as folder:
         there = Path(folder) / "returns.json"
@@ -148,7 +152,7 @@ def cells(folder: Path, name: str, algorithm: str) -> list[list[Any]]:
     if algorithm in PEERS:
         for path in saved(folder, name, algorithm):
             seconds, best = curve(path)[-1]
-            out.append([algorithm, int(path.stem.split("_")[-1]), best, *[None] * 4, seconds, *[None] * 3])
+            out.append([algorithm, int(path.stem.split("_")[-1]), best, *[None] * 5, seconds, *[None] * 3])
         return out
     paths = saved(folder, name, algorithm)
     policies = [path.with_suffix(".policy.npz") for path in paths]
@@ -162,37 +166,48 @@ def cells(folder: Path, name: str, algorithm: str) -> list[list[Any]]:
     return out
 
 
+def summary(name: str, algorithm: str, lines: list[list[Any]]) -> list[Row]:
+    """Means and least values of the seeds of an algorithm, with the bars of shac."""
+    numbers = np.array([line[1:] for line in lines if line[0] == algorithm], dtype=np.float64)
+    ours, of = algorithm == "shac", "" if algorithm == "shac" else f" of {algorithm}"
+    rows = [Row(f"{name}, seeds of {algorithm}", float(len(numbers)), "")]
+    if not len(numbers):
+        return rows
+    means = dict(zip(_HEADER[1:], numbers.mean(axis=0), strict=True))
+    found = {"mean return": means["return"], "least return": numbers[:, 1].min()}
+    for column, title in (
+        ("after 60 s", "after 60 s"), ("unseen step and smoothing", "at an unseen step and smoothing"),
+        *((column, f"in {column}") for column in _HEADER if column.startswith("MuJoCo")),
+    ):  # fmt: skip
+        if np.isfinite(means[column]):
+            found[f"mean return {title}"] = means[column]
+    bars = dict(BARS.get(name, ())) if ours else {}
+    rows += [Row(f"{name}, {key}{of}", float(v), "", bars.get(key), True) for key, v in found.items()]
+    rows.append(Row(f"{name}, mean time{of}", means["time [s]"], "s"))
+    if ours:
+        rows += [Row(f"{name}, {key}", numbers[:, i].sum(), "", 0.0) for key, i in _COUNTS.items()]
+    return rows
+
+
 def table(folder: Path, names: list[str]) -> Report:
-    """Returns of all saved runs: here, and in MuJoCo where Gymnasium has the task; bars of shac."""
-    report = Report("Policies of Gymnasium's tasks, one core")
+    """Returns of all saved runs: here, and in MuJoCo where Gymnasium has the task. Tasks without runs in the folder
+    keep the numbers that its learning.json has.
+    """
+    report, path = Report("Policies of Gymnasium's tasks, one core"), folder / "learning.json"
+    before = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"tables": [], "rows": []}
     for name in names:
         lines = [line for algorithm in (*SETTINGS[name], *PEERS) for line in cells(folder, name, algorithm)]
-        report.tables.append(Table(name, _HEADER, lines))
-        numbers = np.array([line[1:] for line in lines if line[0] == "shac"], dtype=np.float64).reshape(
-            -1, len(_HEADER) - 1
-        )
-        report.rows.append(Row(f"{name}, seeds of shac", float(len(numbers)), ""))
-        if not len(numbers):
+        if lines:
+            report.tables.append(Table(name, _HEADER, lines))
+            for algorithm in dict.fromkeys(("shac", *(line[0] for line in lines))):
+                report.rows += summary(name, algorithm, lines)
             continue
-        means = dict(zip(_HEADER[1:], numbers.mean(axis=0), strict=True))
-        found = {
-            "mean return": means["return"], "least return": numbers[:, 1].min(),
-            "mean return after 60 s": means["after 60 s"],
-            "mean return at an unseen step and smoothing": means["unseen step and smoothing"],
-            "mean return in MuJoCo": means["MuJoCo"],
-            "mean return in MuJoCo, time step / 5": means["MuJoCo, time step / 5"],
-        }  # fmt: skip
-        others = np.array([line[2:8] for line in lines if line[0] == "best_of"], dtype=np.float64)
-        if len(others):
-            found["least return of best_of"] = others[:, 0].min()
-            found["mean return of best_of"] = others[:, 0].mean()
-        bars = dict(BARS.get(name, ()))
-        report.rows += [Row(f"{name}, {key}", float(v), "", bars.get(key), True) for key, v in found.items()]
-        report.rows.append(Row(f"{name}, mean time", means["time [s]"], "s"))
-        if len(others):
-            report.rows.append(Row(f"{name}, mean time of best_of", others[:, 5].mean(), "s"))
-        report.rows.append(Row(f"{name}, unsolved steps", numbers[:, -2].sum(), "", 0.0))
-        report.rows.append(Row(f"{name}, gradients not finite", numbers[:, -1].sum(), "", 0.0))
+        for kept in before["tables"]:
+            if kept["title"] == name:
+                report.tables.append(Table(name, kept["header"], kept["rows"], kept["note"]))
+        for row in before["rows"]:
+            if row["name"].startswith(f"{name}, "):
+                report.rows.append(Row(*(row[key] for key in ("name", "value", "unit", "bar", "at_least", "note"))))
     return report
 
 
