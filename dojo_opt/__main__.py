@@ -33,7 +33,7 @@ from sim.io.json_text import json_text
 from sim.mechanism.checks import nearest, one_of
 
 # names for `run`; the gaits of the quadruped also have the names of their examples, quadruped_trot and so on
-PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap")
+PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap", "humanoid_leap")
 GAITS = ("trot", "bound", "pace", "walk", "turn", "jump", "leap")
 LOOPS = ("free_gait_mpc", "hopper_mpc", "humanoid_mpc", "quadruped_mpc")  # run in closed loop with a plant
 SUITES = ("crisp", "idto", "jin")  # of tasks that are run by SUITE.TASK, such as idto.spinner

@@ -17,6 +17,7 @@ __all__ = ["step"]
 
 _CORRECTIONS = 8  # of the base, for the centre of mass to be where it should
 _CLOSE = 1e-6  # [m]
+_OFF = 0.05  # [rad] of hinges from their stops, and share of their range
 
 
 def step(
@@ -151,3 +152,32 @@ def balanced(feet: Feet, x: Array, path: Array, goal: Array) -> Array:
             break
         x[:, :2] += goal - center
     return np.asarray(x[:, BaseState.POSE])
+
+
+def over_its_feet(sim: Simulator) -> Array:
+    """The neutral state with the centre of mass above the middle of the soles, and all hinges off their stops.
+
+    Args:
+        sim: simulator of a robot on its feet.
+
+    Returns:
+        (nx,) state.
+
+    Raises:
+        ValueError: a foot cannot reach its place.
+    """
+    feet, x = Feet(sim), _inside(sim)[None]
+    places = feet.positions(x)
+    x[:, BaseState.POSE] = balanced(feet, x, places, places[0, :, :2].mean(axis=0))
+    return np.asarray(feet.place(x, places)[0])
+
+
+def _inside(sim: Simulator) -> Array:
+    """The stance (nx,) with all hinges off their stops, where a smooth stop would push with an infinite torque."""
+    x, mech = sim.neutral(), sim.mechanism
+    for joint in mech.joints[1:]:
+        if joint.limits and joint.nrot != 3:
+            at, (lo, hi) = mech.q_slice(joint.name), np.array(list(joint.limits), dtype=np.float64).T
+            off = np.minimum(_OFF, _OFF * (hi - lo))
+            x[at] = np.clip(x[at], lo + off, hi - off)
+    return x

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from dojo_opt.problems.classics import block, hop, swingup
+from dojo_opt.problems.humanoid_leaps import humanoid_leap
 from dojo_opt.problems.leaps import leap
 from dojo_opt.problems.legged import jump, stand_up, trot, walk
 from dojo_opt.problems.locomotion import bound, follow, pace, turn
@@ -17,6 +18,7 @@ __all__ = [
     "bound",
     "follow",
     "hop",
+    "humanoid_leap",
     "jump",
     "leap",
     "pace",

@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt import models
 from dojo_opt.cost import Effort, Slip, Tracking
-from dojo_opt.gaits.biped import balanced
+from dojo_opt.gaits.biped import over_its_feet
 from dojo_opt.gaits.equilibrium import equilibrium
-from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.legs import Legs
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.planning.options import Options, Stage
@@ -37,7 +36,6 @@ _EFFORT, _SLIP, _NEAR = 2e-3, 100.0, 0.01
 _DAMPER = 0.12  # share of the usual damper of a gait
 _BEND, _LEAD = 0.7, 0.032  # [rad], [m]
 _HARD = 0.1  # of the kappa of plans: the equilibrium whose torques are the reference
-_OFF = 0.05  # [rad] of hinges from their stops, and share of their range
 _UPRIGHT, _ABOUT = np.eye(4)[[0, 3]]  # quaternions: no turn, half a turn about z
 _CAREFUL = 0.75  # share of the friction that plans assume
 
@@ -143,7 +141,7 @@ def humanoid_mpc(
     size, slow = legs.size, legs.size**0.5
     knot, kappa = 1e-3 * round(1e3 * _KNOT * slow), _KAPPA * legs.torque * slow
     sim = legs.simulator(knot, kappa)
-    pose = _over_its_feet(sim)
+    pose = over_its_feet(sim)
     held = equilibrium(sim.replace(kappa=_HARD * kappa), pose)[1]
     running = _weights(legs, sim)
     cost = [
@@ -162,25 +160,6 @@ def humanoid_mpc(
     usual |= {"friction": _CAREFUL * min(contact.friction for contact in sim.mechanism.contacts)}
     usual |= {"first": Options(stages=(Stage(kappa, kappa),))}
     return MPC(problem, reference={0: march}, **{**usual, **settings})
-
-
-def _over_its_feet(sim: Simulator) -> Vector:
-    """The stance (nx,) with the centre of mass above the middle of the soles."""
-    feet, x = Feet(sim), _inside(sim)[None]
-    places = feet.positions(x)
-    x[:, BaseState.POSE] = balanced(feet, x, places, places[0, :, :2].mean(axis=0))
-    return np.asarray(feet.place(x, places)[0])
-
-
-def _inside(sim: Simulator) -> Vector:
-    """The stance (nx,) with all hinges off their stops, where a smooth stop would push with an infinite torque."""
-    x, mech = sim.neutral(), sim.mechanism
-    for joint in mech.joints[1:]:
-        if joint.limits and joint.nrot != 3:
-            at, (lo, hi) = mech.q_slice(joint.name), np.array(list(joint.limits), dtype=np.float64).T
-            off = np.minimum(_OFF, _OFF * (hi - lo))
-            x[at] = np.clip(x[at], lo + off, hi - off)
-    return x
 
 
 def _weights(legs: Legs, sim: Simulator) -> Vector:

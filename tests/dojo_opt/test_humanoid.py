@@ -123,3 +123,20 @@ def test_robots_of_files_walk(bench, name):
     assert loop.survived, loop.message
     assert loop.x[-1, 0] - loop.x[0, 0] > 0.3
     assert sum(tick.fallback for tick in loop.log) < 3
+
+
+@pytest.mark.slow
+def test_atlas_leaps_and_lands():
+    """From rest and a goal: it flies for .3 s, and under the gains of the plan it lands at the accuracy of 1e-5."""
+    problem = dojo.problems.humanoid_leap()
+    assert np.ptp(problem.states0, axis=0).max() == 0.0  # the guess stands
+    plan = dojo.ilqr(problem)
+    assert plan.success, plan.message
+    feet = Feet(problem.sim)
+    lowest = feet.gaps(plan.x).min(axis=1)
+    assert lowest.max() > 0.1
+    assert (lowest > 5e-3).sum() * plan.time_step * plan.substeps > 0.3
+    replay = plan.replay(accuracy=1e-5)
+    assert replay.status.name == "SOLVED", replay.status
+    assert np.abs(replay.x[-1, :3] - plan.x[-1, :3]).max() < 5e-3
+    assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(0.1 * Legs(dojo.models.atlas()).size, abs=1e-3)
