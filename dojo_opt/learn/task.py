@@ -41,13 +41,17 @@ def never(x: Floats) -> bool:
     return False
 
 
+# Numbers are copied one by one: assignments of slices took most of the time in which these loops compile.
+
+
 def _observation_loop(observation: Callable[..., Any]) -> Any:
     @users_loop
     def evaluate(layout, xs, work, values, slopes):  # type: ignore[no-untyped-def]
         """values[i] = o(x_i), and slopes[i] = do/dx by central differences on the manifold, if it has rows."""
         n, nx, d = layout.shape[0], xs.shape[1], values.shape[1]
         for row in range(xs.shape[0]):
-            work[0, :nx] = xs[row]
+            for k in range(nx):
+                work[0, k] = xs[row, k]
             observation(work[0, :nx], values[row])
             for i in range(n if slopes.shape[0] > 0 else 0):
                 step = _STEP * max(1.0, abs(xs[row, layout[i]])) if layout[i] >= 0 else _STEP
@@ -67,12 +71,18 @@ def _reward_loop(reward: Callable[..., Any]) -> Any:
         """values[i] = r(x, a, x'), and slopes[i] = dr/d(dx, a, dx') by central differences, if it has rows."""
         n, nx, m = layout.shape[0], xs.shape[1], acts.shape[1]
         for row in range(xs.shape[0]):
-            work[0, :nx], work[1, :m], work[2, :nx] = xs[row], acts[row], nexts[row]
+            for k in range(nx):
+                work[0, k], work[2, k] = xs[row, k], nexts[row, k]
+            for k in range(m):
+                work[1, k] = acts[row, k]
             values[row] = reward(work[0, :nx], work[1, :m], work[2, :nx])
             for i in range(2 * n + m if slopes.shape[0] > 0 else 0):
                 step, total = _STEP, 0.0
                 for sign in (1.0, -1.0):
-                    work[0, :nx], work[1, :m], work[2, :nx] = xs[row], acts[row], nexts[row]
+                    for k in range(nx):
+                        work[0, k], work[2, k] = xs[row, k], nexts[row, k]
+                    for k in range(m):
+                        work[1, k] = acts[row, k]
                     if i < n:
                         displace(layout, xs[row], i, sign * step, work[0, :nx])
                     elif i < n + m:
@@ -90,7 +100,10 @@ def _judge_loop(observation: Any, reward: Any, terminated: Any) -> Any:
     def evaluate(x, a, after, work, out):  # type: ignore[no-untyped-def]
         """(r(x, a, x'), whether the episode ends in x'), and out = o(x')."""
         nx, m = x.shape[0], a.shape[0]
-        work[0, :nx], work[1, :m], work[2, :nx] = x, a, after
+        for k in range(nx):
+            work[0, k], work[2, k] = x[k], after[k]
+        for k in range(m):
+            work[1, k] = a[k]
         value = reward(work[0, :nx], work[1, :m], work[2, :nx])
         over = terminated(work[2, :nx])
         observation(work[2, :nx], out)
@@ -105,7 +118,8 @@ def _survival_loop(probability: Callable[..., Any]) -> Any:
         """values[i] = s(x_i), slopes[i] = ds/dx by central differences on the manifold."""
         nx = xs.shape[1]
         for row in range(xs.shape[0]):
-            work[0, :nx] = xs[row]
+            for k in range(nx):
+                work[0, k] = xs[row, k]
             values[row] = probability(work[0, :nx])
             for i in range(layout.shape[0]):
                 step = _STEP * max(1.0, abs(xs[row, layout[i]])) if layout[i] >= 0 else _STEP

@@ -28,8 +28,8 @@ def _plans(executor=None):
 
 
 def _seeds(executor=None):
-    options = {"epochs": 3, "environments": 4, "horizon": 8, "hidden": (8,), "evaluations": 1, "episodes": 2}
-    runs = dojo.learn.seeds(dojo.learn.shac, task_of("Pendulum"), (3, 4, 5), executor=executor, **options)
+    options = {"epochs": 3, "directions": 4, "evaluations": 1, "episodes": 2}
+    runs = dojo.learn.seeds(dojo.learn.ars, task_of("Pendulum"), (3, 4, 5), executor=executor, **options)
     return [run.policy.weights for run in runs]
 
 
