@@ -56,7 +56,7 @@ def hopper() -> PlanTask:
 
     The end costs 100 of squares of the places and velocities of mass and foot, to first order, the torque of the hip
     .001 and the thrust 1e-5. The leg costs a little in every knot, .01 of squares of angle and retraction and .001 of
-    their rates: without it, long stages end far from the goal. A plan is a success when every component of its end is
+    their rates: without it, plans often end far from the goal. A plan is a success when every component of its end is
     within .05 of the goal.
 
     The leg of the publication has no mass: its foot is fixed in stance, where it has thrust alone, and in flight the
