@@ -14,7 +14,7 @@ are zero in every guess.
 from typing import TYPE_CHECKING, Any
 
 from dojo_opt.tasks.crisp.cart_pole import cart_pole
-from dojo_opt.tasks.crisp.hopper import hopper
+from dojo_opt.tasks.crisp.point_hopper import hopper
 from dojo_opt.tasks.crisp.push_box import push_box
 from dojo_opt.tasks.crisp.push_t import push_t
 from dojo_opt.tasks.crisp.transport import transport
