@@ -32,8 +32,8 @@ from sim.simulator.results import (
     carried,
     contacts_of,
     ended,
-    missed,
     path_of,
+    reservation,
     sentence,
 )
 from sim.simulator.rollout_duration import simulator_for_duration
@@ -171,11 +171,12 @@ class Simulator(RowStepping):
             check.state("step", x)
             check.inputs("step", "u", control, (self.nu,))
         scene, end = (self.mechanism, self.time_step, rolled.contacts[0]), rolled.xs[1 if rolled.solved_steps else 0]
-        (parts, share, error), worst = rolled.division, float(rolled.division.errors[0])
+        (parts, share, error), fraction = rolled.division, float(rolled.division.momentum_fractions[0])
         solved = STATUSES[int(status)], int(iterations), residual, violation
         detail = "" if rolled.solved_steps else self._sentence("Simulator.step", rolled.reports[0], end)
-        division = int(parts[0]), float(share[0]), worst, missed(error) if worst > 1.0 else detail
-        return ended(StepResult(end, *solved, scene, *division), throw)
+        if fraction < 1.0 or error[0] > 1.0:
+            detail = reservation(share, error)
+        return ended(StepResult(end, *solved, scene, int(parts[0]), fraction, float(error[0]), detail), throw)
 
     def rollout(
         self,
@@ -226,8 +227,8 @@ class Simulator(RowStepping):
         knot, xs, reports = rolled.solved_steps, rolled.xs, rolled.reports
         last = reports[min(knot, len(reports) - 1)] if len(reports) else np.zeros(REPORT)
         status, (parts, fractions, errors) = STATUSES[int(last[StepReport.STATUS])], rolled.division
-        where = "Simulator.rollout: step "
-        detail = missed(errors) if status == Status.SOLVED else self._sentence(f"{where}{knot}", last, xs[knot])
+        where, solved = f"Simulator.rollout: step {knot}", status == Status.SOLVED
+        detail = reservation(fractions, errors) if solved else self._sentence(where, last, xs[knot])
         return Trajectory(
             simulator=self,
             x=xs[: knot + 1],

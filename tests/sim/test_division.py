@@ -281,6 +281,8 @@ def test_a_step_that_loses_momentum_has_no_derivatives_of_another_division(
     monkeypatch.setattr(intervals, "slowed", lambda y, part: (real(y, part), 0.5))
     ended = sim.step(x)
     assert (ended.parts, ended.momentum_fraction) == (parts, 0.5)
+    assert ended.success and "step 0 conserved 0.5 of it" in ended.message
+    assert "1 of the divided steps lost momentum" in sim.rollout(x, steps=1).message
     assert not sim.linearize(x, np.zeros(sim.nu)).success
     assert not sim.linearize_rollout(x, np.zeros((1, sim.nu)))[1].success
 
