@@ -180,6 +180,7 @@ def test_pushes_are_zero_at_rest():
     assert np.abs(block.step(x, u).x[block.nq :]).max() < 1e-7
 
 
+@pytest.mark.slow
 def test_round_hulls_stand_on_the_corners_that_are_lowest():
     """Feet of 24 random corners under legs that slide: at most a few corners of each can touch at once."""
     rng, places = np.random.default_rng(3), [(x, y) for x in (0.3, -0.3) for y in (0.2, -0.2)]

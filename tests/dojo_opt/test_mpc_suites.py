@@ -144,6 +144,7 @@ def test_a_start_is_perturbed_and_lifted_out_of_the_ground():
         assert 0.0 <= min(gaps) < 1e-5
 
 
+@pytest.mark.slow
 def test_a_perturbed_start_does_not_overlap():
     """The hand holds its ball within millimetres: a change drawn without regard to it would throw the ball away."""
     task = dojo.tasks.idto.allegro()
