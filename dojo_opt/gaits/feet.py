@@ -142,6 +142,8 @@ class Feet:
             (..., k, 3, nv) derivatives.
         """
         states = np.asarray(x, dtype=float)
+        if states.ndim == 1:
+            return self._slopes(states)
         flat = states.reshape(-1, self.sim.nx)
         out = np.empty((len(flat), len(self.names), 3, self.sim.nv))
         for part in rows(len(flat)):  # in pieces, so that Python can handle Ctrl-C between them
@@ -149,14 +151,14 @@ class Feet:
         return out.reshape(*states.shape[:-1], *out.shape[1:])
 
     def _slopes(self, x: Array) -> Array:
-        """`jacobian` of the states (n, nx), which takes 2 nv states for each of them."""
+        """`jacobian` of states (..., nx), which takes 2 nv states for each of them."""
         sim = self.sim
         steps = np.zeros((2 * sim.nv, sim.ndx))
         steps[: sim.nv, : sim.nv] = _STEP * np.eye(sim.nv)
         steps[sim.nv :] = -steps[: sim.nv]
-        moved = self.positions(sim.integrate(x[:, None, :], steps))
-        slope = (moved[:, : sim.nv] - moved[:, sim.nv :]) / (2.0 * _STEP)
-        return np.moveaxis(slope, 1, -1)
+        moved = self.positions(sim.integrate(x[..., None, :], steps))
+        slope = (moved[..., : sim.nv, :, :] - moved[..., sim.nv :, :, :]) / (2.0 * _STEP)
+        return np.moveaxis(slope, -3, -1)
 
     def place(self, x: ArrayLike, targets: ArrayLike) -> Array:
         """Inverse kinematics: joint angles for given places of the feet, with a fixed base.

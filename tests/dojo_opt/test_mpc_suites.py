@@ -196,7 +196,7 @@ def test_a_rejected_step_does_not_make_a_plan_that_has_fallen(monkeypatch):
 def test_a_tick_begins_with_rollouts_when_no_plan_came_for_a_while(monkeypatch):
     """From the measured state, without gaps: the states of an old plan are far from it by then."""
     sim = dojo.Simulator(arm(), time_step=0.05, kappa=1e-4)
-    mpc = reaching(sim)
+    mpc = reaching(sim, patience=3)
     mpc(0.0, [0.0, 0.0])
     solver, begun = mpc._solver, []
 
