@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -53,28 +55,28 @@ def least_pushes(pushes: Array, load: Array, even: float) -> Array:
     return np.asarray(nnls(rows, np.concatenate([load, np.zeros(len(pushes))]))[0])
 
 
+def _between_stops(sim: Simulator, x: Array) -> Iterator[tuple[str, Array, Array, Array]]:
+    """(joint, q, lo, hi) of all joints with scalar coordinates."""
+    for joint in sim.mechanism.joints:
+        if joint.nrot != 3:
+            lo, hi = np.array(list(joint.limits or ()), dtype=np.float64).reshape(-1, 2).T
+            yield joint.name, x[sim.mechanism.q_slice(joint.name)], lo, hi
+
+
 def stop_torques(sim: Simulator, x: Array) -> Array:
     """(nv,) mean torque of the joint stops at rest, kappa / (h distance) away from each [N, N m]."""
     out = np.zeros(sim.nv)
-    for joint in sim.mechanism.joints:
-        if joint.nrot == 3:
-            continue
-        q, at = x[sim.mechanism.q_slice(joint.name)], sim.mechanism.v_slice(joint.name)
-        lo, hi = np.array(list(joint.limits or ()), dtype=np.float64).reshape(-1, 2).T
-        out[at] = sim.kappa / sim.time_step * (1.0 / (q - lo) - 1.0 / (hi - q))
+    for name, q, lo, hi in _between_stops(sim, x):
+        out[sim.mechanism.v_slice(name)] = sim.kappa / sim.time_step * (1.0 / (q - lo) - 1.0 / (hi - q))
     return out
 
 
 def _check_stops(sim: Simulator, x: Array) -> None:
     """Refuse a joint at its stop, which pushes it away with an infinite torque on the central path."""
-    for joint in sim.mechanism.joints:
-        if joint.nrot == 3:
-            continue
-        q = x[sim.mechanism.q_slice(joint.name)]
-        lo, hi = np.array(list(joint.limits or ()), dtype=np.float64).reshape(-1, 2).T
+    for name, q, lo, hi in _between_stops(sim, x):
         if lo.size and not np.all((lo < q) & (q < hi)):
             raise ValueError(
-                f"equilibrium({sim.mechanism.name}): joint {joint.name!r} is not inside its stops: {q} in [{lo}, {hi}]"
+                f"equilibrium({sim.mechanism.name}): joint {name!r} is not inside its stops: {q} in [{lo}, {hi}]"
             )
 
 
@@ -206,14 +208,13 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     for near in _LOWEST:
         found, force = _standing(sim, feet, state, (free, near), iterations)
         gap = feet.gaps(found)
-        left = potential_gradient(sim, found) - stop_torques(sim, found) - _under(feet, found)[1].T @ force
+        _, up, cosine = _under(feet, found)
+        left = potential_gradient(sim, found) - stop_torques(sim, found) - up.T @ force
         if gap.min() > 0.0 and np.abs(left[free]).max(initial=0.0) <= _LEFT * weight:
             break
     if gap.min() <= 0.0:
         name = feet.names[int(gap.argmin())]
         raise ValueError(f"equilibrium({mech.name}): {name!r} is {-gap.min():.3g} m deep in the ground near x")
-    state = found
-    u = _held(sim, state, left, f"vertical forces at {_named(feet.names)}")
-    cosine = _under(feet, state)[2]
+    u = _held(sim, found, left, f"vertical forces at {_named(feet.names)}")
     _check_friction(mech.name, feet, cosine, np.where(force > 1e-3 * weight, force, 0.0))
-    return state, u
+    return found, u

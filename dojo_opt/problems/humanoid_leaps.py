@@ -75,7 +75,6 @@ def humanoid_leap(
     low, apex, goal = (_moved(start, *by) for by in ((0.0, -_CROUCH * size), (0.5 * far, high), (far, 0.0)))
     part = round(0.3 * _KNOTS)
     poses = np.array([low] * part + [apex] * part + [goal] * (_KNOTS + 1 - 2 * part))
-    limits = sim.mechanism.input_limits
     problem = Problem(
         sim,
         start,
@@ -85,8 +84,7 @@ def humanoid_leap(
             Effort(sim.time_step * _EFFORT / legs.torque**2),
         ],
         constraints=[Goal(goal, components=np.arange(6))],
-        control_limits=limits if np.isfinite(limits).any() else None,
-        controls0=np.clip(held, *limits),
+        controls0=np.clip(held, *sim.mechanism.input_limits),
         states0=np.tile(start, (_KNOTS + 1, 1)),
     )
     problem.refinement = whole_number(f"{call}(refinement=...)", refinement)

@@ -90,7 +90,6 @@ def legged_mpc(
     command: Any = (_SPEED * slow, 0.0, 0.0) if velocity is None else velocity
     reference = SteeredGait(sim, make, command) if callable(command) else CommandedGait(sim, make, command)
     times = knot * np.arange(_HORIZON + 1)
-    limits = sim.mechanism.input_limits
     states, torques = reference(times), reference.torques(times[:-1])
     gains = np.array([part.gain for part in sim.mechanism.inputs or ()])
     problem = Problem(
@@ -98,9 +97,8 @@ def legged_mpc(
         states[0],
         _HORIZON,
         cost=[Tracking(states, _weights(legs, sim)), Effort(_EFFORT * gains**2 / unit**2)],
-        control_limits=limits if np.isfinite(limits).any() else None,
         substeps=substeps,
-        controls0=np.clip(torques, *limits),
+        controls0=np.clip(torques, *sim.mechanism.input_limits),
         states0=states,
     )
     grip = min((c.friction for c in sim.mechanism.contacts), default=0.0)

@@ -153,9 +153,7 @@ def humanoid_mpc(
     bends = np.pad(legs.bends(), ((0, 0), (0, sim.nv)))
     command = checks.array(f"{call}(velocity)", velocity, (3,))
     march = SteppingPose(pose, command, _LEAD * size, bends, (cycle, _SWING, bend))
-    limits = sim.mechanism.input_limits
-    bounded = limits if np.isfinite(limits).any() else None
-    problem = Problem(sim, pose, _HORIZON, cost=cost, control_limits=bounded, controls0=np.clip(held, *limits))
+    problem = Problem(sim, pose, _HORIZON, cost=cost, controls0=np.clip(held, *sim.mechanism.input_limits))
     usual: dict[str, Any] = {"iterations": _ITERATIONS, "kappa": kappa, "patience": 3}
     usual |= {"friction": _CAREFUL * min(contact.friction for contact in sim.mechanism.contacts)}
     usual |= {"first": Options(stages=(Stage(kappa, kappa),))}
