@@ -51,10 +51,10 @@ def test_import_loads_little_and_leaves_the_heavy_libraries_out() -> None:
     assert count < 150  # 80 today, of the standard library; NumPy alone is 170, Numba 1,100
 
 
-def test_a_simulation_needs_no_plotting_library() -> None:
+def test_a_problem_needs_no_plotting_library_and_little_of_scipy() -> None:
     program = (
-        "import sys, dojo_opt as dojo; sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01); "
-        "print([m for m in ('matplotlib', 'meshcat', 'mujoco', 'scipy.optimize') if m in sys.modules])"
+        "import sys, dojo_opt as dojo; dojo.problems.hop(); "
+        "print([m for m in ('matplotlib', 'meshcat', 'mujoco', 'scipy.optimize', 'scipy.spatial') if m in sys.modules])"
     )
     assert python(program).strip() == "[]"
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from dojo_opt.planning.task_space.quantity import FramePoses, FrameVelocities, Momenta, Quantity
 from dojo_opt.planning.task_space.task_spec import TaskSpec
@@ -23,6 +22,8 @@ _UNIT = (1.0, 0.0, 0.0, 0.0)
 
 def frame_on_body(call: str, sim: Simulator, frame: str, offset: ArrayLike) -> tuple[int, Vector]:
     """(number of the body, (7,) point and quaternion) of a frame whose origin is moved by `offset` in its own axes."""
+    from scipy.spatial.transform import Rotation
+
     kin = Kinematics(sim)
     body, point, turn = kin.place(checks.one_of(f"{call}(frame)", frame, kin.frames))
     if body < 0:
