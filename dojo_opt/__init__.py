@@ -65,12 +65,14 @@ def __getattr__(name: str) -> Any:
 
         warn_renamed(f"dojo.{name}", f"dojo.{_RENAMED[name]}")
         return __getattr__(_RENAMED[name])
+    if name.startswith("_"):  # tools ask every object for such names, pytest a dozen times per module of tests
+        raise AttributeError(f"module 'dojo_opt' has no attribute {name!r}")
     if name not in _HOME:
-        from difflib import get_close_matches
+        from sim.mechanism.checks import nearest
 
-        close = get_close_matches(name, __all__, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(__all__)}"
-        raise AttributeError(f"module 'dojo_opt' has no attribute {name!r}; {hint}")
+        raise AttributeError(
+            f"module 'dojo_opt' has no attribute {name!r}; it has {', '.join(__all__)}{nearest(name, __all__)}"
+        )
     home = _HOME[name]
     value = import_module(f"dojo_opt.{name}") if home == "dojo_opt" else getattr(import_module(home), name)
     globals()[name] = value

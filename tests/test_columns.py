@@ -5,11 +5,13 @@ from __future__ import annotations
 import ast
 import inspect
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from sim.model import record_columns
 from sim.model.layout import CARRY_FIELDS, DATA_FIELDS, MODEL_FIELDS
 from solvers.codes import Code
+from support.modules import Node, files_of, last_name, nodes_of, source_of
 
 SIM = Path(record_columns.__file__).parents[1]
 WIDTHS = {name: shape[-1] for name, shape in {**MODEL_FIELDS, **CARRY_FIELDS, **DATA_FIELDS}.items()}
@@ -30,14 +32,17 @@ def _named() -> set[str]:
 def _field(node: ast.expr) -> str | None:
     """The field that an expression is, as data.cone or model.cluster."""
     if isinstance(node, ast.Attribute) and node.attr in WIDTHS:
-        return node.attr if re.fullmatch(r"(data|model|work)(\.carry)?|carry", ast.unparse(node.value)) else None
+        owner = node.value
+        if isinstance(owner, ast.Attribute) and owner.attr == "carry":  # data.carry, as carry
+            owner = owner.value
+        return node.attr if isinstance(owner, ast.Name) and owner.id in ("data", "model", "work", "carry") else None
     return None
 
 
-def _rows(function: ast.FunctionDef) -> dict[str, str]:
+def _rows(function: list[ast.AST]) -> dict[str, str]:
     """Local names of rows of fields, `row = data.cone[c]`, and of vectors."""
     out = {}
-    for node in ast.walk(function):
+    for node in function:
         if isinstance(node, ast.Assign):
             pairs = [(target, node.value) for target in node.targets]
             if isinstance(node.targets[0], ast.Tuple) and isinstance(node.value, ast.Tuple):
@@ -52,12 +57,13 @@ def _rows(function: ast.FunctionDef) -> dict[str, str]:
     return out
 
 
-def numbers_of(source: str) -> list[tuple[str, str]]:
-    """(field, subscript) of every column that a function of a source calls by a number."""
+def numbers_of(functions: Iterable[ast.FunctionDef]) -> list[tuple[str, str]]:
+    """(field, subscript) of every column that a function calls by a number."""
     found = []
-    for function in (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef)):
-        rows = _rows(function)
-        for node in ast.walk(function):
+    for function in functions:
+        parts = list(ast.walk(function))
+        rows = _rows(parts)
+        for node in parts:
             if not isinstance(node, ast.Subscript):
                 continue
             name, last = _field(node.value), node.slice
@@ -70,28 +76,35 @@ def numbers_of(source: str) -> list[tuple[str, str]]:
     return found
 
 
+def _nodes(source: str, kind: type[Node]) -> list[Node]:
+    return [node for node in ast.walk(ast.parse(source)) if isinstance(node, kind)]
+
+
 def test_no_column_with_a_name_is_a_number() -> None:
     named = _named()
     assert {"contact_kin", "cone", "bound", "D", "pair_sizes"} <= named
     source = (
         "def f(data):\n    k = data.contact_kin[c]\n    return k[3] + k[Kin.GAP] + data.bound[c, 1] + data.cone[0, j]"
     )
-    assert sorted(numbers_of(source)) == [("bound", "data.bound[c, 1]"), ("contact_kin", "k[3]")]
+    assert sorted(numbers_of(_nodes(source, ast.FunctionDef))) == [
+        ("bound", "data.bound[c, 1]"),
+        ("contact_kin", "k[3]"),
+    ]
     wrong, seen = [], 0
-    for file in SIM.rglob("*.py"):
-        for name, text in numbers_of(file.read_text()):
+    for file in files_of("sim"):
+        for name, subscript in numbers_of(nodes_of(file, ast.FunctionDef)):
             seen += 1
             plain = WIDTHS[name] in COMPONENTS or name in SIDES + PADDED or not isinstance(WIDTHS[name], int)
             if name not in FRAMES and (name in named or not plain):
-                wrong.append(f"{file.name}: {text}")
+                wrong.append(f"{file.name}: {subscript}")
     assert seen > 1000 and wrong == []
 
 
-def loop_numbers_of(source: str) -> list[str]:
+def loop_numbers_of(subscripts: Iterable[ast.Subscript]) -> list[str]:
     """Subscripts by a number of the arrays of loops over time: settings, goals, and columns of reports."""
     found = []
-    for node in (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Subscript)):
-        name, last = ast.unparse(node.value).split(".")[-1], node.slice
+    for node in subscripts:
+        name, last = last_name(node.value), node.slice
         in_row = isinstance(last, ast.Tuple)
         last = last.elts[-1] if isinstance(last, ast.Tuple) else last
         if name in ("settings", "goal") or (name in ("report", "reports") and in_row):
@@ -101,19 +114,18 @@ def loop_numbers_of(source: str) -> list[str]:
 
 def test_no_setting_and_no_column_of_a_report_is_a_number() -> None:
     """Their names: StepSetting, AccuracyGoal, StepReport."""
-    assert loop_numbers_of("settings[1] + line.reports[t, 0] + reports[0] + goal[Goal.END]") == [
-        *("settings[1]", "line.reports[t, 0]")
-    ]
+    source = "settings[1] + line.reports[t, 0] + reports[0] + goal[Goal.END]"
+    assert loop_numbers_of(_nodes(source, ast.Subscript)) == ["settings[1]", "line.reports[t, 0]"]
     rooms = ("integrators", "simulator", "solve", "model")
-    files = [SIM / "step.py", *(file for room in rooms for file in (SIM / room).rglob("*.py"))]
-    assert [text for file in files for text in loop_numbers_of(file.read_text())] == []
+    files = [SIM / "step.py", *files_of(*(f"sim/{room}" for room in rooms))]
+    assert [found for file in files for found in loop_numbers_of(nodes_of(file, ast.Subscript))] == []
 
 
-def state_numbers_of(source: str) -> list[str]:
+def state_numbers_of(subscripts: Iterable[ast.Subscript]) -> list[str]:
     """Subscripts of states by numbers beyond the first four: columns that state_columns.py names."""
     found = []
-    for node in (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Subscript)):
-        name, last = ast.unparse(node.value).split(".")[-1], node.slice
+    for node in subscripts:
+        name, last = last_name(node.value), node.slice
         last = last.elts[-1] if isinstance(last, ast.Tuple) else last
         ends = (last.lower, last.upper) if isinstance(last, ast.Slice) else (last,)
         numbers = [end.value for end in ends if isinstance(end, ast.Constant) and isinstance(end.value, int)]
@@ -123,13 +135,15 @@ def state_numbers_of(source: str) -> list[str]:
 
 
 def test_no_part_of_a_state_is_a_number() -> None:
-    found = state_numbers_of("z[..., 6:10] + loop.x[:, 7] + x[3:7] + after[13] + x[:3] + x[nq] + x[2] + goal[JOINTS:]")
+    source = "z[..., 6:10] + loop.x[:, 7] + x[3:7] + after[13] + x[:3] + x[nq] + x[2] + goal[JOINTS:]"
+    found = state_numbers_of(_nodes(source, ast.Subscript))
     assert sorted(found) == ["after[13]", "loop.x[:, 7]", "x[3:7]", "z[..., 6:10]"]
-    files = [file for package in ("sim", "dojo_opt") for file in (SIM.parent / package).rglob("*.py")]
-    assert {f"{file.name}: {text}" for file in files for text in state_numbers_of(file.read_text())} == set()
+    files = files_of("sim", "dojo_opt")
+    assert {f"{f.name}: {found}" for f in files for found in state_numbers_of(nodes_of(f, ast.Subscript))} == set()
 
 
 def test_no_size_of_the_second_shape_of_a_pair_is_a_number() -> None:
     """PairSize.B is where they begin."""
-    texts = [file.read_text() for file in (SIM / "contact").rglob("*.py")]
-    assert [found for text in texts for found in re.findall(r"\bsizes\[[4-7]\]", text)] == []
+    assert [
+        found for file in files_of("sim/contact") for found in re.findall(r"\bsizes\[[4-7]\]", source_of(file))
+    ] == []

@@ -30,7 +30,9 @@ from dojo_opt.plant import monte_carlo, tick
 from dojo_opt.viewer.motion import Motion
 from sim.io.mjcf import report as mjcf_report
 from sim.io.urdf import report as urdf_report
-from support.programs import HOME, PACKAGES, python
+from support.fork_server import forked
+from support.modules import files_of, nodes_of, source_of
+from support.programs import PACKAGES, python
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -56,7 +58,7 @@ def test_a_problem_needs_no_plotting_library_and_little_of_scipy() -> None:
         "import sys, dojo_opt as dojo; dojo.problems.hop(); "
         "print([m for m in ('matplotlib', 'meshcat', 'mujoco', 'scipy.optimize', 'scipy.spatial') if m in sys.modules])"
     )
-    assert python(program).strip() == "[]"
+    assert forked(program).strip() == "[]"
 
 
 def test_every_public_name_exists() -> None:
@@ -68,7 +70,7 @@ def test_every_public_name_exists() -> None:
 
 def test_ilqr_stays_a_function_after_its_module_was_imported() -> None:
     assert (
-        python("import dojo_opt as d, dojo_opt.problems, dojo_opt.__main__; print(callable(d.ilqr))").strip() == "True"
+        forked("import dojo_opt as d, dojo_opt.problems, dojo_opt.__main__; print(callable(d.ilqr))").strip() == "True"
     )
 
 
@@ -135,7 +137,7 @@ def test_the_python_of_the_pages_runs(page: str, tmp_path: Path) -> None:
     python("\n".join(blocks), cwd=tmp_path)
 
 
-@pytest.mark.parametrize("library", ["trimesh", "jax"])
+@pytest.mark.parametrize("library", ["trimesh", pytest.param("jax", marks=pytest.mark.slow)])
 def test_the_python_of_the_guide_that_needs_an_extra_runs(library: str, tmp_path: Path) -> None:
     """Such a block is marked py, and imports the library of the extra first."""
     pytest.importorskip(library)
@@ -148,9 +150,9 @@ def test_the_python_of_the_guide_that_needs_an_extra_runs(library: str, tmp_path
 @pytest.mark.parametrize("package", [*PACKAGES, "benchmarks", "examples"])
 def test_prose_has_nouns_for_clauses(package: str) -> None:
     """At most 1.6 "what" in 1000 lines, names of variables included: 10 was the dialect, 0 to 1.6 are our models."""
-    texts = [file.read_text() for file in (ROOT / package).rglob("*.py")]
-    lines = sum(len(text.splitlines()) for text in texts)
-    assert 1000 * sum(len(re.findall(r"\bwhat\b", text, re.IGNORECASE)) for text in texts) <= 1.6 * lines
+    texts = [source_of(file) for file in files_of(package)]
+    lines = sum(len(source.splitlines()) for source in texts)
+    assert 1000 * sum(len(re.findall(r"\bwhat\b", source, re.IGNORECASE)) for source in texts) <= 1.6 * lines
 
 
 KERNEL_MARKS = ("kernel", "jit", "inner_kernel", "parallel_kernel", "local_kernel", "inlined", "optional")
@@ -160,29 +162,25 @@ KERNEL_MARKS = ("kernel", "jit", "inner_kernel", "parallel_kernel", "local_kerne
 def test_docstrings_begin_with_a_noun(package: str) -> None:
     """An editor shows a docstring by itself, where "Those of both" means nothing."""
     pronouns = re.compile(r'"""(Those|That of)\b')
-    found = [str(file) for file in (ROOT / package).rglob("*.py") if pronouns.search(file.read_text())]
+    found = [str(file) for file in files_of(package) if pronouns.search(source_of(file))]
     assert found == []
 
 
 def test_files_stay_readable() -> None:
     """A file with kernels has about 300 lines, others up to 600."""
     long = {}
-    for package in PACKAGES:
-        for file in (HOME / package).rglob("*.py"):
-            text = file.read_text()
-            length = len(text.splitlines())
-            if length > (300 if re.search(rf"^@({'|'.join(KERNEL_MARKS)})\b", text, re.MULTILINE) else 600):
-                long[file.name] = length
+    for file in files_of(*PACKAGES):
+        length = len(source_of(file).splitlines())
+        if length > (300 if re.search(rf"^@({'|'.join(KERNEL_MARKS)})\b", source_of(file), re.MULTILINE) else 600):
+            long[file.name] = length
     assert not long
 
 
 def test_functions_are_short() -> None:
     """Kernels have at most 45 lines after the docstring and 8 arguments, other functions at most 60 lines."""
     long, seen = [], 0
-    for path in (path for package in PACKAGES for path in (HOME / package).rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if not isinstance(node, ast.FunctionDef):
-                continue
+    for path in files_of(*PACKAGES):
+        for node in nodes_of(path, ast.FunctionDef):
             marks = {ast.unparse(mark).partition("(")[0] for mark in node.decorator_list}
             body = node.body[1:] if isinstance(node.body[0], ast.Expr) else node.body
             lines = (node.end_lineno or 0) - body[0].lineno + 1 if body else 0

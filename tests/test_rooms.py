@@ -6,10 +6,11 @@ import ast
 import re
 import tokenize
 from collections import Counter, defaultdict
+from collections.abc import Iterable
 
 import pytest
 
-from support.modules import ROOT, circles, imports, module_name, modules
+from support.modules import ROOT, circles, code_of, files_of, imports, module_name, modules, nodes_of, tree_of
 from support.programs import PACKAGES
 
 PLACES = ("benchmarks", "dojo_opt", "examples", "sim", "solvers", "tests")
@@ -30,23 +31,22 @@ def test_few_entries_at_the_top(package: str, most: int) -> None:
 
 
 def test_every_room_says_its_purpose() -> None:
-    for file, tree in modules().items():
+    for file, module in modules().items():
         if file.name == "__init__.py":
-            assert ast.get_docstring(tree), file
+            assert ast.get_docstring(module), file
 
 
 def test_no_file_name_is_used_more_than_twice() -> None:
-    names = Counter(file.name for place in PLACES for file in (ROOT / place).rglob("*.py"))
+    names = Counter(file.name for file in files_of(*PLACES))
     assert [name for name, count in names.items() if count > 2 and name != "__init__.py"] == []
 
 
 def test_no_class_name_is_used_twice() -> None:
     classes = defaultdict(list)
-    benchmarks = {file: ast.parse(file.read_text()) for file in (ROOT / "benchmarks").rglob("*.py")}
-    for file, tree in {**modules(), **benchmarks}.items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.ClassDef):
-                classes[node.name].append(module_name(file))
+    for file in files_of(*PACKAGES, "benchmarks"):
+        for name in re.findall(r"^ *class (\w+)", code_of(file), re.MULTILINE):
+            classes[name].append(module_name(file))
+    assert len(classes) > 500
     assert {name: where for name, where in classes.items() if len(where) > 1} == {}
 
 
@@ -67,26 +67,25 @@ def test_identifiers_have_american_spelling() -> None:
     assert not any(
         BRITISH.search(name) for name in ("noise", "precise", "symmetric", "otherwise", "parametric", "level")
     )
-    files = [file for place in PLACES for file in (ROOT / place).rglob("*.py*") if "__pycache__" not in file.parts]
+    files = [*files_of(*PLACES), *ROOT.glob("dojo_opt/**/*.pyi")]
     found = {file.name for file in files if BRITISH.search(file.name)}
     for file in files:
-        if BRITISH.search(file.read_text().lower()):
-            with open(file, "rb") as lines:
-                names = (token.string for token in tokenize.tokenize(lines.readline) if token.type == tokenize.NAME)
-                found |= {f"{file.relative_to(ROOT)}: {name}" for name in names if BRITISH.search(name.lower())}
+        names = set(re.findall(r"\w+", code_of(file)))
+        found |= {f"{file.relative_to(ROOT)}: {name}" for name in names if BRITISH.search(name.lower())}
     assert found == set()
 
 
+Documented = ast.Module | ast.ClassDef | ast.FunctionDef
 PARTS_OF_TUPLES = {"_replace", "_asdict", "_fields", "_field_defaults", "_make"}  # public, by Python's documentation
 
 
-def _foreign_private(tree: ast.Module) -> list[str]:
+def _foreign_private(module: Iterable[ast.AST]) -> list[str]:
     """Private names that a module takes from objects which are not its own: it never says self._name or cls._name."""
     found, own = [], set()
-    for node in ast.walk(tree):
+    for node in module:
         if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.AsyncFunctionDef):
             own.add(node.name)
-        if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.endswith("__"):
+        elif isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.endswith("__"):
             owner = ast.unparse(node.value)
             if owner in ("self", "cls") or owner.startswith("super("):
                 own.add(node.attr)
@@ -97,23 +96,26 @@ def _foreign_private(tree: ast.Module) -> list[str]:
 
 def test_no_module_takes_private_parts_of_others() -> None:
     """But for the compiler, which adapts Numba's."""
-    assert _foreign_private(ast.parse("def f(x):\n    return x._hidden")) == ["2: x._hidden"]
-    assert _foreign_private(ast.parse("class A:\n    def f(self, x):\n        return self._a + x._a")) == []
-    places = {module_name(file): _foreign_private(tree) for file, tree in modules().items()}
+    assert _foreign_private(ast.walk(ast.parse("def f(x):\n    return x._hidden"))) == ["2: x._hidden"]
+    assert _foreign_private(ast.walk(ast.parse("class A:\n    def f(self, x):\n        return self._a + x._a"))) == []
+    kinds = (ast.FunctionDef, ast.ClassDef, ast.AsyncFunctionDef, ast.Attribute)
+    places = {
+        module_name(file): _foreign_private(node for kind in kinds for node in nodes_of(file, kind))
+        for file in modules()
+    }
     assert {name: texts for name, texts in places.items() if texts and not name.startswith("solvers.compiler")} == {}
 
 
 def test_files_that_docstrings_name_exist() -> None:
     """A name with folders is a path, in part at least; a bare name is the name of some file."""
-    paths = {file.relative_to(ROOT).as_posix() for file in modules()}
-    paths |= {file.relative_to(ROOT).as_posix() for file in ROOT.glob("*/**/*.py")}
+    paths = {file.relative_to(ROOT).as_posix() for file in ROOT.glob("*/**/*.py")}
     wrong = []
-    for file, tree in modules().items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
-                for name in re.findall(r"(?<![\w/.])(?:\w+/)*\w+\.py\b", text):
-                    if not any(path == name or path.endswith("/" + name) for path in paths):
-                        wrong.append(f"{module_name(file)}: {name}")
+    for file in modules():
+        owners: list[Documented] = [tree_of(file), *nodes_of(file, ast.ClassDef), *nodes_of(file, ast.FunctionDef)]
+        for node in owners:
+            for name in re.findall(r"(?<![\w/.])(?:\w+/)*\w+\.py\b", ast.get_docstring(node, clean=False) or ""):
+                if not any(path == name or path.endswith("/" + name) for path in paths):
+                    wrong.append(f"{module_name(file)}: {name}")
     assert wrong == []
 
 

@@ -43,7 +43,10 @@ def leads(one: Path, other: Path) -> bool:
     return any(d.module_path == other for place in places for d in script.goto(*place, follow_imports=True))
 
 
-@pytest.mark.parametrize(("first", "last", "back"), [("simulator.py", "cone.py", 2), ("ilqr.py", "riccati.py", 5)])
+@pytest.mark.parametrize(
+    ("first", "last", "back"),
+    [pytest.param("simulator.py", "cone.py", 2, marks=pytest.mark.slow), ("ilqr.py", "riccati.py", 5)],
+)
 def test_every_file_of_a_walk_leads_to_the_next(first: str, last: str, back: int) -> None:
     """From one of the `back` files before it: a file calls several of the next ones."""
     files = next(files for files in walks() if files[0].name == first)

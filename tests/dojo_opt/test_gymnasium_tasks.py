@@ -41,7 +41,7 @@ def test_environments_are_as_gymnasium_has_them(name, monkeypatch):
 def test_people_watch_in_the_browser(monkeypatch):
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)
-    env = gymnasium.make("dojo_opt.learn:dojo/Pendulum-v0", render_mode="human")
+    env = gymnasium.make("dojo_opt.learn:dojo/Cartpole-v0", render_mode="human")
     now = [100.0]  # [s] of a clock that runs while the program sleeps, and 10 ms per action
     monkeypatch.setattr(environment, "perf_counter", lambda: now[0])
     monkeypatch.setattr(environment, "sleep", lambda seconds: now.append(now.pop() + seconds))
@@ -105,7 +105,7 @@ def test_a_batch_is_its_environments_one_by_one(mode):
 
 
 def test_batches_can_be_reset_in_part():
-    env = gymnasium.make_vec("dojo_opt.learn:dojo/Pendulum-v0", num_envs=3, autoreset_mode=AutoresetMode.DISABLED)
+    env = gymnasium.make_vec("dojo_opt.learn:dojo/Cartpole-v0", num_envs=3, autoreset_mode=AutoresetMode.DISABLED)
     before, _ = env.reset(seed=1)
     env.step(np.zeros((3, 1), dtype=np.float32))
     after, _ = env.reset(seed=1, options={"reset_mask": np.array([False, True, False])})

@@ -77,13 +77,14 @@ def test_weak_joints_jump_as_high_as_they_can(straight):
     np.testing.assert_allclose(rises[:, 1], 0.2, atol=0.01)
 
 
-def test_a_jump_lasts_whole_knots(straight):
+@pytest.mark.sweep(3)
+@pytest.mark.parametrize("substeps", [3, 4, 2])
+def test_a_jump_lasts_whole_knots(straight, substeps):
     """Of any number of time steps; the steps of a jump alone are no multiple of three or four."""
-    for substeps in (2, 3, 4):
-        problem = dojo.problems.jump(straight, substeps=substeps)
-        path = problem.specs[0][0].reference
-        assert len(path) == problem.horizon + 1 and problem.substeps == substeps
-        np.testing.assert_allclose(path[[0, -1], 2], problem.start[2], atol=1e-3)  # on its feet at both ends
+    problem = dojo.problems.jump(straight, substeps=substeps)
+    path = problem.specs[0][0].reference
+    assert len(path) == problem.horizon + 1 and problem.substeps == substeps
+    np.testing.assert_allclose(path[[0, -1], 2], problem.start[2], atol=1e-3)  # on its feet at both ends
 
 
 def test_six_legs_trot_in_two_sets_of_three():

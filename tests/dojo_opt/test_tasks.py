@@ -43,7 +43,7 @@ def test_hopping_reference_is_consistent():
         dojo.tasks.Hopping(leaning, (0.0, 0.0), 0.25, 0.2)
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.slow
 @pytest.mark.parametrize("perturbation", [{}, {"friction": 0.25}], ids=["nothing", "half the friction"])
 def test_hopper_keeps_to_all_that_is_tracked(perturbation):
     """With height, which the distance along the ground does not include: to 20 mm."""

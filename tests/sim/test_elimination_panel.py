@@ -29,7 +29,7 @@ def both_ways(model_at, data_at, columns, by_one):
     return count
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.slow  # `both_ways` is compiled
 @pytest.mark.parametrize(
     ("build", "deep"),
     [

@@ -31,7 +31,7 @@ def loaded(folder: Path, links: int, above) -> tuple[float, dojo.Mechanism, dojo
         gc.enable()
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.slow
 @pytest.mark.parametrize("above", [lambda k: k - 1, lambda k: 0, lambda k: k // 2], ids=["chain", "star", "tree"])
 def test_the_time_of_loading_grows_as_the_number_of_links(tmp_path: Path, above) -> None:
     growth = []

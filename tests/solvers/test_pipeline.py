@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from support.fork_server import forked
 from support.programs import python
 
 SIMULATION = """
@@ -39,17 +40,17 @@ print(FAST, said.getvalue().count("\\n"), said.getvalue())
 
 
 def test_an_unknown_numba_is_used_as_it_is_and_said_so_in_one_line():
-    first, *rest = python(UNKNOWN, DOJO_OPT_PLAIN_NUMBA="0").split()
+    first, *rest = forked(UNKNOWN, DOJO_OPT_PLAIN_NUMBA="0").split()
     assert (first, rest[0]) == ("False", "1") and "0.99.0" in rest
-    assert python(UNKNOWN, DOJO_OPT_PLAIN_NUMBA="1").split() == ["False", "0"]
+    assert forked(UNKNOWN, DOJO_OPT_PLAIN_NUMBA="1").split() == ["False", "0"]
 
 
 @pytest.mark.parametrize("setting", ["NUMBA_DEBUGINFO", "NUMBA_ENABLE_PROFILING"])
 def test_debug_information_is_for_numbas_own_pipeline(setting: str):
     """With it the fast pipeline makes invalid modules, or kernels with wrong results."""
     program = "from solvers.compiler.pipeline import FAST; print(FAST)"
-    assert python(program, DOJO_OPT_PLAIN_NUMBA="0", **{setting: "1"}).split() == ["False"]
-    assert python(program, DOJO_OPT_PLAIN_NUMBA="0", **{setting: "0"}).split() == ["True"]
+    assert forked(program, DOJO_OPT_PLAIN_NUMBA="0", **{setting: "1"}).split() == ["False"]
+    assert forked(program, DOJO_OPT_PLAIN_NUMBA="0", **{setting: "0"}).split() == ["True"]
 
 
 @pytest.mark.slow
