@@ -13,6 +13,7 @@ def robustness():
     yield from loaded("robustness")
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", ["block", "hopper", "quadruped", "quadruped12"])
 def test_no_extreme_state_is_missed(robustness, name):
     whole = robustness.total(robustness.study(160, [name], seed=7), name)

@@ -50,12 +50,12 @@ def test_people_watch_in_the_browser(monkeypatch):
     for _ in range(3):
         now[0] += 0.01
         env.step(np.zeros(1, dtype=np.float32))
-    assert now == pytest.approx([100.0 + 3 * 0.05])  # [s] of an action
+    assert now == pytest.approx([100.0 + 3 * 0.04])  # [s] of an action
     view = env.unwrapped.view
     assert opened == [view.url]
     env.close()
     with pytest.raises(ValueError, match="closed"):
-        view.show(np.zeros(2))
+        view.show(np.zeros(4))
 
 
 # one of each kind of state and observation: joints, commands, waypoints, forces of contacts, Dojo's own observation

@@ -43,6 +43,7 @@ def test_one_second(name: str) -> None:
         assert t.contacts.gap.min() > -1e-7
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("name", NAMES)
 def test_conservation_in_free_flight(name: str) -> None:
     """Momentum to rounding where nothing holds it, energy with a bounded error of second order."""
@@ -63,6 +64,7 @@ def test_conservation_in_free_flight(name: str) -> None:
     assert error[1] < 0.35 * error[0] or error[1] < 3e-8  # closed loops to their tolerance
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("name", NAMES)
 def test_gradients(name: str) -> None:
     """A and B against central differences of the step at the same kappa."""

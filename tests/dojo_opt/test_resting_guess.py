@@ -73,6 +73,7 @@ def reach(rng):
     return at_rest(sim, sim.neutral(), 40, cost=costs, constraints=[Goal(goal, components="q")])
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("make", [pushed_box, hop, block, reach], ids=lambda f: f.__name__)
 @pytest.mark.parametrize("seed", range(5))
 def test_plans_from_rest_succeed(make, seed):

@@ -127,6 +127,7 @@ def test_joints_hold_to_machine_precision(rng):
     np.testing.assert_allclose(s.quat, quat, atol=1e-11)
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("kappa", [1e-2, 1e-4, 1e-6, 1e-8])
 @pytest.mark.parametrize("law", [IMPACT, LINEAR, NONLINEAR])
 def test_landing_obeys_the_contact_law(law, kappa):

@@ -8,6 +8,7 @@ import dojo_opt as dojo
 from support.scenes import LAWS, ball, block, gaps, run
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("time_step", [1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1])
 def test_no_penetration_at_any_time_step(time_step, law):

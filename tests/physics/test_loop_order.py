@@ -107,7 +107,7 @@ def test_positions_and_node_velocities_are_of_second_order(
     np.testing.assert_allclose(coarse / fine, 4.0, rtol=0.1)
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5, 1e-6])
 @pytest.mark.parametrize("linkage", [fourbar, fivebar])
 def test_loops_have_the_accuracy_that_is_asked_for(

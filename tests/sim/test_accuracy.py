@@ -76,6 +76,7 @@ def test_a_block_slides_as_far_as_it_should(accuracy: float, steps: int) -> None
     assert impulse == pytest.approx([-2.0, 0.0, G], abs=0.1 + 0.25 * G / steps)
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4, 1e-5])
 @pytest.mark.parametrize("steps", [1, 10])
 def test_a_thrown_ball_lands_slides_and_rolls(accuracy: float, steps: int) -> None:

@@ -19,6 +19,7 @@ def again(mechanism):
     return part_of(json.loads(json.dumps(packed_part(mechanism, arrays))), arrays)
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("name", [entry.name for entry in dojo.models.catalog()])
 def test_every_model_comes_back_as_it_was(name):
     build = next(entry.build for entry in dojo.models.catalog() if entry.name == name)

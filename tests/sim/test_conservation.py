@@ -28,6 +28,7 @@ def test_momentum_of_a_free_chain(kind: str) -> None:
     np.testing.assert_allclose(angular, np.tile(angular[0], (51, 1)), atol=1e-9)
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize(("kind", "on_world"), CASES)
 def test_energy_error_is_of_second_order(kind: str, on_world: bool) -> None:
     mech = chain_with(kind, on_world)

@@ -120,6 +120,7 @@ def test_velocities_agree_with_the_interval(kind: str, on_world: bool) -> None:
     assert q.shape == (maps.mech.nq,)
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize(("kind", "on_world"), CASES)
 def test_jacobian_of_maximal(kind: str, on_world: bool) -> None:
     maps, x = setup(kind, on_world)
@@ -133,6 +134,7 @@ def test_jacobian_of_maximal(kind: str, on_world: bool) -> None:
         )
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(("kind", "on_world"), CASES)
 def test_jacobian_of_minimal(kind: str, on_world: bool) -> None:
     maps, x = setup(kind, on_world)

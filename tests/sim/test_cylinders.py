@@ -24,6 +24,7 @@ PAIRS = ["capsule_cylinder", "box_cylinder", "polytope_cylinder", "cylinder_cyli
 LYING = (0.5**0.5, 0.5**0.5, 0.0, 0.0)  # axis along -y
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", PAIRS)
 def test_distance_at_any_pose(name: str, rng: np.random.Generator) -> None:
     """Apart and up to .1 m inside, half of the smallest size; also with axes and faces that are almost parallel."""

@@ -88,6 +88,7 @@ def test_no_energy_in_passive_motion(kind: str) -> None:
                 np.testing.assert_allclose(momentum, np.tile(momentum[0], (len(xs), 1)), atol=1e-10)
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("strength", STIFFNESS)
 def test_derivatives_from_loose_to_stiff(strength: float) -> None:
     """By state, input and all that the weights depend on: dampers, masses, geometry, the time step."""

@@ -110,6 +110,7 @@ def test_contact_behind_every_joint(kind, regime, rng):
         assert_regime(mech, check(mech, x, u, kappa), regime, "nonlinear", kappa)
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_hard_sticking_behind_every_joint(kind, rng):
     mech = chain(kind, 1, gravity=(0.0, 0.0, -9.81), spring=3.0, damper=0.2)

@@ -93,6 +93,7 @@ def test_a_body_without_joints_tumbles_without_it():
     assert abs(work_in_step(sim, x)[0]) < 1e-9
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("damper", [0.0, 0.5])
 @pytest.mark.parametrize("kind", KINDS)
 def test_energy_on_arrival_agrees_with_the_simulator(kind, damper, rng):

@@ -108,7 +108,7 @@ def check(sim: dojo.Simulator, x: np.ndarray) -> float:
     return float(np.abs(check_step(sim, x, by_input=1e-5).contacts.impulse).max())
 
 
-@pytest.mark.sweep(6)
+@pytest.mark.sweep(10)
 @pytest.mark.parametrize("h, speed", [(1e-3, 5.0), (1e-3, 20.0), (1e-4, 5.0)])
 @pytest.mark.parametrize("name", SCENES)
 def test_impacts(name: str, h: float, speed: float) -> None:
@@ -171,6 +171,7 @@ def test_the_accuracy_includes_the_effect_of_a_load() -> None:
     assert sim.linearize_trajectory(x[None], np.zeros((1, sim.nu))).accuracy[0] < 1e-10
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", ["sticking", "sliding", "bouncing", "on a slope", "bodies"])
 def test_parameters_of_impacts(name: str) -> None:
     """To 1e-6 of the largest entry by their kind, or of 1: an impact that sticks hardly feels its friction."""

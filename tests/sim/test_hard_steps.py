@@ -47,6 +47,7 @@ def robustness():
     yield from loaded("robustness")
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("cell", CELLS, ids=str)
 def test_extreme_state(robustness, cell):
     name, friction, h, kappa, number = cell

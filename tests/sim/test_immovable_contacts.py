@@ -204,6 +204,7 @@ def _numbers(found: object) -> bool:
     return all(np.isfinite(v).all() for v in values if isinstance(v, np.ndarray) and v.dtype.kind == "f")
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("seed", range(40))
 def test_numbers_are_finite_or_the_status_says_not(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -107,6 +107,7 @@ def test_a_floating_ring_that_acts_keeps_its_momentum(name: str) -> None:
         assert sim.energy(t.x[-1]) < sim.energy(t.x[1])
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     "mechanism",
     [

@@ -70,6 +70,7 @@ def difference(mech: MjcfMechanism, a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(sim.difference(x, y)).max())
 
 
+@pytest.mark.sweep(3)
 @needs_gym
 @pytest.mark.parametrize("file", FILES)
 def test_free_flight_agrees_with_mujoco(file: str) -> None:
@@ -84,6 +85,7 @@ def test_free_flight_agrees_with_mujoco(file: str) -> None:
     assert error[1] < 0.3 * error[0] or error[0] < 1e-8, error
 
 
+@pytest.mark.sweep(4)
 @needs_gym
 @pytest.mark.parametrize("file", FILES)
 def test_damped_and_driven_flight_agrees_with_mujoco(file: str) -> None:
@@ -100,6 +102,7 @@ def test_damped_and_driven_flight_agrees_with_mujoco(file: str) -> None:
     assert difference(mech, extrapolated, expected) < 1e-5 * (1.0 + difference(mech, q, expected))
 
 
+@pytest.mark.sweep(5)
 @needs_gym
 @pytest.mark.parametrize("file", FILES)
 def test_merged_joints_move_like_chains(file: str) -> None:

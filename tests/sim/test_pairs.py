@@ -144,6 +144,7 @@ def test_a_far_pair_comes_near_within_a_step() -> None:
     assert falls[1].contacts.impulse[0, 2] == pytest.approx(5.0, rel=1e-6)  # 10 N s less 0.05 m / 0.01 s * 1 kg
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("kappa", [1e-2, 1e-4])
 @pytest.mark.parametrize(("law", "friction"), [("nonlinear", 0.5), ("linear", 0.5), ("impact", 0.0)])
 @pytest.mark.parametrize("pair", [("sphere", "sphere"), ("sphere", "box"), ("capsule", "capsule"), ("box", "box")])

@@ -19,6 +19,7 @@ from support.two_bodies import ROCK, SHAPES, approaching, two
 OTHERS = {**SHAPES, "polytope": Polytope.about_centroid([[0.3, 0, 0], [-0.3, 0.2, 0], [-0.1, -0.3, 0], [0, 0, 0.4]])}
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("first", [True, False], ids=["rock first", "rock second"])
 @pytest.mark.parametrize("name", OTHERS)
 def test_motions_keep_momentum_and_gain_no_energy(name: str, first: bool) -> None:

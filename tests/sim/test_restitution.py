@@ -102,6 +102,7 @@ def test_kane_s_double_pendulum_does_not_gain():
     assert min(rebounds) < 0.6  # some states had to give back less
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("kappa", [1e-2, 1e-4])
 @pytest.mark.parametrize("law", ["impact", "linear", "nonlinear"])
 def test_derivatives_through_an_impact(law, kappa):

@@ -15,6 +15,7 @@ from solvers.status import Status
 from support.mechanisms import CASES, chain_with, random_state
 
 
+@pytest.mark.sweep(7)
 @pytest.mark.parametrize(("kind", "on_world"), CASES)
 def test_node_has_the_energy_of_the_velocity(kind: str, on_world: bool) -> None:
     mech = chain_with(kind, on_world)

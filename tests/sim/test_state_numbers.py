@@ -50,6 +50,7 @@ CALLS: dict[str, Callable[[dojo.Simulator, np.ndarray], Any]] = {
 }
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("name", ["hopper", "linkage", "order 4"])
 @pytest.mark.parametrize("call", CALLS)
 def test_a_result_is_finite_or_refused(name: str, call: str, rng: np.random.Generator) -> None:

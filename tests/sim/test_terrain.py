@@ -101,7 +101,7 @@ def test_an_inclined_plane_on_a_grid_is_the_half_space(rng):
         np.testing.assert_allclose(first, second, atol=1e-6)
 
 
-@pytest.mark.sweep(6)
+@pytest.mark.sweep(13)
 @pytest.mark.parametrize("kappa", [1e-2, 1e-3, 1e-4])
 @pytest.mark.parametrize("law", ["impact", "linear", "nonlinear"])
 @pytest.mark.parametrize("height", [-0.01, 0.0, 0.3])

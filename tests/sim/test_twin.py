@@ -92,6 +92,7 @@ def hopper(law="nonlinear"):
     return dojo.Mechanism(bodies, [dojo.Joint("floating", None, "body"), leg], contacts, inputs)
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("time_step", [0.01, 0.05])
 @pytest.mark.parametrize("height", [1.5, 0.56])
 @pytest.mark.parametrize("law", LAWS)
@@ -197,7 +198,7 @@ def test_cone_limit(kind, rng):
             assert axis @ rot.rotate(q, axis) > np.cos(0.6) - 1e-9
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("base", ["floating", None])
 @pytest.mark.parametrize("kind", ["revolute", "planar_axis", "orbital", "fixed_orientation", "screw"])
 def test_armature(kind, base, rng):
@@ -220,6 +221,7 @@ def plain_coordinates(mech, joint):
     return range(start, start + joint.nv - 3 * (joint.nrot == 3))
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "fixed"])
 def test_limits_of_every_kind(kind, rng):
     """Every coordinate that is a plain number arrives at a bound in this very step; a quaternion is far from its cone."""
