@@ -67,6 +67,11 @@ def returns(task: str, act: Callable[[Floats], Floats], episodes: int, finer: in
     return out
 
 
+def in_columns(task: str, act: Callable[[Floats], Floats], episodes: int = 8, finer: int = 5) -> list[Floats]:
+    """Returns of the three columns."""
+    return [returns(task, act, episodes, *variant) for variant in ((1, False), (finer, False), (1, True))]
+
+
 def main() -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -79,8 +84,7 @@ def main() -> None:
     table: dict[str, list[float]] = {}
     print(f"{'policy':40} {given.task:>20} {'time step / ' + str(given.finer):>20} {'elliptic cones':>20}")
     for path in given.policies:
-        act, variants = load(path), ((1, False), (given.finer, False), (1, True))
-        columns = [returns(given.task, act, given.episodes, *variant) for variant in variants]
+        columns = in_columns(given.task, load(path), given.episodes, given.finer)
         table[path] = [float(c.mean()) for c in columns]
         print(f"{path[-40:]:40} " + " ".join(f"{c.mean():12.1f} +-{c.std():5.0f}" for c in columns), flush=True)
     if given.output:

@@ -35,9 +35,10 @@ _RARELY: dict[str, Any] = {"evaluations": 5, "episodes": 4}  # an evaluation tak
 SETTINGS: dict[str, dict[str, dict[str, Any]]] = {  # of shac, beside those of the task
     "HalfCheetah": {
         "shac": {},
+        "shac_long": {"epochs": 2000, "evaluations": 10},
         "best_of": {"epochs": 620},
-        "ars": {"epochs": 30, "rate": 0.02, "randomization": TRANSFER} | _RARELY,
-        "gradient_search": {"epochs": 60, "horizon": 80, "randomization": TRANSFER} | _RARELY,
+        "ars": {"epochs": 20, "rate": 0.02, "randomization": TRANSFER} | _RARELY,
+        "gradient_search": {"epochs": 1200, "horizon": 80, "randomization": TRANSFER} | _RARELY,
     },
     "Hopper": {
         "shac": {},
@@ -55,7 +56,7 @@ SETTINGS: dict[str, dict[str, dict[str, Any]]] = {  # of shac, beside those of t
     "Pendulum": {"shac": {"epochs": 100}, "ars": {"epochs": 30}, "gradient_search": {"epochs": 100}},
     "Cartpole": {"shac": {"epochs": 100}, "ars": {"epochs": 30}},
 }
-PEERS = ("ppo", "sac")  # of learning_peers.py
+PEERS = ("ppo", "sac", "ppo_dojo", "sac_dojo")  # of learning_peers.py, in MuJoCo or here
 JUDGED = ("HalfCheetah", "Hopper", "Walker2d", "Ant")
 UNSEEN = (10, 3e-5)  # time steps per action, smoothing [N s m]
 BARS: dict[str, list[tuple[str, float]]] = {  # of shac: quantity of its seeds, and its least acceptable value
@@ -85,7 +86,7 @@ def run(folder: Path, name: str, algorithm: str, seed: int, given: dict[str, Any
         trio = range(3 * seed, 3 * seed + 3)
         learned = dojo.learn.best_of(dojo.learn.shac, task, trio, verbose=True, **options)
     else:
-        learned = getattr(dojo.learn, algorithm)(task, seed=seed, verbose=True, **options)
+        learned = getattr(dojo.learn, algorithm.removesuffix("_long"))(task, seed=seed, verbose=True, **options)
     learned.save(path)
     learned.policy.save(path.with_suffix(".policy.npz"))
     print(f"{name} seed {seed}: {learned!r}", flush=True)
@@ -93,7 +94,8 @@ def run(folder: Path, name: str, algorithm: str, seed: int, given: dict[str, Any
 
 def saved(folder: Path, name: str, algorithm: str) -> list[Path]:
     """Files of the runs."""
-    return sorted(p for p in folder.glob(f"{name}_{algorithm}_*.npz") if not p.name.endswith(".policy.npz"))
+    first = f"{name}_{algorithm}_"
+    return sorted(p for p in folder.glob(f"{first}*.npz") if p.stem.removeprefix(first).isdigit())
 
 
 def curve(path: Path) -> Floats:
@@ -103,6 +105,11 @@ def curve(path: Path) -> Floats:
             return np.column_stack([data["seconds"], data["returns"]])
     history = dojo.learn.Learned.load(path).history
     return np.array([(r["seconds"], r["evaluated"]) for r in history if r["evaluated"] is not None])
+
+
+def label_of(algorithm: str) -> str:
+    """Name of an algorithm in the figure; peers learn in MuJoCo, unless they are said to learn here."""
+    return f"{algorithm} in MuJoCo" if algorithm in ("ppo", "sac") else algorithm.removesuffix("_dojo")
 
 
 def figure(folder: Path, names: list[str]) -> None:
@@ -121,7 +128,7 @@ def figure(folder: Path, names: list[str]) -> None:
             rows = min(map(len, curves))
             seconds = np.median([c[:rows, 0] for c in curves], axis=0)
             returns = np.array([c[:rows, 1] for c in curves])
-            label = f"{algorithm}, {len(curves)} seed{'s' if len(curves) > 1 else ''}"
+            label = f"{label_of(algorithm)}, {len(curves)} seed{'s' if len(curves) > 1 else ''}"
             axes.plot(seconds, np.median(returns, axis=0), marker=".", label=label)
             axes.fill_between(seconds, returns.min(axis=0), returns.max(axis=0), alpha=0.2)
         axes.set(xlabel="processor time [s]", ylabel="return in the task", title=name, xlim=(0.0, None))
@@ -151,8 +158,11 @@ def cells(folder: Path, name: str, algorithm: str) -> list[list[Any]]:
     out = []
     if algorithm in PEERS:
         for path in saved(folder, name, algorithm):
-            seconds, best = curve(path)[-1]
-            out.append([algorithm, int(path.stem.split("_")[-1]), best, *[None] * 5, seconds, *[None] * 3])
+            with np.load(path, allow_pickle=False) as data:
+                here = float(data["returns"][-1]) if algorithm.endswith("_dojo") else None
+                there, ended = [float(v) for v in data["mujoco"]], [float(data["seconds"][-1]), int(data["steps"][-1])]
+            seed = int(path.stem.split("_")[-1])
+            out.append([algorithm, seed, here, None, None, *there, *ended, None, None])
         return out
     paths = saved(folder, name, algorithm)
     policies = [path.with_suffix(".policy.npz") for path in paths]
@@ -174,7 +184,7 @@ def summary(name: str, algorithm: str, lines: list[list[Any]]) -> list[Row]:
     if not len(numbers):
         return rows
     means = dict(zip(_HEADER[1:], numbers.mean(axis=0), strict=True))
-    found = {"mean return": means["return"], "least return": numbers[:, 1].min()}
+    found = {} if np.isnan(means["return"]) else {"mean return": means["return"], "least return": numbers[:, 1].min()}
     for column, title in (
         ("after 60 s", "after 60 s"), ("unseen step and smoothing", "at an unseen step and smoothing"),
         *((column, f"in {column}") for column in _HEADER if column.startswith("MuJoCo")),
@@ -184,6 +194,7 @@ def summary(name: str, algorithm: str, lines: list[list[Any]]) -> list[Row]:
     bars = dict(BARS.get(name, ())) if ours else {}
     rows += [Row(f"{name}, {key}{of}", float(v), "", bars.get(key), True) for key, v in found.items()]
     rows.append(Row(f"{name}, mean time{of}", means["time [s]"], "s"))
+    rows.append(Row(f"{name}, control steps per second{of}", means["control steps"] / means["time [s]"], ""))
     if ours:
         rows += [Row(f"{name}, {key}", numbers[:, i].sum(), "", 0.0) for key, i in _COUNTS.items()]
     return rows

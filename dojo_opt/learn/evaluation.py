@@ -6,11 +6,11 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.policy import LearnedPolicy
-from dojo_opt.learn.randomization import Drawn
+from dojo_opt.learn.randomization import Drawn, check_pushes, draw_pushes
 from sim.mechanism.checks import whole_number
 from sim.mechanism.memory_limit import room_for
 from solvers.status import Status
@@ -47,6 +47,7 @@ def evaluate(
     substeps: int | None = None,
     kappa: float | None = None,
     delay: int = 0,
+    pushes: tuple[float, ArrayLike] | None = None,
 ) -> Evaluation:
     """Returns of episodes, all at once on all cores.
 
@@ -57,6 +58,7 @@ def evaluate(
         substeps: time steps per action; those of the task by default.
         kappa: smoothing [N s m]; that of the task by default.
         delay: control steps after which an action is applied (default 0).
+        pushes: as of a `Randomization` (default None: none).
 
     Returns:
         Evaluation; the same for the same seed.
@@ -74,6 +76,8 @@ def evaluate(
         sim = task.sim.replace(time_step=task.knot_time / steps, kappa=task.sim.kappa)
         model = replace(model, sim=sim, substeps=steps)
     delays = ActionDelay(whole_number("evaluate(delay=...)", delay, 0), count, task.sim.nu)
+    check_pushes("evaluate", pushes, task.sim.nv)
+    velocities = slice(task.sim.nq, task.sim.nx)
     rngs = [np.random.default_rng((seed, i)) for i in range(count)]
     xs = task.starts(rngs)
     returns, lengths, unsolved = np.zeros(count), np.zeros(count, dtype=np.int64), 0
@@ -88,6 +92,9 @@ def evaluate(
         returns[alive] += np.where(bad, 0.0, task.rewards(x, actions, found.x)[0] + task.survival * ~over)
         lengths[alive] += ~bad
         xs[alive], unsolved = found.x, unsolved + int(bad.sum())
+        if pushes is not None:
+            for i in alive:
+                xs[i, velocities] += draw_pushes(rngs[i], task, (), pushes)
         if alive[0] == 0:
             path.append(xs[0].copy())
         if (bad | over).any():

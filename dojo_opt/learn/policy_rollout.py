@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
-from dojo_opt.learn.randomization import Drawn, Randomization
+from dojo_opt.learn.randomization import Drawn, Randomization, draw_pushes
 from dojo_opt.learn.task import Task
 from sim.mechanism.short_repr import short_repr
 from solvers.status import Status
@@ -43,11 +43,7 @@ class Noise:
         actions = deviation * rng.standard_normal((*shape, task.sim.nu))
         observations, pushes = given.noise * rng.standard_normal((*shape, task.observations)), None
         if given.pushes is not None:
-            mean_time, spread = given.pushes
-            pushed = rng.uniform(size=(*shape, 1)) < task.knot_time / mean_time
-            size = np.zeros(task.sim.nv)
-            size[: np.size(spread)] = spread
-            pushes = pushed * size * rng.standard_normal((*shape, task.sim.nv))
+            pushes = draw_pushes(rng, task, shape, given.pushes)
         return cls(actions, observations, pushes)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +20,7 @@ from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
-__all__ = ["Models", "Randomization"]
+__all__ = ["Models", "Randomization", "check_pushes", "draw_pushes"]
 
 
 @dataclass(frozen=True)
@@ -73,11 +74,30 @@ class Randomization:
                 raise ValueError(f"Randomization(kappa=...): expected 0 < low <= high, got {self.kappa}")
         checks.number("Randomization(noise=...)", self.noise, at_least=0.0)
         room_for("Randomization(models=...)", self.models, 8.0 * (1 + len(self.values) + len(self.factors)))
-        if self.pushes is not None:
-            if not isinstance(self.pushes, tuple | list) or len(self.pushes) != 2:
-                raise TypeError(f"Randomization(pushes=...): expected (time, deviations), got {self.pushes!r}")
-            checks.number("Randomization(pushes=...)", self.pushes[0], above=0.0)
-            checks.floats("Randomization(pushes=...)", self.pushes[1])
+        check_pushes("Randomization", self.pushes)
+
+
+def check_pushes(call: str, pushes: Any, velocities: int | None = None) -> None:
+    """Refuse pushes that are no mean time [s] and deviations, or that have more of these than there are velocities."""
+    if pushes is None:
+        return
+    if not isinstance(pushes, tuple | list) or len(pushes) != 2:
+        raise TypeError(f"{call}(pushes=...): expected (time, deviations), got {pushes!r}")
+    checks.number(f"{call}(pushes=...)", pushes[0], above=0.0)
+    count = np.size(checks.floats(f"{call}(pushes=...)", pushes[1]))
+    if velocities is not None and count > velocities:
+        raise ValueError(f"{call}(pushes=...): expected at most {velocities} deviations, as velocities, got {count}")
+
+
+def draw_pushes(
+    rng: np.random.Generator, task: Task, shape: tuple[int, ...], pushes: tuple[float, ArrayLike]
+) -> Floats:
+    """(*shape, nv) changes of the velocities after actions: none, or normal ones, on average once in the given time."""
+    mean_time, spread = pushes
+    pushed = rng.uniform(size=(*shape, 1)) < task.knot_time / mean_time
+    size = np.zeros(task.sim.nv)
+    size[: np.size(spread)] = spread
+    return pushed * size * rng.standard_normal((*shape, task.sim.nv))
 
 
 class Models:
@@ -87,11 +107,7 @@ class Models:
         self._task, self._given = task, randomization
         self._choices = randomization.substeps or (task.substeps,)
         sim, count = task.sim, randomization.models
-        if randomization.pushes is not None and np.size(randomization.pushes[1]) > sim.nv:
-            raise ValueError(
-                f"Randomization(pushes=...): expected at most {sim.nv} deviations, as velocities, got "
-                f"{np.size(randomization.pushes[1])}"
-            )
+        check_pushes("Randomization", randomization.pushes, sim.nv)
         self._sims: dict[int, Simulator] = {}
         self._tables: dict[int, dict[str, Floats]] = {}
         for substeps in dict.fromkeys(self._choices):

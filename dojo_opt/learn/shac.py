@@ -21,6 +21,7 @@ from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.common_options import check_common
 from dojo_opt.learn.discounted_sum import DiscountedSum
 from dojo_opt.learn.epochs import learn
+from dojo_opt.learn.evaluation import evaluate
 from dojo_opt.learn.network import Adam, Network, clipped
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
@@ -67,6 +68,8 @@ class ShacOptions:
         batches: minibatches per pass (default 4).
         blend: share of the critic in its target network after an epoch (default 0.3).
         randomization: models that the policy learns on (default: that of the task).
+        robust: whether the best policy is the one with the largest sum of mean returns with and without the pushes of
+            `randomization`, if it has any, instead of those without (default False).
         kappa_grad: smoothing of the derivatives [N s m] (default None: that of the motion).
         start: policy to begin with, of `imitate` or another run; it brings its network and scaling (default None).
         evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
@@ -96,6 +99,7 @@ class ShacOptions:
     batches: int = 4
     blend: float = 0.3
     randomization: Randomization = Randomization()
+    robust: bool = False
     kappa_grad: float | None = None
     start: LearnedPolicy | None = None
     evaluations: int = 10
@@ -108,6 +112,8 @@ class ShacOptions:
     def __post_init__(self) -> None:
         lengths = () if self.episode is None else ("episode",)
         check_common("shac", self)
+        if not isinstance(self.robust, bool):
+            raise TypeError(f"shac(robust=...): expected True or False, got {checks.shown(self.robust)}")
         for name in ("environments", "passes", "batches", *lengths):
             checks.whole_number(f"shac({name}=...)", getattr(self, name))
         for name in ("gamma", "trace", "blend"):
@@ -256,6 +262,13 @@ class _Shac(Training):
 
     # -- results -------------------------------------------------------------------------------------------------------
 
+    def rating(self, policy: LearnedPolicy, value: float) -> float:
+        """As Training.rating, with the mean return under pushes where robust policies are asked for."""
+        o = self.options
+        if not o.robust or o.randomization.pushes is None:
+            return value
+        return value + float(evaluate(policy, o.episodes, self.seed, pushes=o.randomization.pushes).returns.mean())
+
     def snapshot(self) -> LearnedPolicy:
         """A copy of the policy as it is now."""
         p = self.policy
@@ -271,12 +284,15 @@ class _Shac(Training):
 
     def state(self) -> dict[str, Any]:
         """As Training.state, with the returns of finished episodes."""
-        return super().state() | {"finished": list(self.finished), "restarts": self.restarts.bit_generator.state}
+        score = {"score": self.score} if self.options.robust else {}
+        own = {"finished": list(self.finished), "restarts": self.restarts.bit_generator.state}
+        return super().state() | own | score
 
     def resume(self, learned: Learned) -> None:
         """As Training.resume."""
         super().resume(learned)
         self.finished, self.restarts.bit_generator.state = list(learned.state["finished"]), learned.state["restarts"]
+        self.score = learned.state.get("score", self.score)
 
 
 def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:

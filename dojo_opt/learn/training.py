@@ -38,6 +38,7 @@ class Training:
         self._check_memory()
         self.rng = np.random.default_rng((seed, 1))
         self.epoch, self.steps, self.unsolved, self.infinite, self.best = 0, 0, 0, 0, -np.inf
+        self.score = -np.inf
 
     def _check_memory(self) -> None:
         """Refuse rollouts of an epoch, with their derivatives, that do not fit the memory."""
@@ -72,8 +73,13 @@ class Training:
         found = evaluate(policy, self.options.episodes, self.seed)
         self.count(found)
         value = float(found.returns.mean())
-        if value > self.best:
-            self.best, self.chosen = value, policy
+        score = self.rating(policy, value)
+        if score > self.score:
+            self.score, self.best, self.chosen = score, value, policy
+        return value
+
+    def rating(self, policy: LearnedPolicy, value: float) -> float:
+        """The number that the best policy has most of: by default its mean return."""
         return value
 
     def count(self, found: Evaluation) -> None:
@@ -93,6 +99,7 @@ class Training:
         """Go on where a run ended."""
         for name in self.NUMBERS:
             setattr(self, name, learned.state[name])
+        self.score = self.best
         for name, array in self.arrays().items():
             array[...] = learned.state[name]
         self.rng.bit_generator.state = learned.state["rng"]

@@ -14,6 +14,8 @@ import dojo_opt as dojo
 from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.discounted_sum import DiscountedSum
 from dojo_opt.learn.network import Adam, Network, perceptron
+from dojo_opt.learn.observation_statistics import ObservationStatistics
+from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import Noise
 from dojo_opt.learn.randomization import Drawn, Models
 
@@ -252,6 +254,49 @@ def test_a_seed_repeats_to_the_bit_and_a_run_can_be_resumed(task, name, tmp_path
     assert whole.best == rest.best and whole.steps == rest.steps
     other = algorithm(task, **(options | {"seed": 4}))
     assert np.abs(other.state["weights"] - whole.state["weights"]).max() > 1e-6
+
+
+def test_pushes_change_an_evaluation_by_their_size_alone(task):
+    policy = _policy(task)
+    calm, pushed, again = (
+        dojo.learn.evaluate(policy, 3, 1, pushes=pushes).returns
+        for pushes in ((0.1, [0.0]), (task.knot_time, [2.0]), (task.knot_time, [2.0]))
+    )
+    np.testing.assert_array_equal(calm, dojo.learn.evaluate(policy, 3, 1).returns)
+    np.testing.assert_array_equal(pushed, again)
+    assert np.abs(pushed - calm).min() > 1e-3
+    np.testing.assert_array_equal(pushed[:2], dojo.learn.evaluate(policy, 2, 1, pushes=(task.knot_time, [2.0])).returns)
+    with pytest.raises(ValueError, match=r"evaluate\(pushes=...\): expected at most 1 deviations"):
+        dojo.learn.evaluate(policy, 1, pushes=(0.1, [1.0, 1.0]))
+
+
+def test_a_robust_policy_is_the_best_of_the_sums_with_and_without_pushes(task, tmp_path):
+    pushes = (task.knot_time, [3.0])
+    models = dojo.learn.Randomization(pushes=pushes)
+    options = {"epochs": 6, "environments": 4, "horizon": 5, "evaluations": 6, "episodes": 2, "rate": 0.02, "seed": 5}
+    options |= {"randomization": models, "robust": True}
+    found, seen = dojo.learn.shac(task, **options), []
+    for epoch in range(1, 7):
+        part = dojo.learn.shac(task, **options, callback=lambda record, last=epoch: _stop(record, last))
+        now = LearnedPolicy(part.policy.network, part.state["weights"], *_scaling(part), task)
+        with_pushes = dojo.learn.evaluate(now, 2, 5, pushes=pushes).returns.mean()
+        seen.append((part.history[-1]["evaluated"], with_pushes))
+    alone, sums = np.array(seen)[:, 0], np.sum(seen, axis=1)
+    assert found.best == alone[np.argmax(sums)] and found.state["score"] == sums.max()
+    assert np.argmax(sums) != np.argmax(alone)  # of this seed, so that the rule matters
+    part = dojo.learn.shac(task, **options, callback=lambda record: _stop(record, 5))
+    part.save(tmp_path / "half.npz")
+    rest = dojo.learn.shac(task, **options, resume=dojo.learn.Learned.load(tmp_path / "half.npz", task))
+    assert rest.best == found.best and rest.state["score"] == found.state["score"]
+    with pytest.raises(TypeError, match="robust"):
+        dojo.learn.shac(task, epochs=1, robust=3)
+
+
+def _scaling(run):
+    """(mean, deviation) of observations at the end of a run."""
+    statistics = ObservationStatistics(len(run.policy.mean))
+    statistics.sums[...] = run.state["sums"]
+    return statistics.sums[0].copy(), statistics.deviation()
 
 
 def _stop(record, epoch):
