@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import ast
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -52,10 +51,14 @@ def _check_own(name: str) -> None:
 _check_own("sim")
 _check_own("solvers")
 
-try:
-    __version__ = version("dojo-opt")
-except PackageNotFoundError:  # run from a source tree that is not installed
-    __version__ = "0+source"
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version  # which takes longer than all the rest here
+
+    try:
+        return version("dojo-opt")
+    except PackageNotFoundError:  # run from a source tree that is not installed
+        return "0+source"
 
 
 def __getattr__(name: str) -> Any:
@@ -65,6 +68,9 @@ def __getattr__(name: str) -> Any:
 
         warn_renamed(f"dojo.{name}", f"dojo.{_RENAMED[name]}")
         return __getattr__(_RENAMED[name])
+    if name == "__version__":
+        globals()[name] = _version()
+        return globals()[name]
     if name.startswith("_"):  # tools ask every object for such names, pytest a dozen times per module of tests
         raise AttributeError(f"module 'dojo_opt' has no attribute {name!r}")
     if name not in _HOME:

@@ -17,20 +17,15 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict
+from math import isfinite
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import dojo_opt as dojo
-from dojo_opt.plant.tick import milliseconds
-from dojo_opt.report import STUDIES
-from dojo_opt.report.command import CHECKOUT, MOVED, add_arguments, report
-from dojo_opt.tasks.plan_task import PlanTask
-from dojo_opt.viewer.show import add_show, show
-from dojo_opt.viewer.whole_file import whole_file
-from sim.io.json_text import json_text
-from sim.mechanism.checks import nearest, one_of
+
+# NumPy, Numba and most rooms are imported by the functions that need them, so that `program` begins before they are
+if TYPE_CHECKING:
+    from dojo_opt.tasks.plan_task import PlanTask
 
 # names for `run`; the gaits of the quadruped also have the names of their examples, quadruped_trot and so on
 PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap", "humanoid_leap")
@@ -41,6 +36,10 @@ _ENDED_BY_SIGINT = 128 + 2  # as shells say it
 
 
 def _parser() -> argparse.ArgumentParser:
+    from dojo_opt.report import STUDIES
+    from dojo_opt.report.command import CHECKOUT, MOVED, add_arguments
+    from dojo_opt.viewer.show import add_show
+
     parser = argparse.ArgumentParser(prog="dojo-opt", description="Plan motion through contact, and measure it.")
     parser.add_argument("--version", action="version", version=f"dojo-opt {dojo.__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -102,8 +101,23 @@ def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
 
 def _save(figure: Any, path: Path, dpi: int = 150) -> None:
     """Write a figure of Matplotlib as a whole."""
+    from dojo_opt.viewer.whole_file import whole_file
+
     with whole_file(path) as file:
         figure.savefig(file, dpi=dpi)
+
+
+def _print_json(value: Any) -> None:
+    from sim.io.json_text import json_text
+
+    print(json_text(value))
+
+
+def _refuse(kind: str, name: str, owner: str, there: Sequence[str]) -> NoReturn:
+    """Refuse a name with those that exist."""
+    from sim.mechanism.checks import nearest
+
+    raise ValueError(f"no {kind} {name!r}; {owner} {', '.join(there)}{nearest(name, there)}")
 
 
 def _run(args: argparse.Namespace) -> int:
@@ -114,7 +128,7 @@ def _run(args: argparse.Namespace) -> int:
     name = args.name.removeprefix("quadruped_") if args.name.removeprefix("quadruped_") in GAITS else args.name
     if name not in PROBLEMS:
         there = [*PROBLEMS, *LOOPS, *(f"{suite}.TASK" for suite in SUITES)]
-        raise ValueError(f"no problem or task {args.name!r}; there are {', '.join(there)}{nearest(args.name, there)}")
+        _refuse("problem or task", args.name, "there are", there)
     if args.perturb or args.seconds is not None:
         raise ValueError(f"--perturb and --seconds apply to closed loops ({', '.join(LOOPS)}); {name} is a plan")
     problem = getattr(dojo.problems, name)(**_arguments(args.set))
@@ -131,7 +145,7 @@ def _run(args: argparse.Namespace) -> int:
         numbers |= {"message": plan.message, "iterations": int(plan.nit), "cost": float(plan.fun)}
         numbers |= {"violation": float(plan.violation), "seconds": seconds}
         numbers |= {"x": plan.x.tolist(), "u": plan.u.tolist()}
-        print(json_text(numbers))
+        _print_json(numbers)
     else:
         for path in filter(None, (args.out, args.html)):
             print(f"wrote {path}")
@@ -139,6 +153,10 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _run_loop(args: argparse.Namespace) -> int:
+    import numpy as np
+
+    from dojo_opt.plant.tick import milliseconds
+
     mpc = getattr(dojo.tasks, args.name)(**_arguments(args.set))
     plant = dojo.tasks.plant(mpc, **_arguments(args.perturb))
     loop = dojo.closed_loop(mpc, plant, 4.0 if args.seconds is None else args.seconds)
@@ -152,7 +170,7 @@ def _run_loop(args: argparse.Namespace) -> int:
     numbers |= {"ticks": len(loop.log), "fallbacks": fallbacks}
     numbers |= {"tick_median_ms": float(np.median(ms)), "tick_99_ms": float(np.percentile(ms, 99))} if ms.size else {}
     if args.json:
-        print(json_text(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()}))
+        _print_json(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()})
     else:
         print(f"{loop.message}  rms {loop.rms():.3f} (m, rad) in {loop.duration:.2f} s over all tracked coordinates:")
         print("  " + ", ".join(f"{name} {value:.3f}" for name, value in each.items()))
@@ -163,10 +181,12 @@ def _run_loop(args: argparse.Namespace) -> int:
 
 
 def _run_suite(args: argparse.Namespace) -> int:
+    from dojo_opt.tasks.plan_task import PlanTask
+
     suite, _, name = args.name.partition(".")
     there = getattr(dojo.tasks, suite)
     if name not in there.__all__:
-        raise ValueError(f"no task {args.name!r}; {suite} has {', '.join(there.__all__)}{nearest(name, there.__all__)}")
+        _refuse("task", args.name, f"{suite} has", there.__all__)
     given = _arguments(args.set)
     seed = given.pop("seed", None)
     task = getattr(there, name)(**given)
@@ -187,12 +207,12 @@ def _run_suite(args: argparse.Namespace) -> int:
     }
     numbers |= {"rate_hz": task.rate, "penetration_mm": 1e3 * outcome.penetration}
     if args.json:
-        print(json_text(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()}))
+        _print_json(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()})
     else:
         print(f"{'success' if outcome.success else 'no success'}: {loop.message}")
         print("  " + ", ".join(f"{measure} {value:.3g}" for measure, value in outcome.measures.items()))
         ticks = "ticks at {rate_hz:g} Hz: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms of the processor"
-        ticks = ticks if np.isfinite(outcome.tick_median_ms) else "too short for a second tick"
+        ticks = ticks if isfinite(outcome.tick_median_ms) else "too short for a second tick"
         print((ticks + ", {fallbacks} fallbacks; penetration {penetration_mm:.2g} mm").format(**numbers))
     return 0 if outcome.success else 1
 
@@ -210,7 +230,7 @@ def _plan_task(args: argparse.Namespace, task: PlanTask) -> int:
         dojo.viewer.save_html(plan, args.html)
     numbers = {"task": args.name, "message": plan.message, "seconds": seconds, **outcome._asdict()}
     if args.json:
-        print(json_text(numbers | {"x": plan.x.tolist(), "u": plan.u.tolist()}))
+        _print_json(numbers | {"x": plan.x.tolist(), "u": plan.u.tolist()})
     else:
         print(f"{'success' if outcome.success else 'no success'}: {plan.message}")
         print("  " + ", ".join(f"{measure} {value:.3g}" for measure, value in outcome.measures.items()))
@@ -226,7 +246,7 @@ def _models(args: argparse.Namespace) -> int:
             _save(dojo.plots.thumbnail(entry.build()), args.thumbnails / f"{entry.name}.png", dpi=100)
     if args.json:
         rows = [asdict(entry) for entry in entries]
-        print(json_text([{name: row[name] for name in row if name != "builder"} for row in rows]))
+        _print_json([{name: row[name] for name in row if name != "builder"} for row in rows])
         return 0
     print(f"{'name':<18}{'bodies':>7}{'nq':>4}{'nv':>4}{'nu':>4}{'contacts':>9}{'limits':>7}{'kg':>8}  description")
     for e in entries:
@@ -244,18 +264,30 @@ def _warmup(args: argparse.Namespace) -> int:
     numbers |= {"kernels": len(compiled_signatures()), "signatures": sum(compiled_signatures().values())}
     folder = cache_folder()
     if args.json:
-        print(json_text({**numbers, "cache": str(folder) if folder else None}))
+        _print_json({**numbers, "cache": str(folder) if folder else None})
     else:
         where = f"cached in {folder}" if folder else "not cached (DOJO_OPT_CACHE=0, or no usable folder)"
         print("{signatures} signatures of {kernels} kernels in {seconds:.1f} s, ".format(**numbers) + where)
     return 0 if plan.success else 1
 
 
+def _report(args: argparse.Namespace) -> int:
+    from dojo_opt.report.command import report
+
+    return report(args)
+
+
+def _show(args: argparse.Namespace) -> int:
+    from dojo_opt.viewer.show import show
+
+    return show(args)
+
+
 _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "run": _run,
-    "report": report,
+    "report": _report,
     "models": _models,
-    "show": show,
+    "show": _show,
     "warmup": _warmup,
 }
 
@@ -277,6 +309,8 @@ def _check_files(args: argparse.Namespace) -> None:
             raise ValueError(f"--{name}: {str(path)!r} cannot be written")
         if name == "out":
             from matplotlib.backend_bases import FigureCanvasBase
+
+            from sim.mechanism.checks import one_of
 
             kinds = [f".{kind}" for kind in sorted(FigureCanvasBase.get_supported_filetypes())]
             one_of("--out: the ending", path.suffix, kinds)
@@ -313,9 +347,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def program() -> int:
     """`main` as a program: Ctrl-C ends it without a traceback, with the status 130 of a shell.
 
-    It ends by the signal itself, which stops a script around it, too.
+    It ends by the signal itself, which stops a script around it, too. While the packages are imported, nothing is there
+    to be cleaned up, and modules in C could lose an exception: the signal ends the program at once.
     """
     try:
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not of a shell's job in the background
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+            _parser()
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         return main()
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)

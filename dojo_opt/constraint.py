@@ -30,6 +30,7 @@ from dojo_opt.planning.term import (
     state_table,
     table,
 )
+from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
 
@@ -211,11 +212,12 @@ class ResidualConstraint(Spec):
     __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
+        equality = checks.flag("ResidualConstraint(equality=...)", self.equality)
         check_residual("ResidualConstraint", self.function, self.dimension, self.jacobian, sim)
         knots = knot_list("ResidualConstraint(knots=...)", self.knots, horizon, last=True)
         kernels = ResidualKernels(self.function, self.jacobian, sim.nu)
         weight = np.ones((knots.size, self.dimension))
-        return ResidualTerm("ResidualConstraint", knots, weight, not self.equality, kernels, layout)
+        return ResidualTerm("ResidualConstraint", knots, weight, not equality, kernels, layout)
 
 
 @dataclass(frozen=True)

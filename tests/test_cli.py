@@ -277,6 +277,26 @@ def test_ctrl_c_ends_every_command_by_its_signal_and_in_silence() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, expected, "")
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a single process")
+@pytest.mark.parametrize("module", ["numpy", "numba", "dojo_opt.report"])
+def test_ctrl_c_during_imports_ends_a_command_in_silence(module: str) -> None:
+    program = (
+        "import os, signal, sys\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, *others):\n"
+        f"        if name == {module!r}:\n"
+        "            print('importing', flush=True)\n"
+        "            os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Finder()); sys.argv = ['dojo-opt', 'models']\n"
+        "from dojo_opt.__main__ import program; sys.exit(program())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(HOME)}
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "importing\n", "")
+
+
 def test_files_are_written_as_a_whole_or_not_at_all(tmp_path: Path) -> None:
     path = tmp_path / "plan.html"
     for before in (None, "old"):

@@ -51,7 +51,6 @@ COUNTS = {
     "closed loop for ever": (lambda: dojo.closed_loop(still, PLANT, 1e300), "closed_loop(duration)"),
     "runs": (lambda: study(runs=N), "monte_carlo(runs=...)"),
     "runs for ever": (lambda: study(duration=1e300), "monte_carlo(duration)"),
-    "cycles": (lambda: dojo.problems.trot(cycles=N), "gaits.trot(cycles=...)"),
     "pendulums": (lambda: dojo.models.npendulum(N), "npendulum(n)"),
     "sliders": (lambda: dojo.models.nslider(N), "nslider(n)"),
     "links": (lambda: dojo.models.orbital(N), "orbital(n)"),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.gaits.feet import Feet
-from dojo_opt.gaits.gait import Gait, assemble
+from dojo_opt.gaits.gait import Gait, assemble, check_length
 from sim.mechanism import checks
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
@@ -72,7 +72,9 @@ def step(
     swung = _swung(feet, swinging)
     spans = [checks.number(f"gaits.step({n}=...)", t, above=0.0) for n, t in (("shift", shift), ("swing", swing))]
     total = 2.0 * spans[0] + spans[1] + checks.number("gaits.step(settle=...)", settle, at_least=0.0)
-    time = sim.time_step * np.arange(-1.0, round(total / sim.time_step) + 1.0)
+    steps = round(min(total / sim.time_step, 1e300))
+    check_length("gaits.step(shift=..., swing=..., settle=...)", sim, steps, "step in less time")
+    time = sim.time_step * np.arange(-1.0, steps + 1.0)
     out, over, back = (
         _smooth((time - begin) / span) for begin, span in ((0.0, shift), (shift, swing), (shift + swing, shift))
     )

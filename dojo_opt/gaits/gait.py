@@ -11,6 +11,7 @@ from dojo_opt.gaits.equilibrium import input_map, least_pushes
 from dojo_opt.gaits.feet import Feet
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
+from sim.mechanism.memory_limit import check_room
 from sim.mechanism.servos import passive
 from sim.mechanism.short_repr import short_repr
 from sim.model.state_columns import BaseState
@@ -23,6 +24,7 @@ __all__ = ["Gait"]
 
 _ALOFT = 100.0  # [m] where no foot feels the ground
 _FAR = 1e3  # [rad, m] where no joint feels its stops
+_LONGEST = 100_000  # time steps: half an hour at 20 ms, whose inverse kinematics take seconds
 _EVEN = 1e-4  # weight of small foot forces against the balance of the base
 
 
@@ -135,6 +137,23 @@ def _pyramid(feet: Feet) -> Array:
         friction = contact.friction if contact.law != "impact" else 0.0
         out[k] = n + friction * np.array([first, -first, second, -second])
     return out
+
+
+def check_length(call: str, sim: Simulator, steps: float, remedy: str) -> None:
+    """Refuse gaits that are too long, or larger than the memory, before any array of theirs is made.
+
+    Args:
+        call: the call and the argument that an error names.
+        sim: simulator of the robot.
+        steps: number of time steps.
+        remedy: end of the message.
+
+    Raises:
+        ValueError: there are more than 100,000, or their derivatives, which torques and plans need, do not fit.
+    """
+    if not steps <= _LONGEST:
+        raise ValueError(f"{call}: expected at most {_LONGEST:,} time steps, got {steps:.6g}: {remedy}")
+    check_room(call, int(steps), 8.0 * (sim.nx + sim.ndx * (sim.ndx + sim.nu)), remedy)
 
 
 def assemble(sim: Simulator, name: str, base: Array, feet: Array, contact: Booleans, *, names: tuple[str, ...]) -> Gait:

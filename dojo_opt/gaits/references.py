@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.gaits.biped import balanced
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.footfall import Footfall
-from dojo_opt.gaits.gait import Gait, assemble
+from dojo_opt.gaits.gait import Gait, assemble, check_length
 from sim.mechanism import checks
-from sim.mechanism.memory_limit import check_room, room_for
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
@@ -32,6 +31,7 @@ _PACE = {(True, False): 0.0, (False, False): 0.0, (True, True): 0.5, (False, Tru
 _BOUND = {(False, False): 0.0, (False, True): 0.0, (True, False): 0.5, (True, True): 0.5}
 _WALK = {(False, True): 0.0, (True, True): 0.25, (False, False): 0.5, (True, False): 0.75}
 _HOP = dict.fromkeys(_TROT, 0.0)
+_STRONGEST = 1000.0  # largest push of a jump, over the weight
 _KEYWORDS = "speed period duty lateral heading_rate cycles step_height height footholds tilt".split()
 
 
@@ -185,6 +185,7 @@ def stand(sim: Simulator, *, duration: float = 1.0, height: float | None = None)
     """
     _check_legs("gaits.stand", sim)
     steps = _whole("gaits.stand(duration=...)", duration, sim.time_step)
+    check_length("gaits.stand(duration=...)", sim, steps, "stand for less time")
     feet, ground = Feet(sim), _ground(sim)
     base = np.tile(sim.neutral()[BaseState.POSE], (steps + 2, 1))
     if height is not None:
@@ -211,7 +212,7 @@ def jump(
     Args:
         sim: simulator of a robot with legs on a floating base.
         distance: displacement along x [m].
-        height: rise of the base over its first height [m], above 0.
+        height: rise of the base over its first height [m], above 0, at most 1,000 times the crouch.
         crouch: drop of the base before the push [m], above 0.
         clearance: distance by which the feet are drawn in during the flight [m].
         before: time in which the base sinks [s], above 0.
@@ -232,11 +233,15 @@ def jump(
         checks.number(f"{call}({name}=...)", value)
     for name, value in (("height", height), ("crouch", crouch), ("before", before), ("after", after)):
         checks.number(f"{call}({name}=...)", value, above=0.0)
+    if height > _STRONGEST * crouch:  # the work of the push is that of the rise
+        raise ValueError(
+            f"{call}(height=..., crouch=...): expected a rise of at most {_STRONGEST:,.0f} times the crouch, whose "
+            f"push takes as many times the weight; got {height:g} m from {crouch:g} m"
+        )
     speed = float(np.sqrt(2.0 * 9.81 * height))
     durations = before, 2.0 * crouch / speed, 2.0 * speed / 9.81, after
     sink, push, fly, rest = (max(1, round(min(d / h, 1e300))) for d in durations)
-    each = 8.0 * (sim.nx + sim.ndx * (sim.ndx + sim.nu))  # with derivatives, which its torques and plans need
-    check_room(f"{call}: time steps", sink + 2 * push + fly + rest, each, "jump in less time")
+    check_length(f"{call}(...)", sim, sink + 2 * push + fly + rest, "jump in less time")
     ends = np.cumsum([0, sink, push, fly, push, rest]) * h
     t = h * np.arange(-1, round(ends[-1] / h) + 1)
     forward, up = _jump_path(np.clip(t, 0.0, None), ends, distance, crouch, height)
@@ -333,7 +338,8 @@ def _periodic(
     if height is not None:
         checks.number(f"{call}(height=...)", height)
     once = _whole(f"{call}(period=...)", period, sim.time_step)
-    steps = once * room_for(f"{call}(cycles=...)", cycles, 8.0 * once * sim.nx, remedy="repeat a plan: Plan.repeated")
+    steps = once * checks.whole_number(f"{call}(cycles=...)", cycles)
+    check_length(f"{call}(cycles=..., period=...)", sim, steps, "repeat a plan: Plan.repeated")
     feet, ground, neutral = Feet(sim), _ground(sim), sim.neutral()
     places = ground[:, :2] - neutral[:2]
     if footholds is not None:

@@ -42,6 +42,7 @@ Floats = NDArray[np.float64]
 __all__ = ["Identified", "IdentifyOptions", "identify"]
 
 _DAMPING, _LEAST, _LARGEST = 1e-3, 1e-9, 1e8  # share of the diagonal
+_LEAST_NOISE = 1e-150  # whose inverse has a square
 _UNSEEN = 1e-8  # of the largest eigenvalue: combinations that the data do not determine
 _NEARLY = 10.0  # tolerances: the decrease that a fit may still expect at its end, where no step brings one
 _AWAY = 0.3  # of a value: standard deviation of further starts where no prior tells one
@@ -347,8 +348,11 @@ def identify(
     deviations = checks.spread(f"{call}(noise=...)", noise, sim.ndx)
     if not np.all(deviations > 0.0) or not np.isfinite(deviations).any():
         raise ValueError(f"{call}(noise=...): expected numbers above 0, not all infinite, got {noise!r}")
+    if deviations.min() < _LEAST_NOISE:
+        raise ValueError(f"{call}(noise=...): expected at least {_LEAST_NOISE:g}, got {deviations.min():g}")
     check_executor(call, executor)
-    known, windows = Prior(space, prior or {}), cut_windows(sim, trajectories, o.window, space.past)
+    known = Prior(space, checks.mapping(f"{call}(prior=...)", prior))
+    windows = cut_windows(sim, trajectories, o.window, space.past)
     count = room_for(f"{call}(starts=...)", starts, 8.0 * sum(w.x.size for w in windows))
     first = _first_values(space, known, count, checks.whole_number(f"{call}(seed=...)", seed, 0))
     calls = [(space, windows, deviations, o, known, values) for values in first]

@@ -202,7 +202,7 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
             raise TypeError(f"Environment(sampler=...): expected a function of a generator, got {sampler!r}")
         if isinstance(source, Task) and not (plant is None and sampler is None):
             raise ValueError("Environment(plant=..., sampler=...): a task has its own simulator and first states")
-        if render_mode not in (None, "rgb_array", "human"):
+        if render_mode is not None and str(render_mode) not in ("rgb_array", "human"):
             raise ValueError(
                 f'Environment(render_mode=...): expected None, "rgb_array" or "human", got {render_mode!r}'
             )

@@ -75,6 +75,7 @@ class Adaptation:
         noise = checks.array(f"{call}(noise=...)", self.noise, (None,))
         if not np.all(noise >= 0.0):
             raise ValueError(f"{call}(noise=...): expected numbers >= 0, got {noise}")
+        checks.mapping(f"{call}(bounds=...)", self.bounds)
         for name in ("interval", "memory"):
             checks.number(f"{call}({name}=...)", getattr(self, name), above=0.0)
 

@@ -38,6 +38,7 @@ Stack = NDArray[np.float64]
 
 _SCALES = (1.0, 0.5, 0.0)  # of the gains of the rollouts that guess="feedback" chooses from
 _ROUNDING = 1e-9  # [s] times are sums of floating-point steps
+_LATEST = 100_000  # knots that a plan is shifted by, at most: all of them are rolled out
 _LOST = 10.0  # times the merit of the guess of a tick: a rollout worse than that has left it
 
 __all__ = ["MPC"]
@@ -162,13 +163,16 @@ class MPC:
             delay.
 
         Raises:
-            ValueError: for a time before the last plan, or a state of the wrong shape or with numbers that are not
-                finite.
+            ValueError: for a time before the last plan or 100,000 knots after it, or a state of the wrong shape or with
+                numbers that are not finite.
         """
         now = checks.number("MPC(time)", time)
-        if self.log and now < self.log[-1].time:
-            last = self.log[-1].time
+        last = self.log[-1].time if self.log else now
+        if now < last:
             raise ValueError(f"MPC(time): expected a time after {last:g} s, got {now:g} s; call reset() to start again")
+        if now > last + _LATEST * self.problem.knot_time:
+            late = f"expected at most {_LATEST:,} knots after {last:g} s"
+            raise ValueError(f"MPC(time): {late}, got {now:g} s; call reset() to start again")
         measured = checks.array("MPC(x)", x, (self.sim.nx,))
         self._measured.add(now, measured)
         if self._next is not None and now >= self._next.time - _ROUNDING:

@@ -24,7 +24,7 @@ class Prediction:
 
     def __init__(self, sim: Simulator, length: float) -> None:
         self._steps = int(np.ceil(length / _PREDICTION - 1e-9))
-        if length:
+        if self._steps:
             h = length / self._steps
             hard = min(_HARD, sim.kappa * h / sim.time_step)
             self._fine: Simulator | None = sim.replace(time_step=h, kappa=hard)

@@ -25,6 +25,12 @@ _ROUNDING = 1e-9  # laps: times are sums of floating-point steps
 __all__ = ["AnchoredReference", "References", "SampledReference"]
 
 
+def _check_space(call: str, sim: Any) -> None:
+    """Refuse what has no states."""
+    if not all(hasattr(sim, name) for name in ("nx", "ndx", "integrate", "difference")):
+        raise TypeError(f"{call}: expected a Simulator, got {checks.shown(sim)}")
+
+
 class SampledReference:
     """A trajectory as a function of time: interpolated between its rows, constant after the last one.
 
@@ -45,6 +51,8 @@ class SampledReference:
     def __init__(
         self, time: ArrayLike, rows: ArrayLike, sim: Simulator | None = None, cycle: ArrayLike | None = None
     ) -> None:
+        if sim is not None:
+            _check_space("SampledReference(sim=...)", sim)
         self.time = checks.array("SampledReference(time)", time, (None,))
         width = None if sim is None else sim.nx
         self.rows = checks.array("SampledReference(rows)", rows, (len(self.time), width))
@@ -138,6 +146,8 @@ class AnchoredReference:
     def __init__(
         self, sim: Simulator, begin: ArrayLike, end: ArrayLike | None = None, duration: float = 1.0, anchored: Any = ()
     ) -> None:
+        _check_space("AnchoredReference(sim)", sim)
+        checks.shape("AnchoredReference(anchored=...)", anchored)
         self.begin = checks.array("AnchoredReference(begin)", begin, (sim.nx,))
         self._end = self.begin if end is None else checks.array("AnchoredReference(end=...)", end, (sim.nx,))
         self._duration = checks.number("AnchoredReference(duration=...)", duration, above=0.0)

@@ -81,26 +81,26 @@ class MPCSettings:
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        if self.guess not in GUESSES:
-            raise ValueError(f"MPC(guess=...): expected one of {GUESSES}, got {self.guess!r}")
+        checks.one_of("MPC(guess=...)", self.guess, GUESSES)
         for name in ("options", "first"):
             value = getattr(self, name)
             if value is not None and not isinstance(value, Options):
                 raise TypeError(f"MPC({name}=...): expected Options, got {value!r}")
         for name, above in (("kappa", 0.0), ("time_limit", 0.0), ("period", 0.0), ("kappa_grad", 0.0)):
             value = getattr(self, name)
-            if value is not None and not value > above:
-                raise ValueError(f"MPC({name}=...): expected a number > 0, got {value}")
+            if value is not None:
+                checks.number(f"MPC({name}=...)", value, above=above, finite=name.startswith("kappa"))
         for name in ("gain_scale", "delay", "computation"):
             checks.number(f"MPC({name}=...)", getattr(self, name), at_least=0.0)
         if self.delay and self.computation:
             raise ValueError("MPC(delay=..., computation=...): give one of them, got both")
-        if not self.feedforward and self.servo is None:
+        if not checks.flag("MPC(feedforward=...)", self.feedforward) and self.servo is None:
             raise ValueError(
                 "MPC(feedforward=False): without a servo nothing would drive the robot; give servo=(kp, kd)"
             )
-        if self.learn_ground not in (False, True, "slope"):
-            raise ValueError(f"MPC(learn_ground=...): expected False, True or 'slope', got {self.learn_ground!r}")
+        if not (isinstance(self.learn_ground, bool) or str(self.learn_ground) == "slope"):
+            given = checks.shown(self.learn_ground)
+            raise ValueError(f"MPC(learn_ground=...): expected False, True or 'slope', got {given}")
         if self.adapt is not None and not isinstance(self.adapt, Adaptation):
             raise TypeError(f"MPC(adapt=...): expected an Adaptation, got {self.adapt!r}")
         for name in ("log", "patience"):

@@ -128,16 +128,21 @@ class Options:
     stream: Any = None
 
     def __post_init__(self) -> None:
-        if self.on_kappa_change not in ("feedback", "gaps"):
-            raise ValueError(f'ilqr(on_kappa_change=...): expected "feedback" or "gaps", got {self.on_kappa_change!r}')
+        checks.flag("ilqr(verbose=...)", self.verbose)
+        checks.one_of("ilqr(on_kappa_change=...)", self.on_kappa_change, ("feedback", "gaps"))
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(field.default, int | float) and not isinstance(field.default, bool):
-                self._check_number(field.name, value, whole=isinstance(field.default, int))
+                whole = isinstance(field.default, int)
+                self._check_number(field.name, value, whole=whole)
+                # for a whole number in place of a float, kernels would be compiled again
+                object.__setattr__(self, field.name, int(value) if whole else float(value))
         if not 0.0 < self.backtracking < 1.0:
             raise ValueError(f"ilqr(backtracking=...): expected a number between 0 and 1, got {self.backtracking}")
         if self.callback is not None and not callable(self.callback):
             raise TypeError(f"ilqr(callback=...): expected a function of a record, got {self.callback!r}")
+        if self.stream is not None and not hasattr(self.stream, "write"):
+            raise TypeError(f"ilqr(stream=...): expected a file, got {checks.shown(self.stream)}")
         stages = self._stages()
         *others, last = stages
         found = [*(_with_decrease(stage, _COARSE) for stage in others), _with_decrease(last, self.tolerance)]
@@ -146,6 +151,8 @@ class Options:
             kappas = [checks.number("ilqr(stages=...): kappa", k) for k in (stage.kappa_eval, stage.kappa_grad)]
             if not min(kappas) > 0.0:
                 raise ValueError(f"ilqr(stages=...): expected positive kappa, got {stage}")
+            self._check_number("stages", stage.decrease, whole=False)
+            self._check_number("stages", stage.iterations, whole=True)
 
     def _stages(self) -> tuple[Stage, ...]:
         """The stages as such; a user may give plain tuples."""

@@ -23,6 +23,12 @@ Matrix = NDArray[np.float64]
 __all__ = ["Problem"]
 
 
+def _check_simulator(call: str, sim: Any) -> None:
+    """Refuse what has no states, inputs and horizons."""
+    if not all(hasattr(sim, name) for name in ("nx", "ndx", "nu", "integrate", "horizon")):
+        raise TypeError(f"{call}: expected a Simulator, got {checks.shown(sim)}")
+
+
 def control_limits_of(limits: tuple[ArrayLike, ArrayLike] | None, sim: Simulator) -> tuple[Vector, Vector] | None:
     """Control limits as two (nu,) arrays, infinite where free; those of the inputs where none are given."""
     nu = sim.nu
@@ -99,8 +105,7 @@ class Problem:
         states0: ArrayLike | None = None,
         free_start: Any = None,
     ) -> None:
-        if not all(hasattr(sim, name) for name in ("nx", "ndx", "nu", "integrate", "horizon")):
-            raise TypeError(f"Problem(sim): expected a Simulator, got {sim!r}")
+        _check_simulator("Problem(sim)", sim)
         self.sim = sim
         self.horizon = whole_number("Problem(horizon=...)", horizon)
         self.substeps = whole_number("Problem(substeps=...)", substeps)
@@ -160,6 +165,11 @@ class Problem:
         finer.bind()
         return finer
 
+    def _motion(self, call: str, xs: ArrayLike, us: ArrayLike) -> tuple[Matrix, Matrix]:
+        """Checked states (T + 1, nx) and inputs (T, nu)."""
+        states = checks.array(f"{call}(xs)", xs, (self.horizon + 1, self.sim.nx))
+        return states, checks.array(f"{call}(us)", us, (self.horizon, self.sim.nu))
+
     def with_own_terms(self, sim: Simulator | None = None, *, fixed_start: bool = True) -> Problem:
         """The same problem with a simulator and terms of its own, for loops that write into them.
 
@@ -169,10 +179,15 @@ class Problem:
 
         Returns:
             The new problem.
+
+        Raises:
+            TypeError: `sim` is no simulator.
         """
+        _check_simulator("Problem.with_own_terms(sim)", self.sim if sim is None else sim)
+        fixed = checks.flag("Problem.with_own_terms(fixed_start=...)", fixed_start)
         own = copy.copy(self)
         own.sim = self.sim.replace() if sim is None else sim
-        own.free_start = None if fixed_start else self.free_start
+        own.free_start = None if fixed else self.free_start
         own.bind()
         return own
 
@@ -250,7 +265,11 @@ class Problem:
 
         Returns:
             The cost.
+
+        Raises:
+            ValueError: for a wrong shape, or a number that is not finite.
         """
+        xs, us = self._motion("Problem.cost", xs, us)
         return sum(term.value(xs, us) for term in self.costs)
 
     def violation(self, xs: Matrix, us: Matrix) -> float:
@@ -262,7 +281,11 @@ class Problem:
 
         Returns:
             The violation [unit of the residual]; 0 without constraints.
+
+        Raises:
+            ValueError: for a wrong shape, or a number that is not finite.
         """
+        xs, us = self._motion("Problem.violation", xs, us)
         worst = 0.0
         for term in self.constraints:
             term.update(xs, us)

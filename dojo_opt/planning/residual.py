@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.planning.function_fingerprint import fingerprint
 from dojo_opt.planning.manifold import displace
+from sim.mechanism.memory_limit import room_for
 from sim.model.interruptible_loops import rows
 from sim.simulator.simulator import Simulator
 from solvers.compiler import CompilationError, users_kernel, users_loop
@@ -64,8 +65,8 @@ def check_residual(call: str, function: Any, dimension: Any, jacobian: Any, sim:
 
     ValueError, naming the function, when it fails there, writes into x or u, or leaves an entry of out as it was.
     """
-    if not isinstance(dimension, int | np.integer) or dimension < 1:
-        raise ValueError(f"{call}(dimension=...): expected a whole number >= 1, got {dimension!r}")
+    each = 8.0 * (sim.ndx + sim.nu)  # of the derivative
+    dimension = room_for(f"{call}(dimension=...)", dimension, each)
     first, second = (_tried(f"{call}(function=...)", function, (int(dimension),), sim, poison) for poison in _POISON)
     unset = np.flatnonzero((first == _POISON[0]) & (second == _POISON[1]))
     if unset.size:

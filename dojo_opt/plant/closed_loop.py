@@ -171,6 +171,9 @@ def closed_loop(
     plant.reset()
     if hasattr(controller, "reset"):
         controller.reset()
+    for name, function in (("fallen", fallen), ("finished", finished)):
+        if function is not None and not callable(function):
+            raise TypeError(f"closed_loop({name}=...): expected a function, got {checks.shown(function)}")
     run = _LoopRecord([plant.x])
     try:
         _drive(run, controller, plant, steps, every, plant.fallen if fallen is None else fallen, finished)
@@ -268,12 +271,20 @@ def _drive(
         run.contacts.append(result.contacts)
         run.x.append(plant.x)
         run.u.append(u)  # last: Ctrl-C may come between two of them, and counts the steps by this one
-        if has_fallen(plant.x.copy()):
+        if _yes("closed_loop: the answer of fallen", has_fallen(plant.x.copy())):
             run.message, run.survived = f"Fell at {plant.time:.3f} s.", False
             break
-        if finished is not None and finished(plant.time, plant.x.copy()):
+        if finished is not None and _yes("closed_loop: the answer of finished", finished(plant.time, plant.x.copy())):
             run.message = f"Achieved its aim at {plant.time:.3f} s."
             break
+
+
+def _yes(call: str, answer: Any) -> bool:
+    """The answer of a user's function, which is not an array."""
+    try:
+        return bool(answer)
+    except ValueError:
+        raise ValueError(f"{call}: expected True or False, got {checks.shown(answer)}") from None
 
 
 def _stacked(sim: Simulator, steps: Sequence[Contacts]) -> Contacts:

@@ -51,6 +51,11 @@ class Disturbances:
         call = "Disturbances"
         whole_number(f"{call}(nv)", self.nv)
         checks.number(f"{call}(velocity=...)", self.velocity, at_least=0.0)
+        for name in ("payload_inertia", "delay"):
+            checks.number(f"{call}({name}=...)", getattr(self, name), at_least=0.0)
+        noise = checks.spread(f"{call}(noise=...)", self.noise, 2 * self.nv)
+        if not np.all((noise >= 0.0) & np.isfinite(noise)):
+            raise ValueError(f"{call}(noise=...): expected numbers >= 0, got {checks.shown(self.noise)}")
         for name in ("push", "push_time", "payload", "friction", "slope"):
             if (given := getattr(self, name)) is not None:
                 low, high = checks.vector(f"{call}({name}=...)", given, 2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -43,6 +43,8 @@ class Push:
     def __post_init__(self) -> None:
         object.__setattr__(self, "time", checks.number("Push(time=...)", self.time))
         object.__setattr__(self, "impulse", checks.vector("Push(impulse=...)", self.impulse, 3))
+        if self.body is not None:
+            checks.name("Push(body=...)", self.body)
         object.__setattr__(self, "duration", checks.number("Push(duration=...)", self.duration, above=0.0))
 
 
@@ -109,10 +111,10 @@ class Perturbation:
             raise TypeError(f"{call}(terrain=...): expected a Terrain, got {self.terrain!r}")
         if self.terrain is not None and (self.slope or self.ground_height):
             raise ValueError(f"{call}(terrain=...): give either a terrain, or a slope and a ground_height")
-        pushes = (self.pushes,) if isinstance(self.pushes, Push) else tuple(self.pushes)
-        for push in pushes:
-            if not isinstance(push, Push):
-                raise TypeError(f"{call}(pushes=...): expected a sequence of Push, got {push!r}")
+        if self.payload_body is not None:
+            checks.name(f"{call}(payload_body=...)", self.payload_body)
+        given = (self.pushes,) if isinstance(self.pushes, Push) else self.pushes
+        pushes = checks.items(f"{call}(pushes=...)", given, Push)
         object.__setattr__(self, "pushes", pushes)
 
     @property
@@ -241,6 +243,8 @@ def _array(call: str, value: ArrayLike) -> NDArray[np.float64]:
 def _check_limits(call: str, limits: Any) -> None:
     """Refuse anything but (lower, upper) with lower <= upper; infinity is allowed."""
     try:
+        if isinstance(limits, Set):
+            raise TypeError
         lo, hi = (checks.floats(call, b) for b in limits)
     except (TypeError, ValueError):
         raise ValueError(f"{call}: expected (lower, upper), got {limits!r}") from None

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt import gaits
 from dojo_opt.gaits.biped import balanced
 from dojo_opt.gaits.feet import Feet
-from dojo_opt.gaits.gait import Gait, assemble
+from dojo_opt.gaits.gait import Gait, assemble, check_length
 from dojo_opt.gaits.legs import Legs
 from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import PLANNED
@@ -20,7 +20,6 @@ from dojo_opt.problems import locomotion
 from dojo_opt.problems.locomotion import EFFORT, PLACE, follow
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
-from sim.mechanism.memory_limit import check_room
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 
@@ -254,7 +253,7 @@ def stand_up(
     step = _rounded(_STEP * slow) / substeps
     sim = legs.simulator(step, PLANNED)
     knots = max(2, round(min(length / (step * substeps), 1e300)))
-    check_room("problems.stand_up(duration=...): knots", knots, 8.0 * substeps * sim.nx, "stand up in less time")
+    check_length("problems.stand_up(duration=...)", sim, float(substeps) * knots, "stand up in less time")
     count = substeps * knots
     drop = _deepest(sim, legs.height) if low is None else (1.0 - low) * legs.height
     return _scaled(legs, _rise(sim, count, drop), follows)

@@ -52,15 +52,13 @@ class Body:
         checks.name("Body(name=...)", self.name)
         call = f"Body({self.name!r}"
         object.__setattr__(self, "shape", shape_of(f"{call}, shape=...)", self.shape))
-        if self.mass != 0 or self.inertia is not None or self.shape is not None:
+        massless = isinstance(self.mass, int | float | np.number) and self.mass == 0
+        if not massless or self.inertia is not None or self.shape is not None:
             object.__setattr__(self, "mass", checks.number(f"{call}, mass=...)", self.mass, above=0.0))
         object.__setattr__(self, "inertia", inertia_of(call, self))
         compensation = checks.number(f"{call}, gravity_compensation=...)", self.gravity_compensation)
         object.__setattr__(self, "gravity_compensation", compensation)
-        object.__setattr__(self, "visuals", tuple(self.visuals))
-        for visual in self.visuals:
-            if not isinstance(visual, Visual):
-                raise ValueError(f"{call}, visuals=...): expected a list of Visual, got {visual!r}")
+        object.__setattr__(self, "visuals", checks.items(f"{call}, visuals=...)", self.visuals, Visual))
 
     @property
     def shapes(self) -> tuple[Solid, ...]:

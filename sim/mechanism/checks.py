@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from difflib import get_close_matches
 from math import isfinite
-from os import PathLike, fspath
+from os import PathLike, fsencode, fspath
 from pathlib import Path
 from typing import Any
 
@@ -103,12 +103,24 @@ def array(call: str, value: Any, shape: tuple[int | str | None, ...]) -> Floats:
     raise ValueError(f"{call}: expected finite numbers, got {out[index]}{where}")
 
 
-def number(call: str, value: Any, at_least: float | None = None, above: float | None = None) -> float:
-    """`value` as a finite float within the stated bound."""
+def points(call: str, value: Any) -> Floats:
+    """`value` as finite places (..., 3)."""
+    out = floats(call, value)
+    if out.shape[-1:] != (3,):
+        raise ValueError(f"{call}: expected shape (..., 3), got {out.shape}")
+    return array(call, out, out.shape)
+
+
+def number(
+    call: str, value: Any, at_least: float | None = None, above: float | None = None, *, finite: bool = True
+) -> float:
+    """`value` as a float within the stated bound, finite unless that is not asked for."""
     if type(value) is float and isfinite(value):
         out = value
     elif ndim(call, value) != 0:
         raise ValueError(f"{call}: expected one number, got {shown(value)}")
+    elif not finite and np.isinf(floats(call, value)):
+        out = float(floats(call, value))
     else:
         out = float(array(call, value, ()))
     if at_least is not None and out < at_least:
@@ -178,11 +190,31 @@ def name(call: str, value: Any) -> str:
     return value
 
 
+def name_or(call: str, value: Any, default: str) -> str:
+    """`value` as a name; the default for an empty one and for None."""
+    return default if value is None or (isinstance(value, str) and not value) else name(call, value)
+
+
+def items(call: str, value: Any, kind: type) -> tuple[Any, ...]:
+    """`value` as a tuple of objects of a class."""
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise TypeError(f"{call}: expected a list of {kind.__name__}, got {shown(value)}")
+    found = tuple(value)
+    for one in found:
+        if not isinstance(one, kind):
+            raise ValueError(f"{call}: expected a list of {kind.__name__}, got {shown(one)}")
+    return found
+
+
 def path(call: str, value: Any) -> Path:
     """`value` as the path of a file."""
     text = fspath(value) if isinstance(value, str | PathLike) else value
     if not isinstance(text, str):
         raise TypeError(f"{call}: expected the path of a file, got {shown(value)}")
+    try:
+        fsencode(text)
+    except UnicodeEncodeError:  # half a character
+        text = ""
     if not text or "\0" in text:
         raise ValueError(f"{call}: expected the path of a file, got {shown(value)}")
     return Path(text)
@@ -230,9 +262,12 @@ def distinct(call: str, names: Iterable[str]) -> None:
 def bounds(call: str, pair: Any) -> tuple[float, float]:
     """(lo, hi) with lo < hi; None stands for no bound."""
     try:
-        lo, hi = (float(x) if x is not None else s * np.inf for x, s in zip(pair, (-1, 1), strict=True))
+        if isinstance(pair, str | bytes | Set | Mapping):
+            raise TypeError
+        ends = [s * np.inf if x is None else x for x, s in zip(pair, (-1, 1), strict=True)]
+        lo, hi = (float(x) for x in floats(call, ends).reshape(2))
     except (TypeError, ValueError):
-        raise ValueError(f"{call}: expected a pair (lo, hi), got {pair!r}") from None
+        raise ValueError(f"{call}: expected a pair (lo, hi), got {shown(pair)}") from None
     if not lo < hi or lo == np.inf or hi == -np.inf:
         raise ValueError(f"{call}: expected lo < hi, got ({lo:g}, {hi:g})")
     return lo, hi
@@ -244,6 +279,13 @@ def fraction(call: str, value: Any) -> float:
     if fraction > 1.0:
         raise ValueError(f"{call}: expected a number from 0 to 1, got {fraction:g}")
     return fraction
+
+
+def flag(call: str, value: Any) -> bool:
+    """`value` as True or False, or 1 or 0."""
+    if isinstance(value, bool | np.bool_ | int | np.integer):
+        return bool(value)
+    raise TypeError(f"{call}: expected True or False, got {shown(value)}")
 
 
 def whole_number(call: str, value: Any, least: int = 1) -> int:

@@ -62,8 +62,8 @@ class Collision:
 
     def __post_init__(self) -> None:
         checks.name("Collision(a=...)", self.a)
-        object.__setattr__(self, "b", checks.name("Collision(b=...)", self.b or WORLD))
-        object.__setattr__(self, "name", checks.name("Collision(name=...)", self.name or f"{self.a}-{self.b}"))
+        object.__setattr__(self, "b", checks.name_or("Collision(b=...)", self.b, WORLD))
+        object.__setattr__(self, "name", checks.name_or("Collision(name=...)", self.name, f"{self.a}-{self.b}"))
         call = f"Collision({self.name!r}"
         if self.a == self.b:
             raise ValueError(f"{call}): a body cannot collide with itself")

@@ -52,7 +52,7 @@ class Contact:
 
     def __post_init__(self) -> None:
         checks.name("Contact(body=...)", self.body)
-        call = f"Contact({self.name or self.body!r}"
+        call = f"Contact({checks.name_or('Contact(name=...)', self.name, self.body)!r}"
         object.__setattr__(self, "point", checks.vector(f"{call}, point=...)", self.point, 3))
         for field in ("radius", "friction"):
             value = checks.number(f"{call}, {field}=...)", getattr(self, field), at_least=0.0)
@@ -86,8 +86,11 @@ class Contact:
 
         Returns:
             (...,) distances [m], negative below the ground.
+
+        Raises:
+            ValueError: the centres have another shape, or are not finite.
         """
-        at = np.asarray(centers, dtype=np.float64)
+        at = checks.points("Contact.gap(centers)", centers)
         if self.terrain is None:
             return np.asarray(at @ np.asarray(self.normal) - self.radius - self.height)
         surface = self.terrain.surface(float(self.radius))
@@ -101,8 +104,11 @@ class Contact:
 
         Returns:
             (..., 3) unit normals, world axes.
+
+        Raises:
+            ValueError: the centres have another shape, or are not finite.
         """
-        at = np.asarray(centers, dtype=np.float64)
+        at = checks.points("Contact.normal_at(centers)", centers)
         if self.terrain is None:
             return np.array(np.broadcast_to(np.asarray(self.normal), at.shape))
         return self.terrain.surface(float(self.radius)).normal(at[..., 0], at[..., 1])

@@ -45,8 +45,10 @@ class Gear:
     def __post_init__(self) -> None:
         checks.name("Gear(joint=...)", self.joint)
         checks.name("Gear(other=...)", self.other)
-        object.__setattr__(self, "name", checks.name("Gear(name=...)", self.name or self.joint))
+        object.__setattr__(self, "name", checks.name_or("Gear(name=...)", self.name, self.joint))
         call = f"Gear({self.name!r}"
+        for field in ("dof", "other_dof"):
+            checks.whole_number(f"{call}, {field}=...)", getattr(self, field), 0)
         for field in ("ratio", "offset"):
             object.__setattr__(self, field, checks.number(f"{call}, {field}=...)", getattr(self, field)))
 

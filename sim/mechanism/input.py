@@ -66,7 +66,10 @@ class Input:
     def __post_init__(self) -> None:
         if (self.joint is None) == (self.body is None):
             raise ValueError("Input(...): give either a joint or body=...")
-        call = f"Input({(self.name or self.joint or self.body)!r}"
+        owner, target = ("body=...", self.body) if self.joint is None else ("joint", self.joint)
+        target = checks.name(f"Input({owner})", target)
+        call = f"Input({checks.name_or('Input(name=...)', self.name, target)!r}"
+        checks.whole_number(f"{call}, dof=...)", self.dof, 0)
         for field in ("force", "torque"):
             object.__setattr__(self, field, checks.vector(f"{call}, {field}=...)", getattr(self, field), 3))
         checks.one_of(f"{call}, frame=...)", self.frame, ("world", "body"))

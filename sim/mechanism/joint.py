@@ -109,12 +109,13 @@ class Joint:
         if swapped and self.kind not in list(KINDS):
             raise ValueError(f"Joint: expected Joint({swapped[0]!r}, parent, child, name), got the kind {self.kind!r}")
         checks.name("Joint(child=...)", self.child)
-        object.__setattr__(self, "name", checks.name("Joint(name=...)", self.name or self.child))
+        object.__setattr__(self, "name", checks.name_or("Joint(name=...)", self.name, self.child))
         call = f"Joint({self.name!r}"
         checks.one_of(f"{call}, kind=...)", self.kind, KINDS)
-        object.__setattr__(self, "parent", checks.name(f"{call}, parent=...)", self.parent or WORLD))
+        object.__setattr__(self, "parent", checks.name_or(f"{call}, parent=...)", self.parent, WORLD))
         for field in ("parent_point", "child_point"):
             object.__setattr__(self, field, checks.vector(f"{call}, {field}=...)", getattr(self, field), 3))
+        checks.flag(f"{call}, close=...)", self.close)
         object.__setattr__(self, "axis", checks.direction(f"{call}, axis=...)", self.axis))
         object.__setattr__(self, "orientation", checks.quaternion(f"{call}, orientation=...)", self.orientation))
         for field in ("spring", "damper", "rest", "armature", "friction"):

@@ -244,7 +244,7 @@ class Mechanism:
         Raises:
             ValueError: both have a part of the same name, or their gravity differs.
         """
-        return _added(self, other, pose, prefix, name or self.name)
+        return _added(self, other, pose, prefix, checks.name_or("Mechanism.add(name=...)", name, self.name))
 
     def on(
         self, terrain: Terrain, contacts: Sequence[str] | None = None, bodies: Sequence[str] = (), **options: Any
@@ -360,13 +360,14 @@ def _parts(call: str, given: Any, kind: type) -> tuple[Any, ...]:
 _CLEAR = 1e-9  # [m] between the lowest contact and the ground, see stance.py
 
 
-def _added(mech: Mechanism, other: Mechanism, pose: ArrayLike, prefix: str, name: str | None) -> Mechanism:
+def _added(mech: Mechanism, other: Mechanism, pose: ArrayLike, prefix: str, name: str) -> Mechanism:
     """Both in one mechanism, see `Mechanism.add`."""
     call = "Mechanism.add"
     if not isinstance(other, Mechanism):
         raise ValueError(f"{call}(other): expected a Mechanism, got {other!r}")
     if not np.array_equal(np.asarray(mech.gravity), np.asarray(other.gravity)):
         raise ValueError(f"{call}(other): {mech.name!r} has the gravity {mech.gravity}, {other.name!r} {other.gravity}")
+    prefix = checks.name_or(f"{call}(prefix=...)", prefix, "")
     point, quat = _placed(f"{call}(pose)", pose)
     neutral = np.concatenate([np.asarray(mech.neutral), _moved_neutral(other, point, quat)])
     parts = _renamed(other, prefix)
@@ -380,7 +381,7 @@ def _added(mech: Mechanism, other: Mechanism, pose: ArrayLike, prefix: str, name
         [*mech.contacts, *parts["contacts"]],
         [*(mech.inputs or ()), *parts["inputs"]],
         mech.gravity,
-        mech.name if name is None else name,
+        name,
         neutral,
         [*mech.collisions, *collisions],
         [*mech.loops, *loops],
@@ -481,6 +482,7 @@ def _moved_visual(visual: Visual, point: Floats, quat: Floats) -> Visual:
 def _with_obstacle(mech: Mechanism, shape: Solid, bodies: Sequence[str] | None, name: str, **options: Any) -> Mechanism:
     """See `Mechanism.with_obstacle`."""
     call = "Mechanism.with_obstacle"
+    name = checks.name(f"{call}(name=...)", name)
     if bodies is None:
         balls = [c for c in mech.contacts if c.radius > 0.0]
         if not balls:
@@ -490,6 +492,7 @@ def _with_obstacle(mech: Mechanism, shape: Solid, bodies: Sequence[str] | None, 
             for c in balls
         ]
     else:
+        bodies = checks.names(f"{call}(bodies=...)", bodies)
         for body in bodies:
             checks.one_of(f"{call}(bodies=...)", body, mech.body_names)
         found = [Collision(body, None, None, shape, name=f"{name}-{body}", **options) for body in bodies]
@@ -504,7 +507,9 @@ def _on_terrain(
     if not isinstance(terrain, Terrain):
         raise ValueError(f"{call}(terrain): expected a Terrain, got {terrain!r}")
     names = [c.name for c in mech.contacts]
-    for name in contacts or ():
+    contacts = names if contacts is None else checks.names(f"{call}(contacts=...)", contacts)
+    bodies = checks.names(f"{call}(bodies=...)", bodies)
+    for name in contacts:
         checks.one_of(f"{call}(contacts=...)", name, names)
     for name in bodies:
         checks.one_of(f"{call}(bodies=...)", name, mech.body_names)
@@ -514,7 +519,7 @@ def _on_terrain(
         )
     shaped = [c for b in mech.bodies if b.name in bodies for c in shape_contacts(f"{call}(bodies=...)", b, **options)]
     level: Any = {"normal": (0.0, 0.0, 1.0), "height": 0.0, "terrain": terrain}
-    chosen = [*(names if contacts is None else contacts), *(c.name for c in shaped)]
+    chosen = [*contacts, *(c.name for c in shaped)]
     found = [*mech.contacts, *shaped]
     moved = replace(mech, contacts=[replace(c, **level) if c.name in chosen else c for c in found])
     return replace(moved, neutral=_standing(moved))

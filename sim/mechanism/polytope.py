@@ -136,7 +136,11 @@ class Polytope(Solid):
 
         Returns:
             (3, 3) inertia in body axes [kg m^2].
+
+        Raises:
+            ValueError: the mass is negative.
         """
+        mass = checks.number("Polytope.central_inertia(mass)", mass, at_least=0.0)
         volume, first, second = self._moments()
         C = mass / volume * (second - np.outer(first, first) / volume)
         R = rotation_matrix(self.orientation)

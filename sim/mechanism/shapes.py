@@ -102,8 +102,7 @@ class Solid:
         if self.restitution is not None:
             restitution = checks.fraction(f"{call}(restitution=...)", self.restitution)
             object.__setattr__(self, "restitution", restitution)
-        if self.name:
-            checks.name(f"{call}(name=...)", self.name)
+        object.__setattr__(self, "name", checks.name_or(f"{call}(name=...)", self.name, ""))
 
     def _positive(self, *fields: str) -> None:
         for field in fields:
@@ -120,8 +119,12 @@ class Solid:
             (3,) moments about x, y, z [kg m^2].
 
         Raises:
-            ValueError: a body cannot have this shape.
+            ValueError: a body cannot have this shape, or the mass is negative.
         """
+        return self._principal(checks.number(f"{type(self).__name__}.principal(mass)", mass, at_least=0.0))
+
+    def _principal(self, mass: float) -> tuple[float, float, float]:
+        """Moments of inertia of a checked mass."""
         raise NotImplementedError
 
     def sizes(self) -> tuple[float, ...]:
@@ -156,7 +159,14 @@ class Solid:
 
         Returns:
             The support [m]; infinite for an unbounded shape.
+
+        Raises:
+            ValueError: `n` has another shape, or is not finite.
         """
+        return self._support(checks.array(f"{type(self).__name__}.support(n)", n, (3,)))
+
+    def _support(self, n: Floats) -> float:
+        """The support along a checked vector."""
         stance = self.stance()
         return inf if stance is None else float((stance.points @ n).max()) + stance.radius
 
@@ -201,7 +211,7 @@ class Solid:
         """
         mass = checks.number(f"{type(self).__name__}.inertia(mass)", mass, at_least=0.0)
         R = rotation_matrix(self.orientation)
-        return np.asarray((R * self.principal(mass)) @ R.T)
+        return np.asarray((R * self._principal(mass)) @ R.T)
 
     def place(self, points: ArrayLike) -> Floats:
         """Points of the frame of the shape in its body.
@@ -215,10 +225,7 @@ class Solid:
         Raises:
             ValueError: the points have another shape.
         """
-        call = f"{type(self).__name__}.place(points)"
-        places = checks.floats(call, points)
-        if places.shape[-1:] != (3,):
-            raise ValueError(f"{call}: expected shape (..., 3), got {places.shape}")
+        places = checks.points(f"{type(self).__name__}.place(points)", points)
         return places @ rotation_matrix(self.orientation).T + np.asarray(self.center)
 
     def mass_center(self) -> Floats:
@@ -260,7 +267,7 @@ class Sphere(Solid):
         super().__post_init__()
         self._positive("radius")
 
-    def principal(self, mass: float) -> tuple[float, float, float]:
+    def _principal(self, mass: float) -> tuple[float, float, float]:
         i = 0.4 * mass * self.radius**2
         return i, i, i
 
@@ -303,7 +310,7 @@ class Box(Solid):
         super().__post_init__()
         self._positive("x", "y", "z")
 
-    def principal(self, mass: float) -> tuple[float, float, float]:
+    def _principal(self, mass: float) -> tuple[float, float, float]:
         x, y, z = self.x**2, self.y**2, self.z**2
         return mass / 12 * (y + z), mass / 12 * (x + z), mass / 12 * (x + y)
 
@@ -345,14 +352,14 @@ class Cylinder(Solid):
         super().__post_init__()
         self._positive("radius", "length")
 
-    def principal(self, mass: float) -> tuple[float, float, float]:
+    def _principal(self, mass: float) -> tuple[float, float, float]:
         across = mass / 12 * (3 * self.radius**2 + self.length**2)
         return across, across, mass / 2 * self.radius**2
 
     def bounding_radius(self) -> float:
         return hypot(*self.sizes())
 
-    def support(self, n: Floats) -> float:
+    def _support(self, n: Floats) -> float:
         return float(self.radius * hypot(n[0], n[1]) + 0.5 * self.length * abs(n[2]))
 
     def volume(self) -> float:
@@ -390,7 +397,7 @@ class Capsule(Solid):
         super().__post_init__()
         self._positive("radius", "length")
 
-    def principal(self, mass: float) -> tuple[float, float, float]:
+    def _principal(self, mass: float) -> tuple[float, float, float]:
         r, length = self.radius, self.length
         ball = mass * (4 / 3 * r) / (length + 4 / 3 * r)
         rod = mass - ball
@@ -440,14 +447,14 @@ class Ellipsoid(Solid):
         super().__post_init__()
         self._positive("x", "y", "z")
 
-    def principal(self, mass: float) -> tuple[float, float, float]:
+    def _principal(self, mass: float) -> tuple[float, float, float]:
         x, y, z = self.x**2, self.y**2, self.z**2
         return mass / 5 * (y + z), mass / 5 * (x + z), mass / 5 * (x + y)
 
     def bounding_radius(self) -> float:
         return max(self.sizes())
 
-    def support(self, n: Floats) -> float:
+    def _support(self, n: Floats) -> float:
         return hypot(self.x * n[0], self.y * n[1], self.z * n[2])
 
     def volume(self) -> float:
@@ -469,7 +476,7 @@ class HalfSpace(Solid):
 
     code = shape_kinds.Shape.HALFSPACE
 
-    def principal(self, mass: float) -> tuple[float, float, float]:
+    def _principal(self, mass: float) -> tuple[float, float, float]:
         raise ValueError("HalfSpace: a body cannot have this shape")
 
     def primitives(self) -> list[Primitive]:
@@ -495,7 +502,7 @@ class String(Solid):
         super().__post_init__()
         self._positive("length")
 
-    def principal(self, mass: float) -> tuple[float, float, float]:
+    def _principal(self, mass: float) -> tuple[float, float, float]:
         raise ValueError("String: a body cannot have this shape")
 
 

@@ -261,7 +261,11 @@ class SignedDistance(Solid):
 
         Returns:
             (3, 3) inertia in body axes [kg m^2].
+
+        Raises:
+            ValueError: the mass is negative.
         """
+        mass = checks.number("SignedDistance.central_inertia(mass)", mass, at_least=0.0)
         volume, first, second = self._moments
         C = mass / volume * (second - np.outer(first, first) / volume)
         R = rotation_matrix(self.orientation)
@@ -360,6 +364,10 @@ def _grid(call: str, bounds: ArrayLike, spacing: float) -> tuple[Floats, tuple[i
     if not np.prod(cells + 1.0) <= _MOST:
         raise ValueError(f"{call}(spacing=...): {np.prod(cells + 1.0):.3g} grid points, expected at most {_MOST:.0e}")
     counts = cells.astype(int) + 1
+    if counts.min() < _LEAST:
+        raise ValueError(
+            f"{call}(spacing=...): expected at least {_LEAST} grid points along each axis, got {tuple(counts.tolist())}"
+        )
     axes = [box[0, k] + spacing * np.arange(counts[k]) for k in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     return box[0], tuple(counts.tolist()), points

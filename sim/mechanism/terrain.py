@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.ball_surface import raised
+from sim.mechanism.memory_limit import check_room
 from sim.mechanism.positional import few_positional
 from sim.mechanism.short_repr import short_repr
 from sim.mechanism.spline import spline, spline_coefficients, spline_gradient, spline_shares
@@ -80,10 +81,16 @@ class Terrain:
         object.__setattr__(self, "spacing", spacing)
         object.__setattr__(self, "direction", _heading("Terrain(direction=...)", self.direction))
         if self.plane is not None:
-            normal = checks.direction("Terrain(plane=...): normal", self.plane[0])
+            try:
+                given, height = self.plane
+            except (TypeError, ValueError):
+                raise ValueError(
+                    f"Terrain(plane=...): expected (normal, height), got {checks.shown(self.plane)}"
+                ) from None
+            normal = checks.direction("Terrain(plane=...): normal", given)
             if normal[2] <= 0.0:
                 raise ValueError(f"Terrain(plane=...): expected a normal that points up, got {normal}")
-            object.__setattr__(self, "plane", (normal, checks.number("Terrain(plane=...): height", self.plane[1])))
+            object.__setattr__(self, "plane", (normal, checks.number("Terrain(plane=...): height", height)))
         object.__setattr__(self, "coefficients", spline_coefficients(heights))
 
     @staticmethod
@@ -163,13 +170,19 @@ class Terrain:
             ValueError: for an edge wider than the depth, or a value of the wrong shape or out of range.
         """
         call = "Terrain.steps"
-        jumps = checks.array(f"{call}(rises)", np.atleast_1d(rises), (None,))
+        jumps = np.atleast_1d(checks.floats(f"{call}(rises)", rises))
+        jumps = checks.array(f"{call}(rises)", jumps, (None,))
+        if not len(jumps):
+            raise ValueError(f"{call}(rises): expected one step at least, got none")
         depth, edge = (checks.number(f"{call}({n}=...)", v, above=0.0) for n, v in (("depth", depth), ("edge", edge)))
         start = checks.number(f"{call}(start=...)", start)
         if edge > depth:
             raise ValueError(f"{call}(edge=...): expected at most the depth {depth:g}, got {edge:g}")
         dx = edge / _EDGE
         margin = 0.5 * edge + _MARGIN * dx
+        lines = ((len(jumps) - 1) * depth + 2.0 * margin) / dx + 1.0
+        remedy = "choose a wider edge, or less depth"
+        check_room(f"{call}(depth=..., edge=...): grid lines", int(min(lines, 1e300)), 32.0 * len(jumps), remedy)
         s = np.arange(-margin, (len(jumps) - 1) * depth + margin + 0.5 * dx, dx)
         t = np.clip((s[:, None] - depth * np.arange(len(jumps))) / edge + 0.5, 0.0, 1.0)
         heights = (t**3 * (10.0 - 15.0 * t + 6.0 * t**2)) @ jumps
@@ -186,8 +199,11 @@ class Terrain:
 
         Returns:
             (...,) heights [m].
+
+        Raises:
+            ValueError: a place is not finite, or the shapes do not fit each other.
         """
-        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        x, y = _places("Terrain.height", x, y)
         if self.plane is not None:
             (a, b, c), d = self.plane
             return np.asarray((d - a * x - b * y) / c)
@@ -202,8 +218,11 @@ class Terrain:
 
         Returns:
             (..., 3) unit normals, world axes.
+
+        Raises:
+            ValueError: a place is not finite, or the shapes do not fit each other.
         """
-        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        x, y = _places("Terrain.normal", x, y)
         if self.plane is not None:
             return np.array(np.broadcast_to(np.asarray(self.plane[0]), (*x.shape, 3)))
         _, fx, fy = self._spline(self.coefficients, x, y)
@@ -226,8 +245,11 @@ class Terrain:
 
         Returns:
             The terrain of the centres, over a grid wider by the radius.
+
+        Raises:
+            ValueError: the radius is negative, or its grid larger than the memory.
         """
-        return self._offset(radius)[0]
+        return self._offset(checks.number("Terrain.offset(radius)", radius, at_least=0.0))[0]
 
     def surface(self, radius: float) -> Terrain:
         """`offset`, computed once per radius.
@@ -237,8 +259,11 @@ class Terrain:
 
         Returns:
             The terrain of the centres.
+
+        Raises:
+            ValueError: the radius is negative, or its grid larger than the memory.
         """
-        return self._kept(radius)[0]
+        return self._kept(checks.number("Terrain.surface(radius)", radius, at_least=0.0))[0]
 
     def height_gradient(self, radius: float, rows: Floats) -> Floats:
         """Gradients by the heights, from those by the coefficients of the surface at a radius.
@@ -251,8 +276,13 @@ class Terrain:
 
         Returns:
             (n, nx, ny) gradients by `heights`.
+
+        Raises:
+            ValueError: the radius is negative, or the rows have another length.
         """
+        radius = checks.number("Terrain.height_gradient(radius)", radius, at_least=0.0)
         surface, touched = self._kept(radius)
+        rows = checks.array("Terrain.height_gradient(rows)", rows, (None, surface.coefficients.size))
         gradient = rows.reshape(len(rows), *surface.coefficients.shape)
         if touched is not None:
             kept = self.__dict__.setdefault("_shares", {})
@@ -272,7 +302,11 @@ class Terrain:
 
         Returns:
             d(coefficients)/d(radius), of their shape.
+
+        Raises:
+            ValueError: the radius is negative, or its grid larger than the memory.
         """
+        radius = checks.number("Terrain.radius_rate(radius)", radius, at_least=0.0)
         kept: dict[float, Floats] = self.__dict__.setdefault("_rates", {})
         if radius not in kept:
             touched = self._kept(radius)[1]
@@ -295,7 +329,10 @@ class Terrain:
         if radius == 0.0 or self.plane is not None:
             return self, None
         spacing, direction = np.asarray(self.spacing), np.asarray(self.direction)
-        pads = [0 if n == 1 else int(np.ceil(radius / d)) + _MARGIN for n, d in zip(self.shape, spacing, strict=True)]
+        wider = np.where(np.equal(self.shape, 1), 0.0, np.ceil(radius / spacing) + _MARGIN)
+        points = float(np.prod(self.shape + 2.0 * wider))
+        check_room("Terrain.offset(radius): grid points", int(min(points, 1e300)), 64.0, "choose a smaller radius")
+        pads = [int(p) for p in wider]
         lines = [d * np.arange(-p, n + p) for n, d, p in zip(self.shape, spacing, pads, strict=True)]
         here = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
         heights, arm = raised(self.coefficients, spacing, here, radius)
@@ -317,6 +354,17 @@ class Terrain:
         """Number of grid lines across both axes."""
         nx, ny = self.coefficients.shape
         return nx - 2, ny - 2
+
+
+def _places(call: str, x: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
+    """Finite places along x and y of the same shape."""
+    along, across = checks.floats(f"{call}(x)", x), checks.floats(f"{call}(y)", y)
+    along, across = checks.array(f"{call}(x)", along, along.shape), checks.array(f"{call}(y)", across, across.shape)
+    try:
+        first, second = np.broadcast_arrays(along, across)
+    except ValueError:
+        raise ValueError(f"{call}(x, y): the shapes {along.shape} and {across.shape} do not fit each other") from None
+    return first, second
 
 
 def _heading(call: str, direction: ArrayLike) -> tuple[float, float]:

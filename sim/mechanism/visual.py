@@ -45,10 +45,19 @@ class Visual:
 
     __repr__ = short_repr
 
+    def _has_mesh(self) -> bool:
+        """Whether a mesh is given, by the path of its file."""
+        if isinstance(self.mesh, str) and not self.mesh:
+            return False
+        checks.path("Visual(mesh=...)", self.mesh)
+        return True
+
     def __post_init__(self) -> None:
-        given: list[Any] = [self.shape is not None, bool(self.mesh), self.triangles is not None]
+        given: list[Any] = [self.shape is not None, self._has_mesh(), self.triangles is not None]
         if sum(given) != 1:
             raise ValueError("Visual(...): give one of shape=..., mesh=... and triangles=...")
+        if self.shape is not None and not isinstance(self.shape, Solid):
+            raise TypeError(f"Visual(shape): expected a shape, got {checks.shown(self.shape)}")
         for field in ("scale", "center"):
             object.__setattr__(self, field, checks.vector(f"Visual({field}=...)", getattr(self, field), 3))
         object.__setattr__(self, "orientation", checks.quaternion("Visual(orientation=...)", self.orientation))

@@ -305,7 +305,8 @@ class Kinematics:
         call, mech = "Kinematics.contact_forces", self.mechanism
         q, v = self._q(f"{call}(q)", q), _rows(f"{call}(v)", v, mech.nv)
         dv = _rows(f"{call}(acceleration)", acceleration, mech.nv)
-        names = mech.contact_names[: len(mech.contacts)] if contacts is None else tuple(contacts)
+        names = mech.contact_names[: len(mech.contacts)]
+        names = names if contacts is None else checks.names(f"{call}(contacts=...)", contacts)
         of_name = dict(zip(mech.contact_names, mech.contacts, strict=False))
         chosen = [of_name[checks.one_of(f"{call}(contacts=...)", name, of_name)] for name in names]
         driven = np.zeros(mech.nv, dtype=bool)

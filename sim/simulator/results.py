@@ -111,7 +111,7 @@ Ended = TypeVar("Ended", bound=Result)
 
 def ended(result: Ended, throw: bool) -> Ended:
     """The result; with `throw`, SimulationError instead of one that was not a success."""
-    if throw:
+    if checks.flag("throw=...", throw):
         result.check()
     return result
 

@@ -378,6 +378,9 @@ class RowStepping(StateSpace):
         given: Any = X if quick else checks.array(f"{call}(X)", X, (count, self.nx))
         states = self._arguments.states(f"{call}(X)", given)
         steps = room_for(f"{call}(substeps=...)", substeps, 8.0 * (self.nx + self.nu) * max(count, 1))
+        parameters = checks.mapping(f"{call}(parameters=...)", parameters)
+        contacts = checks.flag(f"{call}(contacts=...)", contacts)
+        derivatives = checks.flag(f"{call}(derivatives=...)", derivatives)
         kept = self._impulses(call, impulses, count)
         alone = count == 1 and kappa is None and not parameters and not derivatives and not len(kept)
         if alone and self.has_single_rows:
@@ -395,7 +398,7 @@ class RowStepping(StateSpace):
             raise ValueError(f"{call}(contacts=True): expected no derivatives, and a simulator without an accuracy")
         engines, index = self._row_models.of(f"{call}(parameters=...)", parameters, count)
         rows = np.zeros((count if contacts else 0, *self._engine.no_outputs[0].shape[1:]))
-        found, reports = RowBatch(engines, index, states, inputs, steps, kappas, rows, kept).step(bool(derivatives))
+        found, reports = RowBatch(engines, index, states, inputs, steps, kappas, rows, kept).step(derivatives)
         if contacts:
             found = replace(found, contacts=contacts_of(self.mechanism, self.time_step, rows))
         if len(found.unsolved):
@@ -452,9 +455,13 @@ class RowStepping(StateSpace):
         Raises:
             ValueError: substeps is not a whole number above 0, or the simulator has no single rows.
         """
+        if type(substeps) is not int or type(contacts) is not bool:
+            substeps = checks.whole_number("Simulator.single_row(substeps)", substeps)
+            contacts = checks.flag("Simulator.single_row(contacts)", contacts)
         key = get_ident(), substeps, contacts
         if key not in self._single_rows:
-            steps = checks.whole_number("Simulator.single_row(substeps)", substeps)
+            each = 8.0 * (self.nx + self.nu + REPORT)
+            steps = room_for("Simulator.single_row(substeps)", substeps, each)
             if not self.has_single_rows:
                 raise ValueError(
                     "Simulator.single_row: expected a simulator without an accuracy, and of order 2 where there are "

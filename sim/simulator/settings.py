@@ -19,6 +19,7 @@ __all__ = ["LEAST_ACCURACY", "Settings", "default_kappa", "free_parts", "of_call
 LEAST_ACCURACY = 1e-12  # [m/s, rad/s]
 _CREEP = 1e-9  # [m/s]
 _PUSH = 3e-4  # (speed at which an opening contact is pushed away, over the accuracy)^2
+_FAST = 1e100  # [m/s, rad/s] beyond any speed; its square is a float
 _EARTH = 9.81  # [m/s^2] in scenes without gravity
 _SMALLEST, _LARGEST = 1e-13, 1e-6  # [N s m]; products of slack and impulse are rounded to 2e-14
 
@@ -75,7 +76,7 @@ def with_accuracy(settings: Settings, accuracy: float | None, mechanism: Mechani
         raise ValueError(f"Simulator(accuracy=...): it chooses the order itself, got order={settings.order}")
     kappa = settings.kappa
     if mechanism is not None and (mechanism.contacts or mechanism.joints):
-        most = _PUSH * min(free_parts(mechanism), default=1.0) * number**2 * settings.time_step
+        most = _PUSH * min(free_parts(mechanism), default=1.0) * min(number, _FAST) ** 2 * settings.time_step
         kappa = min(kappa, max(most, _SMALLEST))
     return settings._replace(accuracy=number, order=8, kappa=kappa)
 

@@ -455,12 +455,12 @@ class Simulator(RowStepping):
         call = "linearize_rollout"
         state, inputs = self._arguments.state(call, x), self._arguments.inputs(call, "us", us, ("T", self.nu))
         level, external = self._arguments.kappa(call, kappa), self._arguments.wrenches(call, wrenches, len(inputs))
-        blocks: dict[str, Floats] = {}
-        if wrt and (selected := self._by_parameters.select(f"Simulator.{call}(wrt=...)", wrt))[1].names:
-            rolled, J = self._by_parameters.roll(state, inputs, selected[1:], level, external)
-            blocks = {name: J[:, :, rows] for name, rows in selected[1].rows.items()}
+        chosen = self._by_parameters.select(f"Simulator.{call}(wrt=...)", wrt)[1:]
+        if chosen[0].names:
+            rolled, J = self._by_parameters.roll(state, inputs, chosen, level, external)
+            blocks = {name: J[:, :, rows] for name, rows in chosen[0].rows.items()}
         else:
-            rolled = self._engine.roll(state, inputs, external, kappa=level, derivatives=True)
+            rolled, blocks = self._engine.roll(state, inputs, external, kappa=level, derivatives=True), {}
         knot, reports, detail = rolled.solved_steps, rolled.reports, ""
         if knot < len(inputs):
             detail = sentence(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)

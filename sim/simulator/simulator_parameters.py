@@ -145,10 +145,8 @@ class SimulatorParameters:
 
 def _different_names(call: str, wrt: Sequence[str]) -> tuple[str, ...]:
     """The names, one or several, all different."""
-    names = (wrt,) if isinstance(wrt, str) else tuple(wrt)
+    names = (wrt,) if isinstance(wrt, str) else checks.names(call, wrt)
     for name in names:
-        if not isinstance(name, str):
-            raise ValueError(f"{call}: expected names, got {name!r}")
         checks.one_of(f"{call}: kind", name.split(":")[0].split("[")[0], (*_VARIABLES, *KINDS))
     checks.distinct(call, names)
     return names

@@ -309,7 +309,8 @@ class StateSpace:
         zs = zs.reshape(-1, self.nbody, 13)
         self._arguments.check_maximal("minimal", zs)
         xs = self._arguments.finite_result("minimal(z)", self._states.minimal(zs), zs)
-        if joint_tolerance < np.inf:
+        tolerance = checks.number("Simulator.minimal(joint_tolerance)", joint_tolerance, 0.0, finite=False)
+        if tolerance < np.inf:
             self._arguments.check_joints(zs, self._states.maximal(xs), joint_tolerance)
         return xs.reshape(*lead, self.nx)
 

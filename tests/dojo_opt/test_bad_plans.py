@@ -9,6 +9,7 @@ from support.refusals import check_refused
 HOP = dojo.problems.hop()
 SIM, START = HOP.sim, HOP.start
 PLANT = dojo.Plant(SIM)
+ATLAS = dojo.Simulator(dojo.models.atlas(), time_step=0.02)
 QUADRUPED = dojo.Simulator(dojo.models.quadruped(), time_step=0.02)
 
 
@@ -65,7 +66,17 @@ CALLS = {
     "edge beyond floats": (lambda: dojo.problems.block(edge=1e300), "edge=1e+300): numbers", "overflow"),
     "swing of a number": (lambda: dojo.problems.swingup(np.zeros(3)), "problems.swingup(name)", "cartpole"),
     "leap of years": (lambda: dojo.problems.leap(duration=1e9), "problems.leap(duration=...)", "GiB"),
-    "rest of years": (lambda: dojo.problems.jump(after=1e9), "gaits.jump: time steps", "GiB"),
+    "rest of years": (lambda: dojo.problems.jump(after=1e9), "gaits.jump(...)", "100,000 time steps", "5e+10"),
+    "jump to the moon": (lambda: dojo.problems.jump(height=1e9), "gaits.jump(height=..., crouch=...)", "1,000 times"),
+    "crouch of a giant": (lambda: dojo.problems.jump(height=1e9, crouch=1e9), "gaits.jump(...)", "time steps"),
+    "trot of years": (lambda: dojo.problems.trot(cycles=10**7), "gaits.trot(cycles=..., period=...)", "Plan.repeated"),
+    "stand of years": (lambda: dojo.gaits.stand(QUADRUPED, duration=1e9), "gaits.stand(duration=...)", "time steps"),
+    "step of years": (lambda: dojo.gaits.step(ATLAS, shift=1e300), "gaits.step(shift=..., swing=...", "time steps"),
+    "rise of years": (
+        lambda: dojo.problems.stand_up(dojo.models.quadruped(), duration=1e9),
+        "problems.stand_up(duration=...)",
+        "time steps",
+    ),
     "gait of a number": (lambda: dojo.problems.follow(3.0), "problems.follow(gait)", "3.0"),
     "weight as a word": (lambda: dojo.problems.trot(place="near"), "problems.follow(place=...)", "near"),
     "effort below zero": (lambda: dojo.problems.trot(effort=-1.0), "problems.follow(effort=...)", "-1"),

@@ -72,6 +72,10 @@ def test_time_goes_on_in_a_controller():
     mpc(1.0, np.zeros(2))
     with pytest.raises(ValueError, match=r"MPC\(time\): expected a time after 1 s, got 0 s; call reset\(\)"):
         mpc(0.0, np.zeros(2))
+    with pytest.raises(
+        ValueError, match=r"MPC\(time\): expected at most 100,000 knots after 1 s, got 1e\+09 s; call res"
+    ):
+        mpc(1e9, np.zeros(2))
     mpc.reset()
     mpc(0.0, np.zeros(2))
 

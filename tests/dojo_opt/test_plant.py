@@ -160,7 +160,7 @@ def test_error_is_measured_from_the_reference():
     [
         (lambda: Plant(HOPPER, delay=0.0123), "multiple of the time step"),
         (lambda: Plant(HOPPER, pushes=[Push(0.0, (1, 0, 0), body="arm")]), "'arm' is not one of"),
-        (lambda: Plant(HOPPER, pushes=[(0.0, 1.0)]), "sequence of Push"),
+        (lambda: Plant(HOPPER, pushes=[(0.0, 1.0)]), "list of Push"),
         (lambda: Plant(HOPPER, payload=1.0, payload_body="arm"), "payload_body"),
         (lambda: Plant(HOPPER, slope=2.0), "less than a right angle"),
         (lambda: Plant(HOPPER, Perturbation(), payload=-1.0), r"expected shape|real numbers|payload"),

@@ -78,9 +78,10 @@ def with_values(
     """The mechanism with other values of the named parameters in the table; the time step if it is named."""
     time_step = None
     changes: dict[tuple[str, str, str], float] = {}
-    for name, given in values.items():
+    for name, given in checks.mapping(call, values).items():
         found = chosen(call, table, name)
-        numbers = np.atleast_1d(checks.array(f"{call}: {name!r}", np.atleast_1d(given), (len(found),)))
+        numbers = np.atleast_1d(checks.floats(f"{call}: {name!r}", given))
+        numbers = checks.array(f"{call}: {name!r}", numbers, (len(found),))
         for p, value in zip(found, numbers, strict=True):
             if p.part != COMMON:
                 changes[p.kind, p.part, p.component] = float(value)

@@ -33,6 +33,7 @@ from sim.model.record_columns import ContactRow, StepReport, StepSetting
 from sim.simulator.central_differences import central_differences
 from sim.simulator.engines.division import Division
 from sim.simulator.engines.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted, refuse
+from sim.simulator.engines.linear_systems import solved
 from sim.simulator.engines.node_states import ClosingStates
 from sim.simulator.engines.python_loop_engine import PythonLoopEngine
 from sim.simulator.link_kernels import link_flight
@@ -258,8 +259,8 @@ class AdaptiveEngine(PythonLoopEngine):
         by_q, by_v = self._momentum_slopes(h, mean)
         A, B = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
         damped = slopes.p_v + self._damping(h)
-        A[nv:] = np.linalg.solve(by_v, np.hstack([slopes.p_q - 0.5 * h * force - by_q, damped]))
-        B[nv:] = np.linalg.solve(by_v, -0.5 * h * slopes.f_u)
+        A[nv:] = solved(by_v, np.hstack([slopes.p_q - 0.5 * h * force - by_q, damped]))
+        B[nv:] = solved(by_v, -0.5 * h * slopes.f_u)
         return A, B
 
     def _end_slopes(self, mean: Vector, held: Held, h: float, x: Vector) -> tuple[Floats, Floats]:
@@ -270,8 +271,8 @@ class AdaptiveEngine(PythonLoopEngine):
         by_q, by_v = self._momentum_slopes(h, mean)
         A, B = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
         damped = slopes.p_v + self._damping(h)
-        A[nv:] = np.linalg.solve(damped, np.hstack([by_q + 0.5 * h * force - slopes.p_q, by_v]))
-        B[nv:] = np.linalg.solve(damped, 0.5 * h * slopes.f_u)
+        A[nv:] = solved(damped, np.hstack([by_q + 0.5 * h * force - slopes.p_q, by_v]))
+        B[nv:] = solved(damped, 0.5 * h * slopes.f_u)
         return A, B
 
     def _closed_slopes(self, convert: Conversion, x: Vector, held: Held, h: float) -> tuple[Floats, Floats]:

@@ -15,6 +15,7 @@ from sim.derivatives.momentum_gradient import momentum_jacobian
 from sim.dynamics.joints.damper import node_dampings
 from sim.model.interruptible_loops import rows
 from sim.simulator.engines.engine import Engine, Floats
+from sim.simulator.engines.linear_systems import solved
 from sim.simulator.link_kernels import link_gradient, link_step
 from sim.solve.start_velocity import SHORTEST, intervals, momenta_of_velocities, momentum_at, state_of_momentum
 from solvers.status import Status
@@ -49,13 +50,13 @@ class Intervals:
         p = self._arriving(h, x)
         if self._damped:
             C = self._damping(h)
-            p -= C @ np.linalg.solve(self._mass(x) + C, p)
+            p -= C @ solved(self._mass(x) + C, p)
         return p
 
     def state(self, h: float, P: Vector, near: Vector) -> Vector | None:
         """The state with P(q, v; h) = P (nv,), sought from the velocity of `near` (nx,); None where there is none."""
         out = near.copy()
-        p = P + self._damping(h) @ np.linalg.solve(self._mass(near), P) if self._damped else P
+        p = P + self._damping(h) @ solved(self._mass(near), P) if self._damped else P
         status = state_of_momentum(self._engine.linked(link_step), self._engine.table(), h, p, out)
         return out if status == Status.SOLVED and np.isfinite(out).all() else None
 
@@ -128,7 +129,7 @@ class Intervals:
             dofs = np.arange(model.body_vadr[i], model.body_vadr[i + 1])
             columns = np.zeros((len(dofs), nv))
             momenta_of_velocities(self._engine.linked(link_step), self._engine.table(), x, np.eye(nv)[dofs], columns)
-            v[dofs] = np.linalg.solve(columns[:, dofs].T, p[dofs])
+            v[dofs] = solved(columns[:, dofs].T, p[dofs])
             out += v[dofs] @ columns
         return out, v
 
@@ -146,7 +147,7 @@ class Intervals:
         by_q_there, by_v_there = self._momentum_slopes(*other)
         nv = len(by_q)
         out = np.eye(2 * nv)
-        out[nv:] = np.linalg.solve(by_v_there, np.hstack([by_q - by_q_there, by_v]))
+        out[nv:] = solved(by_v_there, np.hstack([by_q - by_q_there, by_v]))
         return out
 
     def _momentum_slopes(self, h: float, x: Vector) -> tuple[Floats, Floats]:
@@ -163,11 +164,11 @@ class Intervals:
             M = self._mass(x)
             damped = M + self._damping(h)
             node = x.copy()
-            node[-len(M) :] = np.linalg.solve(damped, self._arriving(h, x))
+            node[-len(M) :] = solved(damped, self._arriving(h, x))
             brief = min(_BRIEF * self._h, _ANGLE / max(float(np.abs(node[-len(M) :]).max()), 1e-9))
             one, two, three = (self._arriving_slopes(k * brief, node)[0] for k in (1.0, 2.0, 3.0))
             rest = 3.0 * (one - two) + three
-            by_q, by_v = rest + M @ np.linalg.solve(damped, by_q - rest), M @ np.linalg.solve(damped, by_v)
+            by_q, by_v = rest + M @ solved(damped, by_q - rest), M @ solved(damped, by_v)
         return by_q, by_v
 
     def _arriving_slopes(self, h: float, x: Vector) -> tuple[Floats, Floats]:

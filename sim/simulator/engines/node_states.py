@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sim.dynamics import coordinates, maximal_energy
 from sim.model.state_columns import BodyState
+from sim.simulator.engines.linear_systems import solved
 from sim.simulator.engines.linked_model import LinkedModel
 from sim.simulator.engines.mean_states import MeanStates
 from solvers.status import Status
@@ -57,7 +58,7 @@ class NodeStates(MeanStates):
         for x, z in zip(xs, zs, strict=True):
             columns, weighted = self._columns(x)
             rates = np.concatenate([z[:, BodyState.VELOCITY], z[:, BodyState.SPIN]], axis=1).ravel()
-            x[self._sizes.nq :] = np.linalg.solve(weighted @ columns.T, weighted @ rates)
+            x[self._sizes.nq :] = solved(weighted @ columns.T, weighted @ rates)
         return xs
 
     def mass_matrix(self, x: Vector) -> Floats:

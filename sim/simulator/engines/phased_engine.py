@@ -29,6 +29,7 @@ from sim.model.record_columns import StepReport
 from sim.simulator.engines.dividing_engine import DividingEngine
 from sim.simulator.engines.division import DIVISIBLE, Division
 from sim.simulator.engines.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted
+from sim.simulator.engines.linear_systems import solved
 from sim.simulator.engines.python_loop_engine import PythonLoopEngine
 from sim.simulator.link_kernels import link_flight
 from sim.simulator.results import Interrupted
@@ -164,7 +165,7 @@ class PhasedEngine(PythonLoopEngine):
             return A[0], B[0], report[0]
         A, B, x_next, report = self._second.linearize(m.means[s : s + 1], u[None], 1, kappa, None, external)
         after = self._node_slopes(x_next[0])
-        return after @ A[0] @ np.linalg.inv(self._node_slopes(m.means[s])), after @ B[0], report[0]
+        return after @ A[0] @ solved(self._node_slopes(m.means[s]), np.eye(A.shape[1])), after @ B[0], report[0]
 
     def _node_slopes(self, mean: Vector) -> Floats:
         """d(q, v of the node)/d(q, mean velocity) of a state of order 2:  (p_v + C) dv = dp - p_q dq,  (ndx, ndx)."""
@@ -175,5 +176,5 @@ class PhasedEngine(PythonLoopEngine):
         h, damping = self._second.states.interval(mean), np.zeros(nv)
         legendre.legendre_slopes(model, self._scratch.table(), h, mean, slopes, by_q, by_mean)
         node_dampings(model, h, damping)
-        out[nv:] = np.linalg.solve(slopes.p_v + np.diag(damping), np.hstack([by_q - slopes.p_q, by_mean]))
+        out[nv:] = solved(slopes.p_v + np.diag(damping), np.hstack([by_q - slopes.p_q, by_mean]))
         return out
