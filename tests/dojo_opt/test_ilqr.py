@@ -146,7 +146,7 @@ def test_save_and_load(tmp_path):
     "settings, message",
     [
         ({"max_iterations": -1}, r"ilqr\(max_iterations=...\): expected a whole number >= 0, got -1"),
-        ({"on_kappa_change": "open"}, r'ilqr\(on_kappa_change=...\): expected "feedback" or "gaps"'),
+        ({"on_kappa_change": "open"}, r"ilqr\(on_kappa_change=...\): 'open' is not one of: feedback, gaps"),
         ({"stages": ()}, "at least one stage"),
         ({"stages": ((0.0, 1e-3),)}, "expected positive kappa"),
         ({"time_limit": np.nan}, "time_limit"),
