@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from support.refusals import check_refused
 from support.wrong_values import fault, wrong
 
 Calls = dict[str, tuple[Callable[..., Any], dict[str, Any]]]
@@ -188,3 +189,26 @@ def test_states_too_large_to_solve_have_a_status() -> None:
         for result in (sim.step(x), sim.rollout(x, steps=2), sim.linearize(x)):
             end = result.x_next if isinstance(result, dojo.Jacobian) else result.x
             assert not result.success or np.isfinite(end).all(), (k, result)
+
+
+ANSWERS: tuple[Any, ...] = (np.full(2, np.nan), None, "a", np.zeros(3), np.ones(2) * 1j, object(), [], np.zeros((1, 2)))
+
+
+def test_wrong_answers_of_users_functions_are_refused_by_name() -> None:
+    plant = dojo.Plant(dojo.Simulator(dojo.models.pendulum(), 0.05))
+    for answer in ANSWERS:
+        loop = dojo.closed_loop(lambda time, x: np.zeros(1), plant, 0.1, reference=lambda times, answer=answer: answer)
+        check_refused(loop.rms, "closed_loop(reference=...)")
+        lines = np.linspace(0.0, 1.0, 4)
+        check_refused(
+            lambda answer=answer, lines=lines: dojo.Terrain.from_function(lambda X, Y: answer, lines, lines),
+            "Terrain.from_function(f)",
+        )
+    for answer in (np.zeros(2), np.zeros((2, 2))):
+        for name in ("fallen", "finished"):
+            check_refused(
+                lambda answer=answer, name=name: dojo.closed_loop(
+                    lambda time, x: np.zeros(1), plant, 0.1, **{name: lambda *given: answer}
+                ),
+                f"closed_loop: the answer of {name}",
+            )

@@ -83,12 +83,17 @@ class ClosedLoop:
             (N + 1, nv) errors [m, rad].
 
         Raises:
-            ValueError: the run has no reference.
+            ValueError: the run has no reference, or one that returns no states.
         """
         if self.reference is None:
             raise ValueError("ClosedLoop.error: no reference was given; use closed_loop(reference=...)")
-        sim = self.simulator
-        return sim.difference(self.x, np.asarray(self.reference(self.time)))[:, : sim.nv]
+        sim, call = self.simulator, "closed_loop(reference=...)"
+        if not callable(self.reference):
+            raise TypeError(f"{call}: expected a function of the times (n,), got {checks.shown(self.reference)}")
+        states = checks.floats(call, self.reference(self.time))
+        if states.shape not in ((sim.nx,), self.x.shape):
+            raise ValueError(f"{call}: expected states of shape {self.x.shape}, got {states.shape}")
+        return sim.difference(self.x, checks.array(call, states, states.shape))[:, : sim.nv]
 
     def rms(self, components: Any = None) -> float:
         """Root mean square of the distance from the reference.

@@ -115,7 +115,11 @@ class Terrain:
             raise TypeError(f"Terrain.from_function(f): expected a function of (X, Y), got {f!r}")
         lines = [_lines(f"Terrain.from_function({name})", given) for name, given in (("x", x), ("y", y))]
         X, Y = np.meshgrid(*lines, indexing="ij")
-        values = np.array(np.broadcast_to(checks.floats("Terrain.from_function(f)", f(X, Y)), X.shape))
+        values = checks.floats("Terrain.from_function(f)", f(X, Y))
+        try:
+            values = np.array(np.broadcast_to(values, X.shape))
+        except ValueError:
+            raise ValueError(f"Terrain.from_function(f): expected shape {X.shape}, got {values.shape}") from None
         heights = checks.array("Terrain.from_function(f)", values, X.shape)
         spacing = [line[1] - line[0] if len(line) > 1 else 1.0 for line in lines]
         return Terrain(heights, (lines[0][0], lines[1][0]), spacing)

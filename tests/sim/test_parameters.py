@@ -207,7 +207,7 @@ def test_every_value_can_be_put_in_its_place() -> None:
         (("friction:hand",), r"no parameter 'friction:hand'.*friction:body1"),
         (("cone",), r"no parameter 'cone'.*none"),
         (("mass", "mass"), "mass"),
-        ((3,), "expected names, got 3"),
+        ((3,), "expected a name, got 3"),
     ],
 )
 def test_bad_names(wrt: tuple[str, ...], message: str) -> None:
