@@ -197,6 +197,7 @@ def test_round_hulls_stand_on_the_corners_that_are_lowest():
     assert np.abs(sim.difference(after, state)).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_a_robot_whose_trunk_has_corners_too_stands_on_its_feet():
     """With all corners within 1 cm of the ground, Newton's method finds no balance; then fewer may carry."""
     rng = np.random.default_rng(5)

@@ -49,6 +49,7 @@ def test_counts_are_refused_below_one_and_beyond_the_memory(model: str, argument
         assert isinstance(found, str) and f"{model}({argument}" in found and reason in found, (value, found)
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize(("model", "argument"), arguments(("float",)))
 def test_odd_and_extreme_numbers_give_a_mechanism_of_finite_numbers_or_a_reason(model: str, argument: str) -> None:
     for value in ODD:

@@ -114,7 +114,9 @@ CALLS = {
 HOP = dojo.problems.hop()
 
 
-@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "accuracy" else []) for name in CALLS]
+)
 def test_no_ctrl_c_is_dropped_wherever_it_comes(name: str) -> None:
     assert dropped(CALLS[name], most=200) == []
     other = threading.Thread(target=CALLS[name], daemon=True)

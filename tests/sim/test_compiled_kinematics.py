@@ -138,6 +138,11 @@ def test_unknown_quantities_and_frames_are_refused(arm):
         kin.compiled("pose")
     with pytest.raises(ValueError, match="expected no frame"):
         kin.compiled("center_of_mass", "link7")
+
+
+@pytest.mark.slow
+def test_the_world_is_a_frame_that_does_not_move(arm):
+    kin = dojo.Kinematics(arm)
     at = filled(kin.compiled("pose", "world"), arm.neutral(), 7)
     np.testing.assert_array_equal(at, [0, 0, 0, 1, 0, 0, 0])
     assert not filled(kin.compiled("velocity_jacobian", "world"), arm.neutral(), (6, arm.ndx)).any()

@@ -18,10 +18,12 @@ from typing import IO
 from support.programs import HOME
 
 SERVER = """
-import json, os, sys, threading, traceback, warnings
+import gc, json, os, sys, threading, traceback, warnings
 import numba, numpy
 
 numba.njit(lambda x: x + 1.0)(1.0)
+gc.collect()
+gc.freeze()  # a collection in a fork would copy all objects of Numba: half of its processor time
 
 
 def fork():
