@@ -51,8 +51,21 @@ def spline(coefficients: Floats, s: Floats, t: Floats) -> tuple[Floats, Floats, 
     bs, ds, rows = spline_basis(s, coefficients.shape[0])
     bt, dt, columns = spline_basis(t, coefficients.shape[1])
     c = coefficients[rows[..., :, None], columns[..., None, :]]
-    pick = "...i,...ij,...j->..."
-    return np.einsum(pick, bs, c, bt), np.einsum(pick, ds, c, bt), np.einsum(pick, bs, c, dt)
+    across, slopes = _sum_last(c, bt[..., None, :]), _sum_last(c, dt[..., None, :])
+    return _sum_last(bs, across), _sum_last(ds, across), _sum_last(bs, slopes)
+
+
+def spline_values(coefficients: Floats, s: Floats, t: Floats) -> Floats:
+    """F of `spline` alone, in half the time."""
+    bs, _, rows = spline_basis(s, coefficients.shape[0])
+    bt, _, columns = spline_basis(t, coefficients.shape[1])
+    c = coefficients[rows[..., :, None], columns[..., None, :]]
+    return _sum_last(bs, _sum_last(c, bt[..., None, :]))
+
+
+def _sum_last(a: Floats, b: Floats) -> Floats:
+    """Sums of products along the last axis: with two operands einsum is several times as fast as with three."""
+    return np.asarray(np.einsum("...i,...i->...", a, b))
 
 
 def spline_shares(shape: tuple[int, ...], s: Floats, t: Floats) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -189,31 +190,47 @@ def _extent(shape: Shape, named: dict[str, int]) -> tuple[int, int]:
     return rows, cols
 
 
-def _carve(fields: dict[str, Shape], sizes: Sizes, kind: Any) -> dict[str, Any]:
-    """Zeroed arrays of these shapes, end to end in one buffer."""
+_Fields = tuple[tuple[str, Shape], ...]
+_MODEL_PARTS: tuple[_Fields, ...] = (tuple(MODEL_INTS.items()), tuple(MODEL_FLOATS.items()))
+_DATA_PARTS: tuple[_Fields, ...] = tuple(
+    (*carry.items(), *data.items()) for carry, data in ((CARRY_INTS, DATA_INTS), (CARRY_FLOATS, DATA_FLOATS))
+)
+
+
+@lru_cache(maxsize=64)
+def _places(fields: _Fields, sizes: Sizes) -> tuple[int, list[tuple[str, slice, tuple[int, ...]]]]:
+    """Length of a buffer for arrays of these shapes, end to end; the name, place and shape of each."""
     named = _lengths(sizes)
-    extents = {name: _extent(shape, named) for name, shape in fields.items()}
-    line = 128 // 8  # a pair of cache lines: arrays that two threads write must not share one
-    buffer: NDArray[Any] = np.zeros(sum(whole(rows * cols) for rows, cols in extents.values()) + 2 * line, dtype=kind)
-    first = -(buffer.ctypes.data // 8) % line
-    arrays, start = {}, first
-    for name, (rows, cols) in extents.items():
-        if len(fields[name]) == 2 and cols % LANES == 0:  # rows of whole lanes begin where cache lines do
-            start = first + whole(start - first)
-        flat = buffer[start : start + rows * cols]
-        arrays[name] = flat if len(fields[name]) == 1 else flat.reshape(rows, cols)
+    length, start, places = 0, 0, []
+    for name, shape in fields:
+        rows, cols = _extent(shape, named)
+        length += whole(rows * cols)
+        if len(shape) == 2 and cols % LANES == 0:  # rows of whole lanes begin where cache lines do
+            start = whole(start)
+        places.append((name, slice(start, start + rows * cols), (rows, cols)[: len(shape)]))
         start += rows * cols
-    return arrays
+    return length, places
+
+
+def _carve(fields: _Fields, sizes: Sizes, kind: Any) -> dict[str, Any]:
+    """Zeroed arrays of these shapes, end to end in one buffer."""
+    length, places = _places(fields, sizes)
+    line = 128 // 8  # a pair of cache lines: arrays that two threads write must not share one
+    buffer: NDArray[Any] = np.zeros(length + 2 * line, dtype=kind)
+    buffer = buffer[-(buffer.ctypes.data // 8) % line :]
+    return {name: buffer[at] if len(shape) == 1 else buffer[at].reshape(shape) for name, at, shape in places}
 
 
 def allocate_model(sizes: Sizes) -> Model:
     """A Model of zeros."""
-    return Model(**_carve(MODEL_INTS, sizes, np.int64), **_carve(MODEL_FLOATS, sizes, np.float64))
+    integers, floats = _MODEL_PARTS
+    return Model(**_carve(integers, sizes, np.int64), **_carve(floats, sizes, np.float64))
 
 
 def allocate_data(sizes: Sizes) -> Data:
     """The scratch of one thread, and the state between its steps."""
-    arrays = _carve(CARRY_INTS | DATA_INTS, sizes, np.int64) | _carve(CARRY_FLOATS | DATA_FLOATS, sizes, np.float64)
+    integers, floats = _DATA_PARTS
+    arrays = _carve(integers, sizes, np.int64) | _carve(floats, sizes, np.float64)
     carry = Carry(**{name: arrays.pop(name) for name in CARRY_FIELDS})
     return Data(carry=carry, **arrays)
 
