@@ -74,11 +74,9 @@ def __getattr__(name: str) -> Any:
     if name.startswith("_"):  # tools ask every object for such names, pytest a dozen times per module of tests
         raise AttributeError(f"module 'dojo_opt' has no attribute {name!r}")
     if name not in _HOME:
-        from sim.mechanism.checks import nearest
+        from sim.mechanism.checks import no_attribute
 
-        raise AttributeError(
-            f"module 'dojo_opt' has no attribute {name!r}; it has {', '.join(__all__)}{nearest(name, __all__)}"
-        )
+        raise no_attribute(__name__, name, __all__)
     home = _HOME[name]
     value = import_module(f"dojo_opt.{name}") if home == "dojo_opt" else getattr(import_module(home), name)
     globals()[name] = value

@@ -21,6 +21,7 @@ from dojo_opt.learn.task import Task
 from dojo_opt.learn.training_result import Learned
 from dojo_opt.learn.velocity_task import go2, quadruped, velocity_error
 from dojo_opt.learn.waypoint_tasks import quadrotor, uuv, youbot
+from sim.mechanism.checks import no_attribute
 from sim.mechanism.renamed import warn_renamed
 
 if not TYPE_CHECKING:
@@ -30,7 +31,7 @@ if not TYPE_CHECKING:
         if name == "Randomisation":
             warn_renamed("dojo.learn.Randomisation", "dojo.learn.Randomization")
             return Randomization
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        raise no_attribute(__name__, name, __all__)
 
 
 if find_spec("gymnasium") is not None:

@@ -41,7 +41,7 @@ from dojo_opt.models.twister import twister
 from dojo_opt.models.uuv import uuv
 from dojo_opt.models.walker import walker
 from dojo_opt.models.youbot import youbot
-from sim.mechanism.checks import nearest
+from sim.mechanism.checks import no_attribute
 from sim.mechanism.renamed import warn_renamed
 
 __all__ = [
@@ -101,4 +101,4 @@ if not TYPE_CHECKING:
         if name == "catalogue":
             warn_renamed("dojo.models.catalogue", "dojo.models.catalog")
             return catalog
-        raise AttributeError(f"dojo_opt.models has no {name!r}; there are {', '.join(__all__)}{nearest(name, __all__)}")
+        raise no_attribute(__name__, name, __all__)

@@ -11,7 +11,7 @@ from dojo_opt.problems.legged import jump, stand_up, trot, walk
 from dojo_opt.problems.locomotion import bound, follow, pace, turn
 from dojo_opt.problems.push import push
 from dojo_opt.problems.reach import reach
-from sim.mechanism.checks import nearest
+from sim.mechanism.checks import no_attribute
 
 __all__ = [
     "block",
@@ -36,6 +36,4 @@ if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
         """A name that is not there, with the ones that are."""
-        raise AttributeError(
-            f"dojo_opt.problems has no {name!r}; there are {', '.join(__all__)}{nearest(name, __all__)}"
-        )
+        raise no_attribute(__name__, name, __all__)

@@ -12,7 +12,7 @@ from dojo_opt.tasks.legged import legged_mpc
 from dojo_opt.tasks.plants import plant
 from dojo_opt.tasks.trotting import quadruped_mpc
 from dojo_opt.tasks.walking import humanoid_mpc
-from sim.mechanism.checks import nearest
+from sim.mechanism.checks import no_attribute
 
 __all__ = [
     "Hopping",
@@ -32,4 +32,4 @@ if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
         """A name that is not there, with the ones that are."""
-        raise AttributeError(f"dojo_opt.tasks has no {name!r}; there are {', '.join(__all__)}{nearest(name, __all__)}")
+        raise no_attribute(__name__, name, __all__)

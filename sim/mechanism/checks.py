@@ -242,6 +242,13 @@ def nearest(value: Any, known: Iterable[str]) -> str:
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
+def no_attribute(module: str, name: str, known: Iterable[str]) -> AttributeError:
+    """The error of a module for a name that it does not have, with those that it has."""
+    words = list(known)
+    has = f"it has {', '.join(words)}{nearest(name, words)}"
+    return AttributeError(f"module {module!r} has no attribute {name!r}; {has}")
+
+
 def keywords(call: str, given: Iterable[str], known: Iterable[str]) -> None:
     """Refuse keywords that a call does not have, with those that it has."""
     words = list(known)

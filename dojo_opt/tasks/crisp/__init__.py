@@ -19,7 +19,7 @@ from dojo_opt.tasks.crisp.push_box import push_box
 from dojo_opt.tasks.crisp.push_t import push_t
 from dojo_opt.tasks.crisp.transport import transport
 from dojo_opt.tasks.crisp.waiter import waiter
-from sim.mechanism.checks import nearest
+from sim.mechanism.checks import no_attribute
 
 __all__ = ["cart_pole", "hopper", "push_box", "push_t", "transport", "waiter"]
 
@@ -28,5 +28,4 @@ if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
         """A task that is not there, with the ones that are."""
-        raise AttributeError(f"dojo_opt.tasks.crisp has no {name!r}; there are {', '.join(__all__)}"
-                             f"{nearest(name, __all__)}")  # fmt: skip
+        raise no_attribute(__name__, name, __all__)

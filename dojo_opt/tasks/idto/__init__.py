@@ -22,7 +22,7 @@ from dojo_opt.tasks.idto.jaco_ball import jaco_ball
 from dojo_opt.tasks.idto.mini_cheetah import mini_cheetah, mini_cheetah_hills
 from dojo_opt.tasks.idto.planar_hopper import hopper
 from dojo_opt.tasks.idto.spinner import spinner
-from sim.mechanism.checks import nearest
+from sim.mechanism.checks import no_attribute
 
 __all__ = [
     "acrobot",
@@ -42,5 +42,4 @@ if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
         """A task that is not there, with the ones that are."""
-        raise AttributeError(f"dojo_opt.tasks.idto has no {name!r}; there are {', '.join(__all__)}"
-                             f"{nearest(name, __all__)}")  # fmt: skip
+        raise no_attribute(__name__, name, __all__)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from dojo_opt.tasks.jin.fingertips import fingertips
 from dojo_opt.tasks.jin.trifinger import trifinger
-from sim.mechanism.checks import nearest
+from sim.mechanism.checks import no_attribute
 
 __all__ = ["fingertips", "trifinger"]
 
@@ -23,5 +23,4 @@ if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
         """A task that is not there, with the ones that are."""
-        raise AttributeError(f"dojo_opt.tasks.jin has no {name!r}; there are {', '.join(__all__)}"
-                             f"{nearest(name, __all__)}")  # fmt: skip
+        raise no_attribute(__name__, name, __all__)
