@@ -16,7 +16,7 @@ from dojo_opt.planning.manifold import tangent_layout
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.derivative_results import Linearization
-from sim.simulator.results import Trajectory, path_of
+from sim.simulator.results import Trajectory, states_and_inputs
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
 
@@ -77,7 +77,7 @@ def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None,
     if isinstance(trajectories, Trajectory) or not isinstance(trajectories, Iterable):
         raise TypeError(f"{call}: expected a list of motions, got {checks.shown(trajectories)}")
     for number, given in enumerate(trajectories):
-        raw = (given.x, given.u) if isinstance(given, Trajectory) else path_of(call, given)
+        raw = (given.x, given.u) if isinstance(given, Trajectory) else states_and_inputs(call, given)
         us = checks.array(call, raw[1], ("T", sim.nu))
         xs = checks.array(call, raw[0], (len(us) + 1, sim.nx))
         size = len(us) if length is None else length

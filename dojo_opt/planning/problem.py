@@ -67,9 +67,6 @@ def _terms(given: Any) -> tuple[Spec, ...]:
 class Problem:
     """Minimise the sum of costs over x (T + 1, nx) and u (T, nu), from x_0 = start, along the motion of the simulator.
 
-    The attribute `refinement` is 1. If it is larger, `ilqr` ends by planning `refined(refinement)` from its first plan.
-    `refined_constraints` are constraints of that problem only: those that do not help from a distant guess.
-
     Args:
         sim: the simulator.
         start: (nx,) first state.
@@ -85,13 +82,15 @@ class Problem:
         free_start: tangent components of the start that the planner may change, by number or name, or True for all;
             `start` is then a guess (default None: a fixed start). With the constraint `Periodic`, such a plan is a
             periodic gait.
+        refinement: with more than 1, `ilqr` ends by planning `refined(refinement)` from its first plan (default 1).
+        refined_constraints: one constraint or several of that problem only, which do not help from a distant guess.
 
     Raises:
         TypeError: `sim` is not a Simulator, or an entry of `cost` or `constraints` is not a term.
         ValueError: for a wrong shape, a number that is not finite, or a horizon that exceeds the memory.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913
         self,
         sim: Simulator,
         start: ArrayLike,
@@ -104,13 +103,14 @@ class Problem:
         controls0: ArrayLike | None = None,
         states0: ArrayLike | None = None,
         free_start: Any = None,
+        refinement: int = 1,
+        refined_constraints: Spec | Sequence[Spec] = (),
     ) -> None:
         _check_simulator("Problem(sim)", sim)
         self.sim = sim
         self.horizon = whole_number("Problem(horizon=...)", horizon)
         self.substeps = whole_number("Problem(substeps=...)", substeps)
-        self.refinement = 1
-        self.refined_constraints: tuple[Spec, ...] = ()
+        self.refinement = whole_number("Problem(refinement=...)", refinement)
         self._check_memory()
         start = numbers("Problem(start=...)", start)
         if start.shape != (sim.nx,):
@@ -118,15 +118,23 @@ class Problem:
         self.layout = tangent_layout(sim, sim.neutral())
         self.start: Vector = state_table("Problem(start=...)", start, 1, sim.nx, self.layout)[0]
         self.free_start = _components("Problem(free_start=...)", free_start, sim)
-        self.specs = (_terms(cost), _terms(constraints))
-        for argument, specs in zip(("cost", "constraints"), self.specs, strict=True):
+        self.specs, self.refined_constraints = (_terms(cost), _terms(constraints)), _terms(refined_constraints)
+        arguments = {
+            "cost": self.specs[0],
+            "constraints": self.specs[1],
+            "refined_constraints": self.refined_constraints,
+        }
+        for argument, specs in arguments.items():
             for i, spec in enumerate(specs):
                 if not hasattr(spec, "bind"):
-                    found = f"a {type(spec).__name__}, not a term of dojo.{argument.removesuffix('s')}"
+                    kind = argument.removeprefix("refined_").removesuffix("s")
+                    found = f"a {type(spec).__name__}, not a term of dojo.{kind}"
                     raise TypeError(f"Problem({argument}=...): entry {i} is {found}")
         self.bind()
         self.control_limits = control_limits_of(control_limits, sim)
         self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)
+        if self.control_limits is not None:
+            self.controls0 = np.clip(self.controls0, *self.control_limits)
         self.states0 = None if states0 is None else self.check_states("Problem(states0=...)", states0)
 
     def __repr__(self) -> str:

@@ -75,7 +75,7 @@ def humanoid_leap(
     low, apex, goal = (_moved(start, *by) for by in ((0.0, -_CROUCH * size), (0.5 * far, high), (far, 0.0)))
     part = round(0.3 * _KNOTS)
     poses = np.array([low] * part + [apex] * part + [goal] * (_KNOTS + 1 - 2 * part))
-    problem = Problem(
+    return Problem(
         sim,
         start,
         _KNOTS,
@@ -86,9 +86,8 @@ def humanoid_leap(
         constraints=[Goal(goal, components=np.arange(6))],
         controls0=np.clip(held, *sim.mechanism.input_limits),
         states0=np.tile(start, (_KNOTS + 1, 1)),
+        refinement=whole_number(f"{call}(refinement=...)", refinement),
     )
-    problem.refinement = whole_number(f"{call}(refinement=...)", refinement)
-    return problem
 
 
 def _moved(x: Array, ahead: float, up: float) -> Array:

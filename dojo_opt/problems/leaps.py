@@ -84,7 +84,7 @@ def leap(
     check_room(f"{call}(duration=...): knots", horizon, 8.0 * sim.nx, "leap in less time, or with longer knots")
     down, up = round(0.2 * horizon), round(0.4 * horizon)
     poses = np.array([low] * down + [apex] * up + [goal] * (horizon + 1 - down - up))
-    problem = Problem(
+    return Problem(
         sim,
         start,
         horizon,
@@ -93,10 +93,9 @@ def leap(
         control_limits=(-TORQUE_LIMIT, TORQUE_LIMIT),
         controls0=torques,
         states0=np.tile(still, (horizon + 1, 1)),
+        refinement=refinement,
+        refined_constraints=Goal(apex, components=[2], knots=down + up // 2),
     )
-    problem.refinement = refinement
-    problem.refined_constraints = (Goal(apex, components=[2], knots=down + up // 2),)
-    return problem
 
 
 def _moved(x: Array, ahead: float, up: float) -> Array:

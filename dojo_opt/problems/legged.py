@@ -305,12 +305,9 @@ def _shared_out(settings: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any
 
 
 def _scaled(legs: Legs, gait: Gait, given: dict[str, Any]) -> Problem:
-    """The problem to follow a gait, its weights in units of the robot, its torques within the limits of the joints."""
+    """The problem to follow a gait, its weights in units of the robot."""
     place: ArrayLike = np.asarray(PLACE) / legs.size**2
-    limits = legs.mechanism.input_limits
-    bounded = None if limits is None or not np.isfinite(limits).any() else tuple(np.asarray(limits))
-    usual = {"place": place, "effort": EFFORT / legs.torque**2, "control_limits": bounded}
-    return follow(gait, **{**usual, **given})
+    return follow(gait, **{"place": place, "effort": EFFORT / legs.torque**2, **given})
 
 
 def _rounded(step: float) -> float:

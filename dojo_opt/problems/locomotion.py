@@ -16,7 +16,7 @@ from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.gait import Gait
 from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import CONTINUATION, PLANNED
-from dojo_opt.planning.problem import Problem, control_limits_of
+from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.simulator.simulator import Simulator
@@ -56,7 +56,7 @@ def follow(
             closes; "standing" with a robot that stands still, in equilibrium at the smoothing of the planner's first
             stage.
         substeps: time steps of the gait per knot; their number is a multiple of it.
-        control_limits: (lower, upper), numbers or (nu,) [N m]; None for no limits.
+        control_limits: (lower, upper), numbers or (nu,) [N m] (default None: the limits of the inputs).
         place: weight of squares of the base's place, a number or (3,) along x, y, z [1/(m^2 s)].
         attitude: weight of squares of the base's attitude [1/(rad^2 s)].
         effort: weight of squares of the inputs [1/((N m)^2 s)].
@@ -91,8 +91,6 @@ def follow(
     else:
         still, torques = standing(sim, gait.foot_names)
         states, controls = np.tile(still, (horizon + 1, 1)), np.tile(torques, (horizon, 1))
-    if control_limits is not None and (limits := control_limits_of(control_limits, sim)) is not None:
-        controls = np.clip(controls, *limits)
     constraint: Any = Goal(reference[-1], components=np.arange(6))
     if periodic:
         constraint = Periodic(_stride(sim, reference))

@@ -109,7 +109,7 @@ class Result:
 Ended = TypeVar("Ended", bound=Result)
 
 
-def ended(result: Ended, throw: bool) -> Ended:
+def checked(result: Ended, throw: bool) -> Ended:
     """The result; with `throw`, SimulationError instead of one that was not a success."""
     if checks.flag("throw=...", throw):
         result.check()
@@ -409,7 +409,7 @@ class RolloutBatch(Result):
         return cls(*rows)
 
 
-def carried(call: Callable[[], Any], made: Callable[[Any], Any]) -> Any:
+def converted(call: Callable[[], Any], made: Callable[[Any], Any]) -> Any:
     """The converted result of a call; the result that Interrupted carries is converted likewise."""
     try:
         result = call()
@@ -427,7 +427,7 @@ def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
     return contacts
 
 
-def path_of(call: str, trajectory: Any) -> tuple[Any, Any]:
+def states_and_inputs(call: str, trajectory: Any) -> tuple[Any, Any]:
     """(states, inputs) of a trajectory, or of such a pair."""
     if isinstance(trajectory, Trajectory):
         return trajectory.x, trajectory.u
@@ -436,7 +436,7 @@ def path_of(call: str, trajectory: Any) -> tuple[Any, Any]:
     raise TypeError(f"{call}: expected a Trajectory or (states, inputs), one time step apart, got {trajectory!r}")
 
 
-def sentence(
+def status_message(
     mech: Mechanism, where: str, report: Floats, tolerance: float, loop: tuple[float, str] | None = None
 ) -> str:
     """The sentence of a status, with the numbers of a StepReport; loop: (gap, name) of the one with the largest gap."""
@@ -476,7 +476,7 @@ def reservation(fractions: Floats, errors: Floats) -> str:
     )
 
 
-def fastest(mech: Mechanism, z: Floats) -> str:
+def fastest_body(mech: Mechanism, z: Floats) -> str:
     """Name the fastest-turning body of a maximal state (nbody, 13); its step is short, otherwise turns wrap."""
     w = np.linalg.norm(z[:, BodyState.SPIN], axis=1)
     return f"The fastest is {mech.body_names[int(w.argmax())]!r}, with {w.max():.3g} rad/s before the step."

@@ -23,7 +23,7 @@ from sim.model.interruptible_loops import pieces
 from sim.model.record_columns import Dry, StepReport, StepSetting
 from sim.simulator.engines.division import DIVISIBLE, Division
 from sim.simulator.engines.engine import BOUND, CONE, REPORT, Engine, finite_rows, refuse
-from sim.simulator.results import Contacts, Result, contacts_of, ended, sentence
+from sim.simulator.results import Contacts, Result, checked, contacts_of, status_message
 from sim.simulator.row_impulses import RowImpulses
 from sim.simulator.state_space import StateSpace
 from solvers.status import Status
@@ -315,7 +315,7 @@ class SingleRow:
         status, iterations = last[:2].astype(np.int64)[:, None]
         if solved:
             return StepBatch(self.end[None].copy(), status, iterations, *self._none, contacts=self.contacts)
-        detail = sentence(self._mechanism, "Simulator.step_batch: row 0", last, self._engine.settings.tolerance)
+        detail = status_message(self._mechanism, "Simulator.step_batch: row 0", last, self._engine.settings.tolerance)
         return StepBatch(states, status, iterations, *self._none, detail, self.contacts)
 
     @property
@@ -384,7 +384,7 @@ class RowStepping(StateSpace):
         kept = self._impulses(call, impulses, count)
         alone = count == 1 and kappa is None and not parameters and not derivatives and not len(kept)
         if alone and self.has_single_rows:
-            return ended(self.single_row(steps, contacts).step(states, inputs), throw)
+            return checked(self.single_row(steps, contacts).step(states, inputs), throw)
         kappas = np.full(count, np.nan)
         if kappa is not None:
             if self.order > 2:
@@ -403,8 +403,10 @@ class RowStepping(StateSpace):
             found = replace(found, contacts=contacts_of(self.mechanism, self.time_step, rows))
         if len(found.unsolved):
             i = int(found.unsolved[0])
-            found = replace(found, detail=sentence(self.mechanism, f"{call}: row {i}", reports[i], self.tolerance))
-        return ended(found, throw)
+            found = replace(
+                found, detail=status_message(self.mechanism, f"{call}: row {i}", reports[i], self.tolerance)
+            )
+        return checked(found, throw)
 
     def row_impulses(self, count: int) -> RowImpulses:
         """Room for the impulses of independent rows between calls of `step_batch`; in the beginning, none are known.

@@ -29,12 +29,12 @@ from sim.simulator.results import (
     RolloutBatch,
     StepResult,
     Trajectory,
-    carried,
+    checked,
     contacts_of,
-    ended,
-    path_of,
+    converted,
     reservation,
-    sentence,
+    states_and_inputs,
+    status_message,
 )
 from sim.simulator.rollout_duration import simulator_for_duration
 from sim.simulator.row_batch import RowStepping
@@ -176,7 +176,7 @@ class Simulator(RowStepping):
         detail = "" if rolled.solved_steps else self._sentence("Simulator.step", rolled.reports[0], end)
         if fraction < 1.0 or error[0] > 1.0:
             detail = reservation(share, error)
-        return ended(StepResult(end, *solved, scene, int(parts[0]), fraction, float(error[0]), detail), throw)
+        return checked(StepResult(end, *solved, scene, int(parts[0]), fraction, float(error[0]), detail), throw)
 
     def rollout(
         self,
@@ -210,17 +210,17 @@ class Simulator(RowStepping):
             count = self._arguments.steps("rollout", steps)
             external = self._arguments.wrenches("rollout", wrenches, count)
             taken, policy = (lambda found: self._trajectory(found[0], found[1], external)), us
-            return ended(carried(lambda: roll_policy(self._engine, state, policy, count, external), taken), throw)
+            return checked(converted(lambda: roll_policy(self._engine, state, policy, count, external), taken), throw)
         if us is None:
             inputs = np.zeros((self._arguments.steps("rollout", steps), self.nu))
         else:
             inputs = self._arguments.inputs("rollout", "us", us, ("T" if steps is None else steps, self.nu))
         external = self._arguments.wrenches("rollout", wrenches, len(inputs))
-        found = carried(
+        found = converted(
             lambda: self._engine.roll(state, inputs, external),
             lambda rolled: self._trajectory(inputs, rolled, external),
         )
-        return ended(found, throw)
+        return checked(found, throw)
 
     def _trajectory(self, inputs: Floats, rolled: Rolled, wrenches: Floats | None) -> Trajectory:
         """A rollout under the inputs (T, nu)."""
@@ -260,7 +260,7 @@ class Simulator(RowStepping):
         call = "Simulator.rollout_batch"
         inputs = self._arguments.inputs("rollout_batch", "us", us, ("n", "T", self.nu))
         starts = self._arguments.states(f"{call}(x0s)", checks.array(f"{call}(x0s)", x0s, (len(inputs), self.nx)))
-        return ended(carried(lambda: self._engine.roll_batch(starts, inputs), RolloutBatch.of), throw)
+        return checked(converted(lambda: self._engine.roll_batch(starts, inputs), RolloutBatch.of), throw)
 
     def rollout_feedback(  # noqa: PLR0913
         self,
@@ -308,10 +308,10 @@ class Simulator(RowStepping):
         external = self._arguments.wrenches(call, wrenches, len(inputs))
         policy = self._arguments.policy(name, state, inputs, external, (xs, ks, Ks, gaps))
         count, level = whole_number(f"{name}(substeps=...)", substeps), self._arguments.kappa(call, kappa)
-        found = carried(
+        found = converted(
             lambda: self._engine.roll_feedback(state, policy, factor, bounds, count, level), FeedbackRollout.of
         )
-        return ended(found, throw)
+        return checked(found, throw)
 
     closed_loop = renamed("rollout_feedback")
 
@@ -348,7 +348,7 @@ class Simulator(RowStepping):
             )
         external = self._arguments.wrenches("reactions", wrenches, len(states))
         found = reactions(self.mechanism, self._engine, (states, us, external), lead, frame, self._sentence)
-        return ended(found, throw)
+        return checked(found, throw)
 
     def inactive_contacts(self, x: ArrayLike, u: ArrayLike | None = None) -> tuple[str, ...]:
         """Inactive contacts of a step; the solver has no unknowns for them, but their forces kappa / gap act.
@@ -424,10 +424,10 @@ class Simulator(RowStepping):
             (A,), (B,), x_next, report = rolled.A, rolled.B, rolled.xs[1], rolled.reports[0]
             blocks = {"state": A, "input": B} | {name: J[0][:, rows] for name, rows in selected[1].rows.items()}
         status, accuracy = STATUSES[int(report[StepReport.STATUS])], float(report[StepReport.ACCURACY])
-        detail = "" if status == Status.SOLVED else sentence(self.mechanism, call, report, self.tolerance)
+        detail = "" if status == Status.SOLVED else status_message(self.mechanism, call, report, self.tolerance)
         if selected is not None and status == Status.SOLVED:
             blocks = {name: blocks[name] for name in selected[0]}
-        return ended(Jacobian(blocks, x_next, status, accuracy, detail), throw)
+        return checked(Jacobian(blocks, x_next, status, accuracy, detail), throw)
 
     def linearize_rollout(
         self,
@@ -463,14 +463,14 @@ class Simulator(RowStepping):
             rolled, blocks = self._engine.roll(state, inputs, external, kappa=level, derivatives=True), {}
         knot, reports, detail = rolled.solved_steps, rolled.reports, ""
         if knot < len(inputs):
-            detail = sentence(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)
+            detail = status_message(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)
             reports[knot:, StepReport.STATUS] = reports[knot, StepReport.STATUS]
             rolled.xs[knot + 1 :] = rolled.xs[knot]
             for array in (rolled.A, rolled.B, *blocks.values()):
                 array[knot:] = 0.0
         statuses, accuracy = reports[:, StepReport.STATUS].astype(np.int64), reports[:, StepReport.ACCURACY]
         linear = Linearization(rolled.A, rolled.B, rolled.xs[1:], statuses, blocks, accuracy, detail)
-        return rolled.xs, ended(linear, throw)
+        return rolled.xs, checked(linear, throw)
 
     def linearize_trajectory(
         self,
@@ -510,9 +510,9 @@ class Simulator(RowStepping):
         statuses, detail = reports[:, StepReport.STATUS].astype(np.int64), ""
         if statuses.any():
             t = int(np.flatnonzero(statuses)[0])
-            detail = sentence(self.mechanism, f"{call}: knot {t}", reports[t], self.tolerance)
+            detail = status_message(self.mechanism, f"{call}: knot {t}", reports[t], self.tolerance)
         linear = Linearization(A, B, x_next, statuses, accuracy=reports[:, StepReport.ACCURACY], detail=detail)
-        return ended(linear, throw)
+        return checked(linear, throw)
 
     def linearize_maximal(
         self, z: ArrayLike, u: ArrayLike | None = None, *, kappa: float | None = None, throw: bool = False
@@ -565,7 +565,7 @@ class Simulator(RowStepping):
             Gradient by the names of `wrt`: "state" (ndx,), of the first state; "input" (T, nu); parameters (n,).
         """
         call = "Simulator.vjp"
-        xs, us = path_of(f"{call}(trajectory)", trajectory)
+        xs, us = states_and_inputs(f"{call}(trajectory)", trajectory)
         if wrenches is None and isinstance(trajectory, Trajectory):
             wrenches = trajectory.wrenches
         inputs = self._arguments.inputs("vjp", "trajectory", us, ("T", self.nu))
@@ -579,10 +579,10 @@ class Simulator(RowStepping):
         blocks = {"state": line.costate[0], "input": line.inputs}
         blocks = {name: blocks[name] if name in blocks else line.parameters[found.rows[name]] for name in asked}
         if knot >= 0:
-            detail = sentence(self.mechanism, f"{call}: step {knot}", line.report[0], self.tolerance)
-            return ended(Gradient(blocks, Status(int(line.report[0, StepReport.STATUS])), detail), throw)
+            detail = status_message(self.mechanism, f"{call}: step {knot}", line.report[0], self.tolerance)
+            return checked(Gradient(blocks, Status(int(line.report[0, StepReport.STATUS])), detail), throw)
         finite = all(np.isfinite(block).all() for block in blocks.values())
-        return ended(Gradient(blocks, Status.SOLVED if finite else Status.NOT_FINITE), throw)
+        return checked(Gradient(blocks, Status.SOLVED if finite else Status.NOT_FINITE), throw)
 
     def with_parameters(self, values: Mapping[str, ArrayLike]) -> Simulator:
         """The same simulator, including its kappa, with other values of parameters.

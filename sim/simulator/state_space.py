@@ -19,7 +19,7 @@ from sim.simulator.arguments import Arguments, shaped
 from sim.simulator.describe import describe
 from sim.simulator.engines.engine_choice import engine_of
 from sim.simulator.loop_closure import Closure
-from sim.simulator.results import fastest, sentence
+from sim.simulator.results import fastest_body, status_message
 from sim.simulator.settings import Settings
 from sim.simulator.task_space.task_space import TaskSpace
 from solvers.status import Status
@@ -88,10 +88,10 @@ class StateSpace:
         mech = self.mechanism
         names = [f"Loop joint {j.name!r}" for j in mech.loops] + [f"Gear {g.name!r}" for g in mech.gears]
         gaps = zip(self._engine.open_loops(), names, strict=True) if names else ()
-        text = sentence(mech, where, report, self.tolerance, max(gaps, default=None))
+        text = status_message(mech, where, report, self.tolerance, max(gaps, default=None))
         if report[StepReport.STATUS] == Status.ANGULAR_STEP and x is not None:  # in so short a step no turn is too far
             short = StateSpace(mech, self._engine.settings._replace(time_step=1e-6, order=2, accuracy=0.0))
-            text += f" {fastest(mech, short.maximal(x))}"
+            text += f" {fastest_body(mech, short.maximal(x))}"
         return text
 
     @cached_property

@@ -84,10 +84,22 @@ def test_one_term_need_not_be_a_list_and_names_of_settings_are_suggested():
         dojo.Problem(SIM, X, 10, cost=Effort(1.0), control_limits=5)
 
 
-@pytest.mark.parametrize(("module", "name", "near"), [("models", "hoper", "hopper"), ("problems", "hopp", "hop")])
-def test_a_misspelt_model_or_problem(module, name, near):
-    with pytest.raises(AttributeError, match=f"dojo_opt.{module} has no '{name}'; .*did you mean '{near}'"):
-        getattr(getattr(dojo, module), name)
+@pytest.mark.parametrize(
+    ("module", "name", "near"),
+    [
+        (dojo, "Simulater", "Simulator"),
+        (dojo.models, "hoper", "hopper"),
+        (dojo.problems, "hopp", "hop"),
+        (dojo.tasks, "hopper_mcp", "hopper_mpc"),
+        (dojo.tasks.jin, "fingertip", "fingertips"),
+        (dojo.learn, "Tasks", "Task"),
+    ],
+    ids=lambda value: getattr(value, "__name__", value),
+)
+def test_a_misspelt_name_of_a_module(module, name, near):
+    message = f"module '{module.__name__}' has no attribute '{name}'; it has .*did you mean '{near}'"
+    with pytest.raises(AttributeError, match=message):
+        getattr(module, name)
 
 
 def test_results_print_on_one_line():
@@ -97,3 +109,17 @@ def test_results_print_on_one_line():
     assert repr(loop) == "ClosedLoop(0.1 s, Ran to the end. x (3, 4), u (2, 1), 0 ticks)"
     t = SIM.rollout(X, np.zeros((3, 1)))
     assert repr(t) == "Trajectory(cartpole, 3 steps of 0.05 s, SOLVED, x (4, 4), u (3, 1))"
+
+
+def test_a_problem_is_refined_as_its_arguments_say():
+    goal = Goal(X)
+    problem = dojo.Problem(SIM, X, 10, cost=Effort(1.0), refinement=3, refined_constraints=goal)
+    finer = problem.refined(problem.refinement)
+    assert (finer.substeps, finer.refinement, finer.specs[1], problem.specs[1]) == (3, 1, (goal,), ())
+    assert finer.sim.time_step == pytest.approx(SIM.time_step / 3)
+    with pytest.raises(ValueError, match=r"Problem\(refinement=\.\.\.\): "):
+        dojo.Problem(SIM, X, 10, cost=Effort(1.0), refinement=0)
+    with pytest.raises(
+        TypeError, match=r"refined_constraints=\.\.\.\): entry 0 is a float, not a term of dojo.constraint"
+    ):
+        dojo.Problem(SIM, X, 10, cost=Effort(1.0), refined_constraints=[1.0])
