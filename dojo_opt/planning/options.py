@@ -64,6 +64,9 @@ class Options:
     Attributes:
         stages: the continuation, from smooth to hard contact: `Stage`s, or pairs (kappa_eval, kappa_grad) [N s m]
             (default 3e-2, 3e-3, 1e-4, 1e-6).
+        kappa_blocks: number of blocks of knots over which kappa_grad grows along the horizon, in equal ratios from the
+            kappa_eval of a stage to its kappa_grad: derivatives are exact for what happens now, and reach across gaps
+            for what happens later (default 1: kappa_grad at all knots).
         on_kappa_change: "feedback" rolls out with the gains, "gaps" keeps the states and opens the gaps (default
             "feedback").
         max_merit_increase: share of the merit; a rollout at the next kappa that raises the merit by more counts as lost
@@ -101,6 +104,7 @@ class Options:
     """
 
     stages: tuple[Stage, ...] = CONTINUATION
+    kappa_blocks: int = 1
     on_kappa_change: str = "feedback"
     max_merit_increase: float = 1.0
     bisections: int = 3
@@ -137,6 +141,8 @@ class Options:
                 self._check_number(field.name, value, whole=whole)
                 # for a whole number in place of a float, kernels would be compiled again
                 object.__setattr__(self, field.name, int(value) if whole else float(value))
+        if self.kappa_blocks < 1:
+            raise ValueError(f"ilqr(kappa_blocks=...): expected a number >= 1, got {self.kappa_blocks}")
         if not 0.0 < self.backtracking < 1.0:
             raise ValueError(f"ilqr(backtracking=...): expected a number between 0 and 1, got {self.backtracking}")
         if self.callback is not None and not callable(self.callback):

@@ -14,6 +14,7 @@ from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import Options
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.regularization import RegularizationSchedule
+from sim.simulator.derivative_results import Linearization
 from sim.simulator.horizon import Horizon
 from solvers.riccati import PredictedChange, Quadratic, Regularization, backward, value_hessian, work_size
 from solvers.status import MESSAGES, Status
@@ -65,14 +66,15 @@ class Subproblem:
     def linearize(self, now: Iterate, kappa: float, kappa_eval: float) -> Status:
         """Expand dynamics and objective around `now`, at the first smoothing that solves every knot.
 
-        kappa, ten times that, and at last kappa_eval, where the trajectory itself was solved.
+        kappa, ten times that, and at last kappa_eval, where the trajectory itself was solved. Where the smoothing grows
+        along the horizon, it is that of the last knots.
         """
         status, self.detail = Status.SOLVED, ""
         for level in (kappa, 10.0 * kappa, kappa_eval):
             apart, guess = level != kappa_eval, None
             if apart and self._apart is not None and self._apart[0] == level:
                 guess = now.x[1:] + self._apart[1]  # next states: as far from the trajectory as the last time
-            linear = self._horizon.linearize(now.x, now.u, level, guess)
+            linear = self._linear(now, kappa_eval, level, guess)
             failed = np.flatnonzero(linear.status)
             if failed.size == 0:
                 if apart:
@@ -83,6 +85,21 @@ class Subproblem:
             status = Status(int(linear.status[failed[0]]))
             self.detail = f" Derivatives at knot {failed[0]}, {status.name}: {MESSAGES[status]}"
         return status
+
+    def _linear(self, now: Iterate, first: float, last: float, guess: Matrix | None) -> Linearization:
+        """Derivatives whose smoothing grows from `first` to `last` over the blocks of the options."""
+        blocks = min(self._options.kappa_blocks, len(now.u))
+        if blocks == 1 or first == last:
+            return self._horizon.linearize(now.x, now.u, last, guess)
+        ends = np.linspace(0, len(now.u), blocks + 1).astype(np.int64)
+        parts = [
+            self._horizon.linearize(now.x[i : j + 1], now.u[i:j], kappa, None if guess is None else guess[i:j])
+            for i, j, kappa in zip(ends[:-1], ends[1:], np.geomspace(first, last, blocks), strict=True)
+        ]
+        A, B, x_next, status = (
+            np.concatenate([getattr(part, name) for part in parts]) for name in ("A", "B", "x_next", "status")
+        )
+        return Linearization(A, B, x_next, status)
 
     def expand(self, now: Iterate, linear: Any) -> None:
         """Take derivatives at `now`, expand the objective there, and regularise in units of the mean control weight."""

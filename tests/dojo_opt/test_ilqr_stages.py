@@ -188,3 +188,18 @@ def test_a_stage_that_used_all_its_iterations_is_not_solved():
     assert plan.status == Status.MAX_ITERATIONS and not plan.success and plan.nit == 1
     whole = ilqr(problem, stages=(stage._replace(iterations=100),))
     assert whole.success and whole.nit > 1
+
+
+def test_the_smoothing_of_derivatives_grows_along_the_horizon():
+    """In blocks of knots, from that of the rollouts to kappa_grad; one block has kappa_grad throughout."""
+    problem = Problem(SmoothedWall(), [0.1, 0.0], 20, cost=[Tracking([-1.0, 0.0], 1.0), Effort(0.01)])
+    now = Iterate(np.tile(problem.start, (21, 1)), problem.controls0, kappa=1e-4)
+    horizon = problem.sim.horizon(problem.horizon, problem.substeps, problem.control_limits)
+    for blocks, kappas in ((1, [1e-2] * 20), (2, [1e-4] * 10 + [1e-2] * 10), (3, [1e-4] * 6 + [1e-3] * 7 + [1e-2] * 7)):
+        solver = Solver(problem, Options(kappa_blocks=blocks))
+        assert solver._subproblem.linearize(now, 1e-2, 1e-4) == Status.SOLVED
+        for t, kappa in enumerate(kappas):
+            alone = horizon.linearize(now.x, now.u, kappa)
+            np.testing.assert_array_equal(solver._subproblem.linear.A[t], alone.A[t])
+            np.testing.assert_array_equal(solver._subproblem.linear.x_next[t], alone.x_next[t])
+    assert np.ptp(solver._subproblem.linear.A[:, 1, 0]) > 1e-2  # the wall pushes from further away later on
