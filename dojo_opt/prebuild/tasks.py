@@ -291,8 +291,9 @@ _SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to co
 
 
 def _kernels() -> dict[str, OptionalKernel]:
-    """Kernels that a scene may link, by name."""
+    """Kernels that a scene, or a function of the user, may link, by name."""
     import_module("sim.simulator.link_kernels")
+    import_module("sim.simulator.task_space.compiled_kinematics")
     return {kernel.name: kernel for kernel in optional_kernels()}
 
 

@@ -219,3 +219,5 @@ class Slot(Code):
     REACHED_IMPULSES = 177
     # sizes of the rows of loops
     ADD_LOOP_SIZES = 178
+    # kinematics that functions of the user call
+    KINEMATIC_QUANTITY = 179

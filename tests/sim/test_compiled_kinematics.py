@@ -77,8 +77,9 @@ def hand_of(kin, goal):
     def jacobian(x, u, out):
         J = np.empty((6, nv))
         rows(x, J)
-        out[:] = 0.0
-        out[:3, :nv] = J[:3]
+        for k in range(3):  # loops: NumPy's assignments of slices take seconds to compile
+            for d in range(out.shape[1]):
+                out[k, d] = J[k, d] if d < nv else 0.0
 
     return residual, jacobian
 

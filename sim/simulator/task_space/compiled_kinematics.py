@@ -21,13 +21,14 @@ from sim.dynamics.kinematics import velocity_columns
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
+from sim.model.slots import Slot
 from sim.simulator.simulator import Simulator
 from sim.simulator.task_space.frames import frame_velocity, frame_velocity_jacobian
 from sim.simulator.task_space.frozen_tables import freeze, put_table
 from sim.simulator.task_space.knot_rows import carried, place_of, point_at, put_column
 from sim.simulator.task_space.momenta import total_mass
 from solvers.codes import Code
-from solvers.compiler import Table, kernel, users_callee, users_kernel
+from solvers.compiler import kernel, link, optional, users_kernel
 from solvers.dense import clear
 from solvers.rotation import quat_mul
 from solvers.types import Matrix, Vector
@@ -105,13 +106,14 @@ def _com_jacobian(model: Model, data: Data, out: Matrix) -> None:
             i = model.body_parent[i]
 
 
-@users_callee
+@optional(Slot.KINEMATIC_QUANTITY)
 def evaluate(
-    quantity: int, table: Table, arrays: int, h: float, body: int, place: Vector, x: Vector, out: Matrix
+    model: Model, data: Data, quantity: int, h: float, body: int, place: Vector, x: Vector, out: Matrix
 ) -> None:
-    """A quantity at x. The table is that of Model, of so many arrays, and that of Data. out: see `_function`."""
-    model = model_view(table[: 3 * arrays])
-    data = data_view(table[3 * arrays :])
+    """A quantity at x; out: see `_function`.
+
+    Called by its address: as a part of each function that calls it, it was compiled anew, a second each time.
+    """
     nq = data.theta1.shape[0]
     node_poses(model, data, h, x)
     if quantity == KinematicQuantity.POSE:
@@ -142,18 +144,23 @@ def _function(model: Model, h: float, quantity: int, body: int, place: Floats) -
         KinematicQuantity.CENTER_OF_MASS: (1, 3),
         KinematicQuantity.COM_JACOBIAN: (3, nv),
     }[KinematicQuantity(quantity)]
-    layout, arrays, whole, numbers, size = freeze(model)
+    linked = model._replace(optional=model.optional.copy())
+    link(linked.optional, evaluate)
+    layout, arrays, whole, numbers, size = freeze(linked)
     words, single = 3 * len(layout), rows == 1
-    first, end = size + nx, size + nx + rows * columns
-    code = int(quantity)
+    at, first = size + nx, size + nx + 7  # where the place begins, and the result
+    end, code = first + rows * columns, int(quantity)
 
     def function(x: Any, out: Any) -> None:
         scratch, table = np.zeros(end), np.empty(words, np.int64)
         put_table(layout, whole.ctypes.data, numbers.ctypes.data, scratch.ctypes.data, table)
         for k in range(nx):
             scratch[size + k] = x[k]
+        for k in range(7):
+            scratch[at + k] = place[k]
         result = scratch[first:end].reshape(rows, columns)
-        evaluate(code, table, arrays, h, body, place, scratch[size:first], result)
+        tree, moving = model_view(table[: 3 * arrays]), data_view(table[3 * arrays :])
+        evaluate(tree, moving, code, h, body, scratch[at:first], scratch[size:at], result)
         for row in range(rows):
             for k in range(columns):
                 if single:  # a constant: Numba compiles the branch that fits the dimension of out
