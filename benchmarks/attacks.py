@@ -1,7 +1,7 @@
 """Random mechanisms in random states: count the failures of steps, motions and derivatives.
 
-    python benchmarks/attacks.py                 2000 steps, 10,000 motions, 300 derivatives, 1000 files
-    python benchmarks/attacks.py --quick         40, 60, 10 and 40
+    python benchmarks/attacks.py             2000 steps, 10,000 motions, 4000 crowds, 300 derivatives, 1000 files
+    python benchmarks/attacks.py --quick     40, 60, 40, 10 and 40
     python benchmarks/attacks.py --only motions --first 5000 --count 2000
 
 steps          one step of any mechanism (random_mechanisms.py), kappa default or 1e-4: no exception, every number
@@ -10,6 +10,8 @@ steps          one step of any mechanism (random_mechanisms.py), kappa default o
                gravity
 motions        passive trees of 2 to 8 bodies that fall on level ground, .3 s at 10, 20 and 50 ms: no accepted step
                gains more than a tenth of the kinetic energy. Refused motions are counted
+crowds         the same of trees of any joints whose bodies collide with one another; steps that begin with an overlap
+               are not judged
 derivatives    d(next state)/d(state) of a step at kappa 1e-4 against central differences on the manifold, where those
                of two step sizes agree
 files          a URDF and an MJCF file, mutated at random (tests/support/robot_texts.py): refused by an error that names
@@ -22,6 +24,7 @@ import argparse
 import sys
 import warnings
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -42,6 +45,7 @@ SECONDS = 0.3
 GAIN = 0.1  # of the kinetic energy, or of LEAST
 LEAST = 1e-3  # [J]
 PASSIVE = Recipe(kinds=COMMON, passive=True, contacts=16)
+CROWDED = Recipe(passive=True, crowded=True)
 ANYTHING = Recipe(bodies=12)
 BELOW = 1e-6  # [m]
 AGREE, WRONG = 1e-6, 1e-4  # of central differences of two step sizes; of a derivative, relative to the largest
@@ -108,6 +112,21 @@ def motion_case(seed: int) -> tuple[float, str, float]:
     return h, motion.status.name, float(gains.max(initial=-1.0))
 
 
+def crowd_case(seed: int) -> tuple[float, str, float]:
+    """(time step, status, largest gain of an accepted step) of a passive fall of bodies that collide.
+
+    Steps that begin with an overlap may gain energy: those from random states, and from states that ended with one.
+    """
+    rng = np.random.default_rng([seed, 5])
+    h = TIME_STEPS[seed % len(TIME_STEPS)]
+    sim = dojo.Simulator(random_mechanism(rng, CROWDED), time_step=h)
+    motion = sim.rollout(random_state(sim, rng), np.zeros((round(SECONDS / h), sim.nu)))
+    energy, kinetic = np.asarray(sim.energy(motion.x)), np.asarray(sim.kinetic_energy(motion.x))
+    gains = np.diff(energy)[1:] / np.maximum(kinetic[1:-1], LEAST)
+    apart = motion.contacts.gap[: len(gains)].min(axis=1, initial=0.0) > -BELOW
+    return h, motion.status.name, float(gains[apart].max(initial=-1.0))
+
+
 def difference(sim: dojo.Simulator, x: Vector, direction: Vector, eps: float) -> Vector | None:
     """Central difference of the next state along a direction, (ndx,); None where a step is not solved."""
     ends = [sim.step(sim.integrate(x, s * eps * direction)) for s in (1.0, -1.0)]
@@ -137,11 +156,11 @@ def derivative_case(seed: int) -> float | None:
 
 def attack(args: argparse.Namespace) -> Report:
     """Run all sections."""
-    sizes = {"steps": 2000, "motions": 10_000, "derivatives": 300, "files": 1000}
+    sizes = {"steps": 2000, "motions": 10_000, "crowds": 4000, "derivatives": 300, "files": 1000}
     if args.quick:
-        sizes = {"steps": 40, "motions": 60, "derivatives": 10, "files": 40}
+        sizes = {"steps": 40, "motions": 60, "crowds": 40, "derivatives": 10, "files": 40}
     report = Report("Attacks with random mechanisms", "")
-    sections = {"steps": steps, "motions": motions, "derivatives": derivatives, "files": files}
+    sections = {"steps": steps, "motions": motions, "crowds": crowds, "derivatives": derivatives, "files": files}
     for name, section in sections.items():
         if args.only in (None, name):
             section(report, range(args.first, args.first + (args.count or sizes[name])))
@@ -169,24 +188,34 @@ def steps(report: Report, seeds: range) -> None:
 
 def motions(report: Report, seeds: range) -> None:
     """Passive falls."""
-    named = [(f"motion {seed}", (seed,)) for seed in seeds]
-    cases = [motion_case(*case) for case in progress()(named, "motions")]
+    falls(report, seeds, "motions", motion_case)
+
+
+def crowds(report: Report, seeds: range) -> None:
+    """Passive falls of bodies that collide."""
+    falls(report, seeds, "crowds", crowd_case)
+
+
+def falls(report: Report, seeds: range, name: str, case: Callable[[int], tuple[float, str, float]]) -> None:
+    """Gains of energy and refusals, by time step."""
+    named = [(f"{name} {seed}", (seed,)) for seed in seeds]
+    cases = [case(*seed) for seed in progress()(named, name)]
     lines = []
     for h in TIME_STEPS:
         here = [case for case in cases if case[0] == h]
         refused = Counter(status for _, status, _ in here if status != "SOLVED")
         gained = sum(gain > GAIN for *_, gain in here)
         worst = max((gain for *_, gain in here), default=0.0)
-        why = ", ".join(f"{name} {count}" for name, count in refused.items())
+        why = ", ".join(f"{status} {count}" for status, count in refused.items())
         lines.append([f"{1e3 * h:g} ms", len(here), gained, worst, refused.total(), why])
-    gaining = [seed for seed, case in zip(seeds, cases, strict=True) if case[2] > GAIN]
+    gaining = [seed for seed, (*_, gain) in zip(seeds, cases, strict=True) if gain > GAIN]
     report.rows += [
-        number("motions: tried", len(seeds)),
-        number("motions: accepted steps that gain energy", len(gaining), 0, note=shown(gaining)),
-        number("motions: refused", sum(line[4] for line in lines)),
+        number(f"{name}: tried", len(seeds)),
+        number(f"{name}: accepted steps that gain energy", len(gaining), 0, note=shown(gaining)),
+        number(f"{name}: refused", sum(line[4] for line in lines)),
     ]
     header = ("time step", "motions", "gained more than a tenth", "largest gain", "refused", "by status")
-    report.tables.append(Table("Passive falls", header, lines))
+    report.tables.append(Table(f"Passive falls: {name}", header, lines))
 
 
 def derivatives(report: Report, seeds: range) -> None:
@@ -241,7 +270,7 @@ def files(report: Report, seeds: range) -> None:
 def main(argv: list[str] | None = None) -> int:
     """Print or write the report; the exit status is 1 after any failure."""
     arguments = parser(__doc__)
-    arguments.add_argument("--only", choices=("steps", "motions", "derivatives", "files"), help="one section")
+    arguments.add_argument("--only", choices=("steps", "motions", "crowds", "derivatives", "files"), help="one section")
     arguments.add_argument("--first", type=int, default=0, help="first seed")
     arguments.add_argument("--count", type=int, help="cases of each section")
     with warnings.catch_warnings():

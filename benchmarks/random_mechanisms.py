@@ -31,6 +31,7 @@ class Recipe:
     root: str = "floating"
     mass_spread: float = 1.3  # decades up and down
     passive: bool = False  # no springs, limits, restitution or collisions
+    crowded: bool = False  # passive, with shapes of most bodies, and collisions
     contacts: int = 8  # at most
 
 
@@ -91,7 +92,8 @@ def random_mechanism(rng: Rng, recipe: Recipe) -> dojo.Mechanism:
     bodies, joints, contacts = [], [], []
     for i in range(count):
         mass = float(10.0 ** rng.uniform(-spread, spread))
-        shape = random_shape(rng) if not recipe.passive and rng.random() < 0.4 else None
+        often = 0.7 if recipe.crowded else 0.0 if recipe.passive else 0.4
+        shape = random_shape(rng) if often and rng.random() < often else None
         bodies.append(dojo.Body(f"b{i}", mass, cloud_inertia(rng, mass), shape=shape))
         joints.append(random_joint(rng, i, recipe))
         for _ in range(rng.integers(0, 3)):

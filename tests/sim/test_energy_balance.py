@@ -207,6 +207,21 @@ def test_no_accepted_step_of_a_passive_fall_gains_energy(attacks, capsys):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [74, 139, 169, 357])
+def test_collisions_of_bodies_that_are_apart_allow_no_gain(attacks, seed):
+    """Falls that gained up to 23 times their energy: nothing was limited as long as a collision was inactive."""
+    _, status, gain = attacks.crowd_case(seed)
+    assert status == "SOLVED"
+    assert gain < attacks.GAIN
+
+
+@pytest.mark.slow
+def test_no_accepted_step_of_bodies_that_collide_gains_energy(attacks, capsys):
+    assert attacks.main(["--only", "crowds", "--count", "60", "--first", "20000"]) == 0
+    capsys.readouterr()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [41312, 42191, 43091])
 def test_the_gain_is_a_share_of_the_kinetic_energy_at_the_node(attacks, seed):
     """Falls that gained up to .21: slow at the node, with little turn, or with a turn whose work says little."""

@@ -68,10 +68,15 @@ def _overlapped(model: Model, data: Data, j: int) -> float:
 
 @optional(Slot.PAIR_SLACK, default=0.0)
 def pair_slack(model: Model, data: Data) -> float:
-    """Sum of the normal impulses times the overlaps where the step began, which they may take away [N s m]."""
+    """Sum of the normal impulses times the overlaps where the step began, which they may take away [N s m].
+
+    Inactive collisions began apart, and have none.
+    """
     total = 0.0
     for m in range(data.near_count[0]):
         first = data.near_first[m]
+        if data.pair_activation[first] != 0.0:
+            continue
         overlap = _overlapped(model, data, first) + _LEFT * least_size(model, first) + rounding_of_rims(model, first)
         for j in range(first, end_of(model, first)):
             if not is_absent(data, j):
