@@ -1,11 +1,15 @@
 """Contact-implicit MPC on published task suites: successes, tick times and penetration, beside the published rates.
 
     NUMBA_NUM_THREADS=1 python benchmarks/mpc_suites.py [TASK ...] [--runs N] [--first SEED] [--plant PLANT]
+        [--smoothing]
 
 Tasks are those of IDTO (arXiv 2309.01813): costs, horizons, rates and the delay of one tick are theirs, contact is
 ours. `free_gait` is the quadruped of `tasks.free_gait_mpc` at .3 m/s, with the horizon and rate of arXiv 2312.08961;
 `free_gait_disturbed` and `free_gait_fast` have it walk at .3 and .6 m/s on slopes up to .1 rad that it does not know,
 with payloads up to 1 kg and friction from .4 to .8, and push it by 8 N s.
+With --smoothing the tasks of IDTO run with three kinds of smoothing of the derivatives: that of the rollouts, a larger
+one at all knots, and one that grows along the horizon to the larger one. The larger one is that of the task, or ten
+times that of the rollouts.
 Every task runs from its start and from N perturbed ones, on two plants: ours, at 1 ms with kappa 1e-8, and
 MuJoCo's with its default contacts, where it is installed. Measured here: everything but the rates. The publication
 replans at these on four threads, and gives no rates of success: `help(TASK)` states each criterion. Ticks are
@@ -16,6 +20,8 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from typing import Any
@@ -24,6 +30,7 @@ import numpy as np
 from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
+from dojo_opt.mpc.settings import OPTIONS
 from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report.result import Cell, Report, Row, Table
@@ -42,14 +49,21 @@ HEADER = (
     *("task", "succeed", "of", "replans at [Hz]", "allowed [ms]", "tick [ms]", "99 % [ms]", "fell back", "of ticks"),
     *("penetration [mm]", "measured in the first run", "other ends"),
 )
+SMOOTHINGS = {"as in rollouts": (False, 1), "larger": (True, 1), "growing": (True, 4)}  # larger or not; blocks of knots
 QUICK = 0.2  # [s] of a run that only checks that it runs
 
 
-def made(name: str) -> SuiteTask:
-    """A task by its name."""
+def made(name: str, smoothing: str | None = None) -> SuiteTask:
+    """A task by its name, as it is or with another smoothing of its derivatives."""
     if name not in SPEEDS:
-        task: SuiteTask = getattr(dojo.tasks.idto, name)()
-        return task
+        build: Callable[..., SuiteTask] = getattr(dojo.tasks.idto, name)
+        task = build()
+        if smoothing is None:
+            return task
+        (larger, blocks), own = SMOOTHINGS[smoothing], task.mpc.settings
+        kappa = own.kappa_grad or 10.0 * own.kappa
+        options = replace(own.options or OPTIONS, kappa_blocks=blocks)
+        return build(kappa_grad=kappa if larger else None, options=options)
     mpc = dojo.tasks.free_gait_mpc((SPEEDS[name], 0.0, 0.0))
     spread = np.concatenate([np.full(6, 0.05), np.full(12, 0.1), np.full(18, 0.1)])
     model = mpc.nominal.replace(time_step=1e-3, kappa=1e-8)
@@ -98,18 +112,19 @@ def run(args: argparse.Namespace) -> Report:
     kinds = [PLANTS[args.plant]] if args.plant else [OURS] + ([MUJOCO] if find_spec("mujoco") is not None else [])
     runs, seconds = (1, QUICK) if args.quick else (args.runs, None)
     perturbed = range(args.first, args.first + runs)
-    tasks = {name: made(name) for name in args.tasks}
+    smoothings = SMOOTHINGS if args.smoothing else (None,)
     for kind in kinds:
-        lines = []
         names = [name for name in args.tasks if kind == OURS or name not in DISTURBED]  # only our plant is perturbed
-        if not names:
-            continue
-        for name in progress()([(n, n) for n in names], kind):
-            cells, outcomes = line(tasks[name], kind, perturbed, seconds)
-            lines.append(cells)
-            report.rows += rows(f"{name}, {kind}", cells, tasks[name].rate, bars=not args.quick)
-            report.details[f"{name}, {kind}"] = [outcome._asdict() for outcome in outcomes]
-        report.tables.append(Table(f"plant: {kind}", HEADER, lines))
+        names = [name for name in names if not args.smoothing or name not in SPEEDS]
+        for smoothing in smoothings if names else ():
+            lines, said = [], f", derivatives {smoothing}" if smoothing else ""
+            for name in progress()([(n, n) for n in names], kind + said):
+                task = made(name, smoothing)
+                cells, outcomes = line(task, kind, perturbed, seconds)
+                lines.append(cells)
+                report.rows += rows(f"{name}, {kind}{said}", cells, task.rate, bars=not (args.quick or args.smoothing))
+                report.details[f"{name}, {kind}{said}"] = [outcome._asdict() for outcome in outcomes]
+            report.tables.append(Table(f"plant: {kind}{said}", HEADER, lines))
     report.notes.append("Rates are those of the publication, on four threads; all else was measured here, on one core.")
     return report
 
@@ -133,6 +148,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments.add_argument("--runs", type=int, default=10, help="perturbed starts per task")
     arguments.add_argument("--first", type=int, default=0, help="seed of the first perturbed start")
     arguments.add_argument("--plant", choices=PLANTS, help="one plant only (default: ours and mujoco)")
+    arguments.add_argument("--smoothing", action="store_true", help="compare three kinds of smoothing of derivatives")
     return deliver("mpc_suites", run, arguments, argv)
 
 
