@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
-__all__ = ["TRANSFER", "ant", "cartpole", "half_cheetah", "hopper", "humanoid", "pendulum", "walker2d"]
+__all__ = ["DISTURBED", "TRANSFER", "ant", "cartpole", "half_cheetah", "hopper", "humanoid", "pendulum", "walker2d"]
 
 _CLEARANCE = 1e-3  # [m] of lifted first states
 _KAPPA = 1e-4  # [N s m]
@@ -46,7 +47,11 @@ TRANSFER = Randomization(
     by_row=False,
 )
 
-# The same for robots that fall: steps of milliseconds carry small impulses, which ask for a small kappa.
+# The same with small pushes in every action, about as large as the differences that an action makes here and in MuJoCo
+# with the time step of HalfCheetah-v5 (standard deviations by benchmarks/action_differences.py [m/s, rad/s]).
+DISTURBED = replace(TRANSFER, by_row=True, pushes=(0.05, (0.1, 0.2, 0.45, 0.8, 0.9, 2.0, 0.9, 1.5, 1.5)))
+
+# The same as TRANSFER for robots that fall: steps of milliseconds carry small impulses, which ask for a small kappa.
 BALANCE = Randomization(
     factors={"friction": (0.6, 1.2), "damper": (0.7, 1.3), "armature": (0.9, 1.1), "mass": (0.9, 1.1)},
     substeps=(2, 2, 4),
