@@ -137,7 +137,7 @@ def mini_cheetah(*, speed: float = 0.4, terrain: Terrain | None = None, **settin
         TypeError: for an unknown setting.
         ValueError: for an argument out of range.
     """
-    given: dict[str, Any] = {"period": 1.0 / _RATE, "servo": _SERVO, "friction": _FRICTION}
+    given: dict[str, Any] = {"period": 1.0 / _RATE, "iterations": 2, "servo": _SERVO, "friction": _FRICTION}
     mpc = free_gait_mpc(
         (speed, 0.0, 0.0),
         robot=mechanism(2.0 / 3.0),
