@@ -77,6 +77,15 @@ def save_html(
     return target
 
 
+def load_meshcat() -> None:
+    """Import MeshCat as a whole: Ctrl-C within leaves modules of Python's library that cannot be imported again."""
+    from solvers.compiler.signals import signals_held
+
+    with signals_held(), warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # MeshCat loads its server, and that an old part of zmq
+        import meshcat  # noqa: F401
+
+
 def html_of(*motions: Motion, moving: bool = True, shown: Mapping[str, bool] | None = None) -> str:
     """The page of motions side by side.
 
@@ -88,10 +97,7 @@ def html_of(*motions: Motion, moving: bool = True, shown: Mapping[str, bool] | N
     Returns:
         The text of an HTML file.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # MeshCat loads its server, and that an old part of zmq
-        import meshcat  # noqa: F401
-
+    load_meshcat()
     commands = _ground(motions[0])
     clips: dict[Any, Any] = {}
     away = spacing(motions)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import socket
 import threading
 import time as clock
 import warnings
 from collections.abc import Callable
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +19,9 @@ from dojo_opt.viewer.motion import motion
 from sim.mechanism import checks
 from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
+
+if TYPE_CHECKING:
+    import asyncio
 
 __all__ = ["Live", "live"]
 
@@ -144,6 +146,8 @@ class Live:
 
     def _serve(self, port: int) -> None:
         """The thread of the server."""
+        import asyncio  # in this thread Ctrl-C does not end it half-way, after which it could not be imported again
+
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # of parts that MeshCat loads
             from tornado.httpserver import HTTPServer

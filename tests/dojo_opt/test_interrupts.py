@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from dojo_opt.planning.subproblem import Subproblem
 from solvers.compiler import local_kernel
 from solvers.status import Status
 from support.interrupts import dropped, heard
-from support.programs import HOME
+from support.programs import HOME, python
 
 ENDLESS: dict[str, Any] = {"tolerance": 1e-12, "violation_tolerance": 1e-14}
 
@@ -123,6 +124,33 @@ def test_no_ctrl_c_is_dropped_wherever_it_comes(name: str) -> None:
     other.start()
     other.join(100.0)
     assert not other.is_alive(), "a lock is kept"
+
+
+@pytest.mark.parametrize("module", ["asyncio.events", "tornado.ioloop", "meshcat.geometry"])
+def test_ctrl_c_in_the_first_animation_leaves_no_half_of_a_library(module: str, tmp_path: Path) -> None:
+    """The next animation failed with a NameError of asyncio, which was imported in part."""
+    pytest.importorskip("meshcat")
+    program = f"""
+import os, signal, sys
+import numpy as np, dojo_opt as dojo
+
+class Finder:
+    def find_spec(self, name, *others):
+        if name == {module!r} and self in sys.meta_path:
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sim = dojo.Simulator(dojo.models.pendulum(), 0.05)
+motion = sim.rollout(np.zeros(2), np.zeros((2, 1)))
+sys.meta_path.insert(0, Finder())
+try:
+    dojo.viewer.save_html(motion, "page.html")
+except KeyboardInterrupt:
+    print("heard")
+print(dojo.viewer.save_html(motion, "page.html"))
+"""
+    assert python(program, cwd=tmp_path).split() == ["heard", "page.html"]
 
 
 def test_ctrl_c_before_the_first_iterate_leaves_no_plan(monkeypatch: pytest.MonkeyPatch) -> None:
