@@ -4,8 +4,8 @@ python benchmarks/learning.py DIR HalfCheetah --algorithms shac ars --seeds 0 1 
 python benchmarks/learning.py DIR HalfCheetah --only-figure                                 draws saved results
 python benchmarks/learning.py DIR HalfCheetah --beside Hopper --table       and tabulates it, in DIR/learning.json
 
-`shac_long` and `shac_robust` take three minutes instead of one; the latter learns under pushes in every action, which a
-policy needs to run in MuJoCo. `best_of` with seed k begins with the seeds 3k, 3k + 1, 3k + 2 of SHAC, and its times
+`shac_long` and `shac_robust` take two to three minutes; the latter learns under pushes in every action, which a policy
+needs to run in MuJoCo. `best_of` with seed k begins with the seeds 3k, 3k + 1, 3k + 2 of SHAC, and its times
 count all three. A run is DIR/TASK_ALGORITHM_SEED.npz, and its policy DIR/....policy.npz. For one core, set
 NUMBA_NUM_THREADS=1 and OPENBLAS_NUM_THREADS=1. The table has the returns of policies at a time step and a smoothing
 that they have not learnt on, and in MuJoCo, by benchmarks/evaluate_policy.py, which imports nothing of dojo-opt. Runs
