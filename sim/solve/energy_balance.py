@@ -28,8 +28,9 @@ b, w the wrenches that the momenta of a body leave over without and with those o
 dampers, inputs and limits, is the work of joints, loops and contacts, and none of third order in a motion
 that time steps can follow. It is that of mean velocities, which differs from the gain by a tenth of it where bodies
 turn by a third of a radian: a tenth of the limit decides, as K may be less than K12, and the energies are also computed
-in every step in which a body turns by .3 rad. They are skipped if the ground is flat and no body turns by .15 rad, with
-contacts by .01 rad: of the motions of benchmarks/attacks.py, none that is accepted in this way gains a tenth.
+in every step in which a body turns by .3 rad, and in every part of a divided step in which one turns by .1 rad. They
+are skipped if the ground is flat and no body turns by .15 rad, with contacts by .01 rad: of the motions of
+benchmarks/attacks.py, none that is accepted in this way gains a tenth.
 
 Their bound without joints saves factorisations in the many steps that lose energy, or gain less than drives may give.
 """
@@ -68,7 +69,7 @@ LARGEST_GAIN = 0.09
 _OF_FALL = 1e-3  # largest gain, of the work of gravity, where there is less kinetic energy
 # cosines of half the turns below which there is no such work, without contacts and with them, and above which it tells
 # nothing
-_NEAR, _NEAR_GROUND, _FAR = 0.99719, 0.99999, 0.98877
+_NEAR, _NEAR_GROUND, _FAR, _FAR_IN_PART = 0.99719, 0.99999, 0.98877, 0.99875
 _TELLING = 0.1  # work, as a share of the largest gain, from which on the energies are computed
 
 
@@ -245,7 +246,7 @@ def step_gained(model: Model, data: Data, options: StepOptions, inputs: tuple[Ve
     near = _NEAR if model.contact_body.shape[0] == 0 else _NEAR_GROUND
     if turned > near and model.terrain_size.shape[0] == 0:
         return False
-    if turned > _FAR:
+    if turned > (_FAR_IN_PART if options.gain < LARGEST_GAIN else _FAR):
         work = constraint_work(model, data, options.h, v)
         work = abs(work) if both else work
         telling = _TELLING * options.gain

@@ -216,6 +216,50 @@ def test_collisions_of_bodies_that_are_apart_allow_no_gain(attacks, seed):
 
 
 @pytest.mark.slow
+def test_parts_of_a_divided_step_gain_no_energy():
+    """A quarter of the energy was gained: the first part turned by .27 rad, and the work of its constraints is negative."""
+    bodies = [
+        dojo.Body("rod", 3.2054987336, (0.06977618259, 0.06977618259, 0.01180755579)),
+        dojo.Body("ball", 2.3756842838, (0.00420595264, 0.00420595264, 0.00420595264)),
+    ]
+    joints = [
+        dojo.Joint(
+            "spherical", None, "rod", orientation=(-0.753804589, 0.493873938, -0.056072957, -0.429794136), damper=0.1
+        ),
+        dojo.Joint(
+            "cylindrical_free",
+            "rod",
+            "ball",
+            parent_point=(0.033319652467, -0.270087177645, -0.3491327),
+            child_point=(0.240110123026, 0.355121661762, -0.114076700962),
+            axis=(-0.600874095746, -0.321952032133, 0.731640082327),
+            orientation=(-0.472731783, 0.345643796, -0.064397856, 0.808027192),
+        ),
+    ]
+    contacts = [
+        dojo.Contact("rod", (-0.098438263, 0.119973200, 0.206504754), 0.05),
+        dojo.Contact("ball", (-0.289753366, -0.245259254, 0.037000600), 0.05, law="linear"),
+        dojo.Contact("ball", (-0.168147096, 0.248961753, -0.258422051), 0.05, law="linear"),
+    ]
+    sim = dojo.Simulator(dojo.Mechanism(bodies, joints, contacts), time_step=0.01)
+    q = (-0.350834782833, -0.410183803569, -0.006395649807, 0.841797658657)
+    q += (0.257332613366, 0.528820267887, -0.368307869919, 0.192296018476)
+    v = (
+        0.740081535,
+        24.422501635,
+        109.983121949,
+        109.288539308,
+        40.34399808,
+        221.530858484,
+        11.639007599,
+        39.964966026,
+    )
+    x = np.array([*q, *v])
+    result = sim.step(x)
+    assert not result.success or sim.energy(result.x) - sim.energy(x) < 0.1 * sim.kinetic_energy(result.x)
+
+
+@pytest.mark.slow
 def test_no_accepted_step_of_bodies_that_collide_gains_energy(attacks, capsys):
     assert attacks.main(["--only", "crowds", "--count", "60", "--first", "20000"]) == 0
     capsys.readouterr()
