@@ -96,12 +96,13 @@ class Network:
 
     def backward(self, weights: Floats, kept: list[Floats], g: Floats, out: Floats | None = None) -> Floats:
         """Gradient by x (n, inputs) from that by the outputs, g (n, m); adds that by the weights to `out`."""
-        slots = self.layers(weights if out is None else out)
+        layers = self.layers(weights)
+        slots = [] if out is None else self.layers(out)
         for k in range(len(kept) - 1, -1, -1):
-            if out is not None:
+            if slots:
                 slots[k][0][:] += kept[k].T @ g
                 slots[k][1][:] += g.sum(axis=0)
-            g = g @ self.layers(weights)[k][0].T
+            g = g @ layers[k][0].T
             if k:
                 g = g * (1.0 - kept[k] ** 2 if self.activation == "tanh" else np.where(kept[k] > 0.0, 1.0, kept[k] + 1))
         return g

@@ -59,6 +59,7 @@ def _observation_loop(observation: Callable[..., Any]) -> Any:
                 observation(work[0, :nx], work[1, :d])
                 displace(layout, xs[row], i, -step, work[0, :nx])
                 observation(work[0, :nx], work[2, :d])
+                displace(layout, xs[row], i, 0.0, work[0, :nx])
                 for j in range(d):
                     slopes[row, j, i] = (work[1, j] - work[2, j]) / (2.0 * step)
 
@@ -77,20 +78,17 @@ def _reward_loop(reward: Callable[..., Any]) -> Any:
                 work[1, k] = acts[row, k]
             values[row] = reward(work[0, :nx], work[1, :m], work[2, :nx])
             for i in range(2 * n + m if slopes.shape[0] > 0 else 0):
-                step, total = _STEP, 0.0
-                for sign in (1.0, -1.0):
-                    for k in range(nx):
-                        work[0, k], work[2, k] = xs[row, k], nexts[row, k]
-                    for k in range(m):
-                        work[1, k] = acts[row, k]
+                total = 0.0
+                for sign in (1.0, -1.0, 0.0):
                     if i < n:
-                        displace(layout, xs[row], i, sign * step, work[0, :nx])
+                        displace(layout, xs[row], i, sign * _STEP, work[0, :nx])
                     elif i < n + m:
-                        work[1, i - n] += sign * step
+                        work[1, i - n] = acts[row, i - n] + sign * _STEP
                     else:
-                        displace(layout, nexts[row], i - n - m, sign * step, work[2, :nx])
-                    total += sign * reward(work[0, :nx], work[1, :m], work[2, :nx])
-                slopes[row, i] = total / (2.0 * step)
+                        displace(layout, nexts[row], i - n - m, sign * _STEP, work[2, :nx])
+                    if sign != 0.0:
+                        total += sign * reward(work[0, :nx], work[1, :m], work[2, :nx])
+                slopes[row, i] = total / (2.0 * _STEP)
 
     return evaluate
 
@@ -127,6 +125,7 @@ def _survival_loop(probability: Callable[..., Any]) -> Any:
                 ahead = probability(work[0, :nx])
                 displace(layout, xs[row], i, -step, work[0, :nx])
                 slopes[row, i] = (ahead - probability(work[0, :nx])) / (2.0 * step)
+                displace(layout, xs[row], i, 0.0, work[0, :nx])
 
     return evaluate
 

@@ -66,12 +66,10 @@ def state_residual(layout: Integers, xs: Matrix, knots: Integers, reference: Mat
 
 @users_callee
 def displace(layout: Integers, x: Vector, i: int, step: float, out: Vector) -> None:
-    """out = x (+) step e_i"""
-    for j in range(x.shape[0]):
-        out[j] = x[j]
+    """The numbers of component i of out = x (+) step e_i; the others keep their values, and a step of 0 restores x."""
     a = layout[i]
     if a >= 0:
-        out[a] += step
+        out[a] = x[a] + step
         return
     first = i
     while first > 0 and layout[first - 1] == a:

@@ -93,6 +93,11 @@ def test_rows_have_their_own_parameters(sim):
     np.testing.assert_array_equal(one.x, every.x)
     mixed = sim.step_batch(X, U, 2, parameters={"friction:*": values["friction:*"], "time_step": 0.02})
     np.testing.assert_array_equal(mixed.x[[0, 3]], found.x[[0, 3]])
+    values["friction:*"][:] = values["friction:*"][::-1].copy()  # in place, between two calls
+    turned = sim.step_batch(X, U, 2, parameters=values)
+    again = sim.step_batch(X, U, 2, parameters={name: value.copy() for name, value in values.items()})
+    np.testing.assert_array_equal(turned.x, again.x)
+    assert not np.array_equal(turned.x, found.x)
 
 
 def _motion(sim, X, U, impulses, substeps=1):
