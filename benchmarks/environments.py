@@ -17,12 +17,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 from command import deliver, number, parser, progress
-from numpy.typing import NDArray
 
-from dojo_opt.learn.registration import TASKS
+from dojo_opt.learn.environment_names import TASKS
 from dojo_opt.report.result import Report, Table
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 ACTIONS, ROUNDS, ROWS = 50, 7, 64
 FORCES = "Ant, forces"

@@ -23,8 +23,7 @@ from dojo_opt.planning.term import Pick, PickTerm, ResidualTerm, Spec, StateTerm
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
-
-Integers = NDArray[np.int64]
+from solvers.types import Integers
 
 __all__ = [
     "CenterOfMass",
@@ -115,8 +114,8 @@ class ResidualCost(Spec):
 
         def residual(x, u, out): ...                          # writes all of out, (dimension,)
 
-    The loop over the knots is compiled once per process (about a second), because Numba cannot cache a loop around a
-    function that it is given. At the final knot u is zero. x and u are read-only.
+    The loop over the knots is compiled once (about a second) and kept on disk, see `dojo.jit`. At the final knot u is
+    zero. x and u are read-only.
 
     Attributes:
         function: the residual, a function of x (nx,), u (nu,) and out (dimension,).

@@ -13,15 +13,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solvers.boxqp import box_qp
 from solvers.compiler import PAUSE, inlined, kernel, seconds
 from solvers.dense import add_mul_tn, axpy, cholesky_solve, dot
 from solvers.status import Status
-from solvers.types import Integers, Matrix, Vector
-
-Stack = NDArray[np.float64]
+from solvers.types import Integers, Matrix, Stack, Vector
 
 _SOLVED, _NOT_FINITE = int(Status.SOLVED), int(Status.NOT_FINITE)
 _LOOK = 16  # knots between two looks at the clock

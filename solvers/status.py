@@ -2,32 +2,59 @@
 
 from __future__ import annotations
 
+import warnings
+
 from solvers.codes import Code
 
 __all__ = ["MESSAGES", "Status"]
 
 
-class Status(Code):
-    """Exit of a time step (below 10, and TOLERANCE_STEP), of the planner, or of both; kernels return it as a number."""
+class _Old:
+    """A member under its old name, which works for one version and warns."""
 
+    def __init__(self, new: str) -> None:
+        self._new = new
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: object, owner: type[Status]) -> Status:
+        text = f"Status.{self._name} is now Status.{self._new}; the old name goes with version 0.2"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return owner[self._new]
+
+
+class Status(Code):
+    """Exit of a time step, of the planner, or of both; kernels return it as a number."""
+
+    # of both
     SOLVED = 0
     MAX_ITERATIONS = 1
     NO_PROGRESS = 2
     NOT_FINITE = 3
     SINGULAR = 4
-    ANGULAR_STEP = 5
-    LOOP_STEP = 6
-    COLLISION_STEP = 7
-    ENERGY_STEP = 8
+    # of a time step
+    TURN_TOO_LARGE = 5
+    LOOP_SINGULAR = 6
+    SHAPES_CROSSED = 7
+    ENERGY_GAIN = 8
     CONTACT_SUNK = 9
+    ACCURACY_NOT_REACHED = 17
+    # of the planner
     MAX_REGULARIZATION = 10
     LINE_SEARCH = 11
     TIME_LIMIT = 12
     SIMULATION_FAILED = 13
     INFEASIBLE = 14
     STOPPED = 15
+    # of any call
     INTERRUPTED = 16
-    TOLERANCE_STEP = 17
+
+    ANGULAR_STEP = _Old("TURN_TOO_LARGE")
+    LOOP_STEP = _Old("LOOP_SINGULAR")
+    COLLISION_STEP = _Old("SHAPES_CROSSED")
+    ENERGY_STEP = _Old("ENERGY_GAIN")
+    TOLERANCE_STEP = _Old("ACCURACY_NOT_REACHED")
 
     def __str__(self) -> str:
         """The name, where an IntEnum prints its number."""
@@ -40,10 +67,10 @@ MESSAGES: dict[Status, str] = {
     Status.NO_PROGRESS: "The time step did not converge to its tolerance; try a smaller one.",
     Status.NOT_FINITE: "A number is not finite.",
     Status.SINGULAR: "A matrix is singular, or not positive definite as required.",
-    Status.ANGULAR_STEP: "A body turns by half a turn or more in one time step; use a smaller time step.",
-    Status.LOOP_STEP: "A loop passes a singular configuration too fast for the time step; use a smaller one.",
-    Status.COLLISION_STEP: "Shapes pass through one another or gain energy in every solution found; use smaller steps.",
-    Status.ENERGY_STEP: "Every solution found gains energy: bodies turn too far in one step; use smaller steps.",
+    Status.TURN_TOO_LARGE: "A body turns by half a turn or more in one time step; use a smaller time step.",
+    Status.LOOP_SINGULAR: "A loop passes a singular configuration too fast for the time step; use a smaller one.",
+    Status.SHAPES_CROSSED: "Shapes pass through one another or gain energy in every solution found; use smaller steps.",
+    Status.ENERGY_GAIN: "Every solution found gains energy: bodies turn too far in one step; use smaller steps.",
     Status.CONTACT_SUNK: "A contact is below the ground, and no motion of its joints can lift it out.",
     Status.MAX_REGULARIZATION: "No positive definite control Hessian up to the largest regularisation.",
     Status.LINE_SEARCH: "No step size of the line search improves the plan.",
@@ -51,6 +78,6 @@ MESSAGES: dict[Status, str] = {
     Status.SIMULATION_FAILED: "The simulator could not solve the steps of the trajectory.",
     Status.INFEASIBLE: "The constraints are still violated after the last penalty increase.",
     Status.STOPPED: "The callback stopped the solver.",
-    Status.TOLERANCE_STEP: "The shortest step is too long for the requested accuracy; request a lower accuracy.",
+    Status.ACCURACY_NOT_REACHED: "The shortest step is too long for the requested accuracy; request a lower accuracy.",
     Status.INTERRUPTED: "Ctrl-C interrupted the computation.",
 }

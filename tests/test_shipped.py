@@ -213,8 +213,8 @@ def test_only_entries_and_what_users_call_are_shipped(package: Package) -> None:
     assert len(Shipped(package.folder, TARGET, "another stamp")) == 0
     stamp = package.index()["stamp"]
     names = sorted(name.split("-")[0] for name in package.index()["entries"])
-    assert names == ["own_clock", "own_half", "own_one", "own_total"]
-    assert len(Shipped(package.folder, TARGET, stamp)) == 4
+    assert names == ["own_clock", "own_half", "own_one", "own_total", "users"]
+    assert len(Shipped(package.folder, TARGET, stamp)) == 5
 
 
 def test_an_edited_source_is_compiled(package: Package) -> None:

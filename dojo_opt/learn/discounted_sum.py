@@ -9,11 +9,9 @@ s is the probability that an episode continues: 1 or 0, or smooth, if the task d
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.learn.policy_rollout import PolicyRollout
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["DiscountedSum"]
 

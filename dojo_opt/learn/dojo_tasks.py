@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.velocity_task import upright
@@ -15,8 +15,7 @@ from sim.mechanism import checks
 from sim.mechanism.input import Input
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["ant_ars", "quadruped_sampling", "sampled_gait"]
 

@@ -16,13 +16,13 @@ from dojo_opt.plant.plant import Plant
 from dojo_opt.viewer.live import Live, live
 from sim.mechanism import checks
 from sim.simulator.simulator import Simulator
+from solvers.types import Vector
 
 try:
     import gymnasium
 except ImportError:
     gymnasium = None
 
-Vector = NDArray[np.float64]
 Outcome = tuple[Vector, float, bool, bool, dict[str, Any]]
 
 __all__ = ["Environment"]
@@ -56,7 +56,7 @@ class _TaskEpisode:
     def reset(self, rng: np.random.Generator) -> Vector:
         """To a first state."""
         self.x, self._count, self._rngs = self.task.starts([rng]), 0, [rng]
-        return self.task.observe(self.x)[0][0]
+        return self.task.observe_one(self.x[0])
 
     def step(self, action: Vector) -> Outcome:
         """One action, held over the time steps of the task."""
@@ -69,11 +69,11 @@ class _TaskEpisode:
         self._count += 1
         late = self._count >= task.steps
         if message:
-            return task.observe(self.x)[0][0], 0.0, True, late, {"message": message}
+            return task.observe_one(self.x[0]), 0.0, True, late, {"message": message}
         observation, reward, over = task.judge(before[0], given, self.x[0])
         if task.hold is not None and self._count % task.hold == 0:
             task.redraw(self.x, np.array([self._count]), self._rngs)
-            observation = task.observe(self.x)[0][0]
+            observation = task.observe_one(self.x[0])
         return observation, reward, over, late, {}
 
     def _step(self, x: Vector, action: Vector) -> tuple[Vector, str]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.policy import LearnedPolicy
@@ -14,9 +14,7 @@ from dojo_opt.learn.randomization import Drawn, check_pushes, draw_pushes
 from sim.mechanism.checks import whole_number
 from sim.mechanism.memory_limit import room_for
 from solvers.status import Status
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Floats, Integers
 
 __all__ = ["Evaluation", "evaluate"]
 

@@ -14,7 +14,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.learn.contact_observation import contact_fields, model_path
 from dojo_opt.learn.randomization import Randomization
@@ -28,14 +27,30 @@ from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.stance import gaps
 from sim.simulator.simulator import Simulator
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
+Fields = dict[str, Any]
 
-__all__ = ["DISTURBED", "TRANSFER", "ant", "cartpole", "half_cheetah", "hopper", "humanoid", "pendulum", "walker2d"]
+__all__ = [
+    "DISTURBED",
+    "FUNCTIONS",
+    "TRANSFER",
+    "ant",
+    "cartpole",
+    "half_cheetah",
+    "hopper",
+    "humanoid",
+    "pendulum",
+    "walker2d",
+]
 
 _CLEARANCE = 1e-3  # [m] of lifted first states
 _KAPPA = 1e-4  # [N s m]
 _FASTEST = 10.0  # [m/s, rad/s] observed velocity of hopper and walker
+_COORDINATES = {
+    "half_cheetah.xml": 9, "hopper.xml": 6, "walker2d_v5.xml": 9, "ant.xml": 15, "humanoid.xml": 24,
+    "inverted_pendulum.xml": 2,
+}  # fmt: skip
 
 # Models on which policies of the half-cheetah learn to run in other simulators, too.
 TRANSFER = Randomization(
@@ -80,7 +95,12 @@ def _model(file: str) -> MjcfMechanism:
     path = model_path(file)
     with warnings.catch_warnings():  # about collisions that could be added
         warnings.simplefilter("ignore", MjcfWarning)
-        return load_mjcf(path)
+        mech = load_mjcf(path)
+    if mech.nq != _COORDINATES[file]:
+        raise RuntimeError(
+            f"{file}: expected {_COORDINATES[file]} coordinates, got {mech.nq}; this Gymnasium is unknown"
+        )
+    return mech
 
 
 def _coordinate_limits(mech: Mechanism) -> tuple[Floats, Floats]:
@@ -118,8 +138,9 @@ def _starts(
     return start
 
 
-def _tailed(skipped: int, nq: int, fastest: float) -> Callable[..., Any]:
-    """Observation of all coordinates but the first ones, and of velocities up to a limit."""
+def _tailed(skipped: int, file: str, fastest: float) -> Callable[..., Any]:
+    """Observation of all coordinates of a model but the first ones, and of velocities up to a limit."""
+    nq = _COORDINATES[file]
 
     def observation(x, out):  # type: ignore[no-untyped-def]
         for i in range(skipped, x.shape[0]):
@@ -147,44 +168,21 @@ def _task(mech: MjcfMechanism, substeps: int, time_step: float, **fields: Any) -
     return Task(sim, substeps, low=mech.report.low, high=mech.report.high, **fields)
 
 
-def half_cheetah() -> Task:
-    """HalfCheetah-v5: run forward; 17 observations, 6 actions, 0.05 s each.
+# -- functions, apart from the models: a wheel has them compiled, and is built without Gymnasium -----------------------
 
-    Episodes go on where the robot lies on its back or drags its head, and many policies would learn to slide along like
-    that, at a third of the speed: `shac` takes a pitch of .8 rad and a torso 25 cm low for the end.
 
-    Returns:
-        The task.
-    """
-
+def _functions_of_half_cheetah() -> Fields:
     def survival_probability(x):  # type: ignore[no-untyped-def]
         return within(x[2], -0.8, 0.8, 0.1) * within(x[1], -0.25, np.inf, 0.03)
 
-    mech = _model("half_cheetah.xml")
-    return _task(
-        mech, 5, 0.01, observation=_tailed(1, mech.nq, np.inf), observations=17, reward=_runs(0.05, 0.1),
-        start=_starts(mech, 1, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)),
-        survival_probability=survival_probability, name="HalfCheetah", settings=_CHEETAH,
-    )  # fmt: skip
+    return {
+        "observation": _tailed(1, "half_cheetah.xml", np.inf),
+        "reward": _runs(0.05, 0.1),
+        "survival_probability": survival_probability,
+    }
 
 
-def _legged(name: str, file: str, observations: int, *ends: Callable[..., Any]) -> Task:
-    """A robot in a plane that moves forward on one leg or two, and ends where it falls."""
-    mech = _model(file)
-    return _task(
-        mech, 4, 0.002, observation=_tailed(1, mech.nq, _FASTEST), observations=observations, reward=_runs(0.008, 1e-3),
-        start=_starts(mech, 1, 5e-3, lambda rng, n: rng.uniform(-5e-3, 5e-3, n)), terminated=ends[0], survival=1.0,
-        survival_probability=ends[1], name=name, settings=_LEGGED,
-    )  # fmt: skip
-
-
-def hopper() -> Task:
-    """Hopper-v5: hop forward without falling; 11 observations, 3 actions, 0.008 s each.
-
-    Returns:
-        The task.
-    """
-
+def _functions_of_hopper() -> Fields:
     def terminated(x):  # type: ignore[no-untyped-def]
         for i in range(2, x.shape[0]):
             if not abs(x[i]) < 100.0:
@@ -194,7 +192,125 @@ def hopper() -> Task:
     def survival_probability(x):  # type: ignore[no-untyped-def]
         return within(x[1], 0.7, np.inf, 0.02) * within(x[2], -0.2, 0.2, 0.02)
 
-    return _legged("Hopper", "hopper.xml", 11, terminated, survival_probability)
+    return {
+        "observation": _tailed(1, "hopper.xml", _FASTEST),
+        "reward": _runs(0.008, 1e-3),
+        "terminated": terminated,
+        "survival_probability": survival_probability,
+    }
+
+
+def _functions_of_walker2d() -> Fields:
+    def terminated(x):  # type: ignore[no-untyped-def]
+        return not (0.8 < x[1] < 2.0 and abs(x[2]) < 1.0)
+
+    def survival_probability(x):  # type: ignore[no-untyped-def]
+        return within(x[1], 0.8, 2.0, 0.03) * within(x[2], -1.0, 1.0, 0.08)
+
+    return {
+        "observation": _tailed(1, "walker2d_v5.xml", _FASTEST),
+        "reward": _runs(0.008, 1e-3),
+        "terminated": terminated,
+        "survival_probability": survival_probability,
+    }
+
+
+def _functions_of_ant() -> Fields:
+    def terminated(x):  # type: ignore[no-untyped-def]
+        return not 0.2 <= x[2] <= 1.0
+
+    def survival_probability(x):  # type: ignore[no-untyped-def]
+        return within(x[2], 0.2, 1.0, 0.02)
+
+    return {
+        "observation": _tailed(2, "ant.xml", np.inf),
+        "reward": _runs(0.05, 0.5),
+        "terminated": terminated,
+        "survival_probability": survival_probability,
+    }
+
+
+def _functions_of_humanoid() -> Fields:
+    def terminated(x):  # type: ignore[no-untyped-def]
+        return not 1.0 < x[2] < 2.0
+
+    def survival_probability(x):  # type: ignore[no-untyped-def]
+        return within(x[2], 1.0, 2.0, 0.03)
+
+    def reward(x, a, after):  # type: ignore[no-untyped-def]
+        total = 1.25 * (after[0] - x[0]) / 0.015
+        for i in range(a.shape[0]):
+            total -= 0.1 * (0.4 * a[i]) ** 2  # of Gymnasium's controls, up to 0.4
+        return total
+
+    return {
+        "observation": _tailed(2, "humanoid.xml", np.inf),
+        "reward": reward,
+        "terminated": terminated,
+        "survival_probability": survival_probability,
+    }
+
+
+def _functions_of_cartpole() -> Fields:
+    def terminated(x):  # type: ignore[no-untyped-def]
+        return not abs(x[1]) <= 0.2
+
+    def reward(x, a, after):  # type: ignore[no-untyped-def]
+        return 0.0
+
+    return {
+        "observation": _tailed(0, "inverted_pendulum.xml", np.inf),
+        "reward": reward,
+        "terminated": terminated,
+    }
+
+
+FUNCTIONS: dict[str, Callable[[], Fields]] = {  # of the tasks whose models are Gymnasium's
+    "HalfCheetah": _functions_of_half_cheetah,
+    "Hopper": _functions_of_hopper,
+    "Walker2d": _functions_of_walker2d,
+    "Ant": _functions_of_ant,
+    "Humanoid": _functions_of_humanoid,
+    "Cartpole": _functions_of_cartpole,
+}
+
+
+# -- tasks -------------------------------------------------------------------------------------------------------------
+
+
+def half_cheetah() -> Task:
+    """HalfCheetah-v5: run forward; 17 observations, 6 actions, 0.05 s each.
+
+    Episodes go on where the robot lies on its back or drags its head, and many policies would learn to slide along like
+    that, at a third of the speed: `shac` takes a pitch of .8 rad and a torso 25 cm low for the end.
+
+    Returns:
+        The task.
+    """
+    mech = _model("half_cheetah.xml")
+    return _task(
+        mech, 5, 0.01, observations=17, start=_starts(mech, 1, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)),
+        name="HalfCheetah", settings=_CHEETAH, **_functions_of_half_cheetah(),
+    )  # fmt: skip
+
+
+def _legged(name: str, file: str, observations: int) -> Task:
+    """A robot in a plane that moves forward on one leg or two, and ends where it falls."""
+    mech = _model(file)
+    return _task(
+        mech, 4, 0.002, observations=observations,
+        start=_starts(mech, 1, 5e-3, lambda rng, n: rng.uniform(-5e-3, 5e-3, n)), survival=1.0, name=name,
+        settings=_LEGGED, **FUNCTIONS[name](),
+    )  # fmt: skip
+
+
+def hopper() -> Task:
+    """Hopper-v5: hop forward without falling; 11 observations, 3 actions, 0.008 s each.
+
+    Returns:
+        The task.
+    """
+    return _legged("Hopper", "hopper.xml", 11)
 
 
 def walker2d() -> Task:
@@ -203,14 +319,7 @@ def walker2d() -> Task:
     Returns:
         The task.
     """
-
-    def terminated(x):  # type: ignore[no-untyped-def]
-        return not (0.8 < x[1] < 2.0 and abs(x[2]) < 1.0)
-
-    def survival_probability(x):  # type: ignore[no-untyped-def]
-        return within(x[1], 0.8, 2.0, 0.03) * within(x[2], -1.0, 1.0, 0.08)
-
-    return _legged("Walker2d", "walker2d_v5.xml", 17, terminated, survival_probability)
+    return _legged("Walker2d", "walker2d_v5.xml", 17)
 
 
 def ant(include_cfrc_ext_in_observation: bool = False, contact_cost_weight: float = 0.0) -> Task:
@@ -224,21 +333,14 @@ def ant(include_cfrc_ext_in_observation: bool = False, contact_cost_weight: floa
     Returns:
         The task.
     """
-    mech = _model("ant.xml")
-    seen = _tailed(2, mech.nq, np.inf), 27
+    mech, functions = _model("ant.xml"), _functions_of_ant()
     fields = contact_fields(
-        mech, "ant.xml", (*seen, _runs(0.05, 0.5)), include_cfrc_ext_in_observation, contact_cost_weight, 1.0, np.inf
-    )
-
-    def terminated(x):  # type: ignore[no-untyped-def]
-        return not 0.2 <= x[2] <= 1.0
-
-    def survival_probability(x):  # type: ignore[no-untyped-def]
-        return within(x[2], 0.2, 1.0, 0.02)
-
+        mech, "ant.xml", (functions["observation"], 27, functions["reward"]), include_cfrc_ext_in_observation,
+        contact_cost_weight, 1.0, np.inf,
+    )  # fmt: skip
     return _task(
-        mech, 5, 0.01, start=_starts(mech, 2, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)), terminated=terminated,
-        survival=1.0, survival_probability=survival_probability, name="Ant", settings=_ANT, **fields,
+        mech, 5, 0.01, start=_starts(mech, 2, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)), survival=1.0,
+        name="Ant", settings=_ANT, **{**functions, **fields},
     )  # fmt: skip
 
 
@@ -258,30 +360,17 @@ def humanoid(include_cfrc_ext_in_observation: bool = False, contact_cost_weight:
     Returns:
         The task.
     """
-    mech = _model("humanoid.xml")
+    mech, functions = _model("humanoid.xml"), _functions_of_humanoid()
     home = np.array(mech.neutral)
     for knee in ("right_knee", "left_knee"):
         home[mech.q_slice(knee)] = np.deg2rad(-3.0)
-
-    def terminated(x):  # type: ignore[no-untyped-def]
-        return not 1.0 < x[2] < 2.0
-
-    def survival_probability(x):  # type: ignore[no-untyped-def]
-        return within(x[2], 1.0, 2.0, 0.03)
-
-    def reward(x, a, after):  # type: ignore[no-untyped-def]
-        total = 1.25 * (after[0] - x[0]) / 0.015
-        for i in range(a.shape[0]):
-            total -= 0.1 * (0.4 * a[i]) ** 2  # of Gymnasium's controls, up to 0.4
-        return total
-
-    seen = _tailed(2, mech.nq, np.inf), 45
     fields = contact_fields(
-        mech, "humanoid.xml", (*seen, reward), include_cfrc_ext_in_observation, contact_cost_weight, np.inf, 10.0
-    )
+        mech, "humanoid.xml", (functions["observation"], 45, functions["reward"]), include_cfrc_ext_in_observation,
+        contact_cost_weight, np.inf, 10.0,
+    )  # fmt: skip
     return _task(
         mech, 3, 0.005, start=_starts(mech, 2, 0.01, lambda rng, n: rng.uniform(-0.01, 0.01, n), home),
-        terminated=terminated, survival=5.0, survival_probability=survival_probability, name="Humanoid", **fields,
+        survival=5.0, name="Humanoid", **{**functions, **fields},
     )  # fmt: skip
 
 
@@ -292,17 +381,9 @@ def cartpole() -> Task:
         The task.
     """
     mech = _model("inverted_pendulum.xml")
-
-    def terminated(x):  # type: ignore[no-untyped-def]
-        return not abs(x[1]) <= 0.2
-
-    def reward(x, a, after):  # type: ignore[no-untyped-def]
-        return 0.0
-
     return _task(
-        mech, 2, 0.02, observation=_tailed(0, mech.nq, np.inf), observations=4, reward=reward,
-        start=_starts(mech, -1, 0.01, lambda rng, n: rng.uniform(-0.01, 0.01, n)), terminated=terminated, survival=1.0,
-        name="Cartpole",
+        mech, 2, 0.02, observations=4, start=_starts(mech, -1, 0.01, lambda rng, n: rng.uniform(-0.01, 0.01, n)),
+        survival=1.0, name="Cartpole", **_functions_of_cartpole(),
     )  # fmt: skip
 
 

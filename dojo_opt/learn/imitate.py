@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.learn.common_options import check_common
 from dojo_opt.learn.epochs import learn
@@ -29,8 +29,7 @@ from dojo_opt.learn.training_result import Learned
 from dojo_opt.planning.plan import Plan
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["ImitationOptions", "imitate"]
 

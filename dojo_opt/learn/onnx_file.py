@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.learn.network import Network
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["write_onnx"]
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.network import Network
@@ -14,8 +13,7 @@ from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.shared_object import Shared
 from solvers.status import Status
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["PairInputs", "PairReturns", "pair_returns"]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.learn.network import Network, number_of, perceptron
 from dojo_opt.learn.onnx_file import write_onnx
@@ -17,8 +17,7 @@ from dojo_opt.learn.task import Task
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.npz_file import check_head, check_shapes, read_npz, reading, write_npz
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["LearnedPolicy", "policy_of"]
 
@@ -121,7 +120,7 @@ class LearnedPolicy:
         if self.task is None:
             raise ValueError("LearnedPolicy(x): a loaded policy has no task; LearnedPolicy.load(path, task)")
         state = checks.array("LearnedPolicy(x)", x, (self.task.nx,))
-        return self.task.inputs(self.action(self.task.observe(state[None])[0][0]))
+        return self.task.inputs(self.action(self.task.observe_one(state)))
 
     def controller(self, time: float, x: Floats) -> Floats:
         """As `dojo.closed_loop` takes a controller.

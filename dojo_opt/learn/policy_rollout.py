@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.network import Network
@@ -15,9 +14,7 @@ from dojo_opt.learn.randomization import Drawn, Randomization, draw_pushes
 from dojo_opt.learn.task import Task
 from sim.mechanism.short_repr import short_repr
 from solvers.status import Status
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from solvers.types import Flags, Floats
 
 __all__ = ["Noise", "PolicyGradient", "PolicyRollout", "roll_policy_batch"]
 

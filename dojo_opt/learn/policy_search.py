@@ -16,7 +16,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.learn.common_options import check_common
 from dojo_opt.learn.epochs import learn
@@ -32,8 +31,7 @@ from dojo_opt.learn.training import Training
 from dojo_opt.learn.training_result import Learned
 from dojo_opt.planning.executors import results_in_order
 from sim.mechanism import checks
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["GradientSearchOptions", "RandomSearchOptions", "ars", "gradient_search"]
 

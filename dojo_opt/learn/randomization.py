@@ -17,8 +17,7 @@ from sim.simulator.contact_groups import ContactGroups
 from sim.simulator.row_batch import StepBatch
 from sim.simulator.row_impulses import RowImpulses
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["Models", "Randomization", "check_pushes", "draw_pushes"]
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.common_options import check_common
@@ -31,9 +30,7 @@ from dojo_opt.learn.task import Task
 from dojo_opt.learn.training import Training
 from dojo_opt.learn.training_result import Learned
 from sim.mechanism import checks
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from solvers.types import Flags, Floats
 
 __all__ = ["ShacOptions", "shac"]
 
@@ -284,15 +281,13 @@ class _Shac(Training):
 
     def state(self) -> dict[str, Any]:
         """As Training.state, with the returns of finished episodes."""
-        score = {"score": self.score} if self.options.robust else {}
         own = {"finished": list(self.finished), "restarts": self.restarts.bit_generator.state}
-        return super().state() | own | score
+        return super().state() | own
 
     def resume(self, learned: Learned) -> None:
         """As Training.resume."""
         super().resume(learned)
         self.finished, self.restarts.bit_generator.state = list(learned.state["finished"]), learned.state["restarts"]
-        self.score = learned.state.get("score", self.score)
 
 
 def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.learn.task import Task
 from sim.mechanism.body import Body
@@ -14,8 +13,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Capsule, Sphere
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["swimmer"]
 

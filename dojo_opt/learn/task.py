@@ -11,19 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.planning.function_fingerprint import fingerprint
 from dojo_opt.planning.manifold import displace, tangent_layout
 from dojo_opt.planning.residual import jit
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.contact_groups import ContactGroups
 from sim.simulator.simulator import Simulator
-from solvers.compiler import reduced, users_loop
+from solvers.compiler import fingerprint, reduced, users_loop
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-__all__ = ["Task", "never"]
+__all__ = ["Task", "compile_functions", "never"]
 
 _STEP = float(np.cbrt(np.finfo(float).eps))
 _KEPT = 64  # loops
@@ -95,19 +94,17 @@ def _reward_loop(reward: Callable[..., Any]) -> Any:
 
 def _judge_loop(observation: Any, reward: Any, terminated: Any) -> Any:
     @users_loop
-    def evaluate(x, a, after, work, out):  # type: ignore[no-untyped-def]
+    def evaluate(x, a, after, out):  # type: ignore[no-untyped-def]
         """(r(x, a, x'), whether the episode ends in x'), and out = o(x')."""
-        nx, m = x.shape[0], a.shape[0]
-        for k in range(nx):
-            work[0, k], work[2, k] = x[k], after[k]
-        for k in range(m):
-            work[1, k] = a[k]
-        value = reward(work[0, :nx], work[1, :m], work[2, :nx])
-        over = terminated(work[2, :nx])
-        observation(work[2, :nx], out)
+        value, over = reward(x, a, after), terminated(after)
+        observation(after, out)
         return value, over
 
     return evaluate
+
+
+def _itself(function: Any) -> Any:
+    return function
 
 
 def _survival_loop(probability: Callable[..., Any]) -> Any:
@@ -152,6 +149,33 @@ def _loop(make: Callable[..., Any], *functions: Callable[..., Any]) -> Any:
             _loops.popitem(last=False)
     _loops.move_to_end(key)
     return _loops[key]
+
+
+def compile_functions(
+    observation: Callable[..., Any],
+    reward: Callable[..., Any],
+    terminated: Callable[..., Any] = never,
+    survival_probability: Callable[..., Any] | None = None,
+    batches: bool = True,
+) -> None:
+    """Compile the functions of a task, or load them, without a simulator.
+
+    Args:
+        observation: as of a Task.
+        reward: as of a Task.
+        terminated: as of a Task.
+        survival_probability: as of a Task.
+        batches: whether to include the loops over many states that batches and algorithms need (default True).
+    """
+    row, rows, stack, layout = np.zeros(1), np.zeros((1, 1)), np.zeros((1, 1, 1)), np.zeros(1, dtype=np.int64)
+    _loop(_judge_loop, observation, reward, terminated).compile_for(row, row, row, row)
+    _loop(_itself, observation).compile_for(row, row)
+    if batches:
+        _loop(_observation_loop, observation).compile_for(layout, rows, rows, rows, stack)
+        _loop(_reward_loop, reward).compile_for(layout, rows, rows, rows, rows, row, rows)
+        _loop(_end_loop, terminated).compile_for(rows, np.zeros(1, dtype=np.bool_))
+        if survival_probability is not None:
+            _loop(_survival_loop, survival_probability).compile_for(layout, rows, rows, row, rows)
 
 
 @dataclass(frozen=True)
@@ -264,6 +288,10 @@ class Task:
         return _loop(_observation_loop, self.observation)
 
     @cached_property
+    def _observation(self) -> Any:
+        return _loop(_itself, self.observation)
+
+    @cached_property
     def _reward_loop(self) -> Any:
         return _loop(_reward_loop, self.reward)
 
@@ -317,6 +345,19 @@ class Task:
         self._observation_loop(self._layout, xs, self._work.copy(), values, out)
         return values, out
 
+    def observe_one(self, x: Floats) -> Floats:
+        """The observation in one state.
+
+        Args:
+            x: (nx,) state.
+
+        Returns:
+            (no,) observation.
+        """
+        out = np.zeros(self.observations)
+        self._observation(np.array(x), out)
+        return out
+
     def rewards(self, xs: Floats, actions: Floats, nexts: Floats, slopes: bool = False) -> tuple[Floats, Floats]:
         """(rewards (n,) without those of survival, their derivatives (n, ndx + nu + ndx), or none).
 
@@ -358,8 +399,8 @@ class Task:
         Returns:
             The observation after it, the reward with that of survival, and whether the episode ends.
         """
-        observation = np.zeros(self.observations)
-        reward, over = self._judge_loop(x, action, after, self._work, observation)
+        observation, end = np.zeros(self.observations), np.array(after)  # copies: a function may write into them
+        reward, over = self._judge_loop(np.array(x), np.array(action), end, observation)
         return observation, float(reward) + (0.0 if over else self.survival), bool(over)
 
     def survives(self, xs: Floats, ends: Flags) -> tuple[Floats, Floats]:

@@ -6,15 +6,13 @@ from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.learn.evaluation import Evaluation, evaluate
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.training_result import Learned
 from sim.mechanism.memory_limit import check_room
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 class Training:
@@ -31,7 +29,7 @@ class Training:
     policy: LearnedPolicy  # moves in place
     chosen: LearnedPolicy  # the best so far
 
-    NUMBERS: tuple[str, ...] = ("epoch", "steps", "unsolved", "infinite", "best")
+    NUMBERS: tuple[str, ...] = ("epoch", "steps", "unsolved", "infinite", "best", "score")
 
     def __init__(self, task: Task, options: Any, seed: int) -> None:
         self.task, self.options, self.seed = task, options, seed
@@ -97,9 +95,9 @@ class Training:
 
     def resume(self, learned: Learned) -> None:
         """Go on where a run ended."""
+        known = {"score": learned.state["best"], **learned.state}  # older files have no score
         for name in self.NUMBERS:
-            setattr(self, name, learned.state[name])
-        self.score = self.best
+            setattr(self, name, known[name])
         for name, array in self.arrays().items():
             array[...] = learned.state[name]
         self.rng.bit_generator.state = learned.state["rng"]

@@ -10,15 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.learn.policy import LearnedPolicy, policy_of
 from dojo_opt.learn.task import Task
 from sim.mechanism.short_repr import short_table
 from sim.simulator.npz_file import check_head, read_npz, reading, write_npz
 from solvers.status import MESSAGES, Status
-
-Floats = NDArray[np.float64]
 
 __all__ = ["Learned", "LearningProgress"]
 

@@ -12,6 +12,7 @@ from dojo_opt.learn.task import Task
 from sim.mechanism import checks
 from sim.mechanism.memory_limit import room_for
 from solvers.status import Status
+from solvers.types import Floats
 
 try:
     import gymnasium
@@ -20,7 +21,6 @@ try:
 except ImportError:
     gymnasium = VectorEnv = None
 
-Floats = NDArray[np.float64]
 
 __all__ = ["VectorEnvironment"]
 

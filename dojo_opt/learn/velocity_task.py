@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.learn.randomization import Randomization
 from dojo_opt.learn.task import Task
@@ -22,8 +22,7 @@ from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["WALKING", "go2", "quadruped", "velocity_error"]
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.velocity_task import distance, in_body, upright
@@ -18,8 +17,7 @@ from dojo_opt.planning.residual import jit
 from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["quadrotor", "uuv", "youbot"]
 

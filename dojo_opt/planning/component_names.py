@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.dofs import components
 from sim.simulator.simulator import Simulator
-
-Integers = NDArray[np.int64]
+from solvers.types import Integers
 
 __all__ = ["chosen_components", "chosen_inputs", "component_name", "input_weight", "state_weight"]
 

@@ -18,7 +18,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.planning.executors import check_executor
 from dojo_opt.planning.ilqr_search import Search
@@ -36,9 +36,7 @@ from sim.simulator.derivative_results import Linearization
 from sim.simulator.results import Interrupted
 from solvers.riccati import PredictedChange
 from solvers.status import MESSAGES, Status
-
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
+from solvers.types import Matrix, Stack
 
 __all__ = ["Solver", "ilqr"]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.planning.iterate import Iterate
 from dojo_opt.planning.objective import Objective
@@ -14,9 +13,7 @@ from dojo_opt.planning.problem import Problem
 from sim.simulator.horizon import Horizon, Known
 from solvers.riccati import PredictedChange
 from solvers.status import Status
-
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
+from solvers.types import Matrix, Stack
 
 __all__ = ["Direction", "Search"]
 

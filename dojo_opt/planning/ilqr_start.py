@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.planning.iterate import Iterate
 from dojo_opt.planning.objective import Objective
@@ -17,8 +16,7 @@ from sim.simulator.horizon import Horizon
 from sim.simulator.simulator import Simulator
 from solvers.riccati import Quadratic, Regularization, backward, value_hessian, work_size
 from solvers.status import Status
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 _GOOD_FIT = 2.0  # times the least sum of squared gaps: a guess fits a smoother stage nearly as well
 _REST = 1e-9  # [m, rad] largest motion from one knot to the next of a joint at rest
@@ -86,14 +84,14 @@ class FreeStart:
         self.step = np.zeros(problem.sim.ndx)
 
     @property
-    def stride(self) -> Array | None:
+    def stride(self) -> Floats | None:
         """(ndx,) displacement over one period, None unless all of the end is tied to the start."""
         ties = (term for term in self._terms if isinstance(term, PeriodicTerm))
         return next((term.shift for term in ties if term.mask.all()), None)
 
     def solve(
-        self, model: Quadratic, K: Array, k: Array, mu: float, unit: Array, xs: Array, us: Array
-    ) -> tuple[Array, float, float]:
+        self, model: Quadratic, K: Floats, k: Floats, mu: float, unit: Floats, xs: Floats, us: Floats
+    ) -> tuple[Floats, float, float]:
         """(k + S s, d0 and d1 of the step with s); `step` is s, in tangent coordinates at the present start."""
         T, m, n = K.shape
         X, W, w, ends = self._couple(n, xs, us)
@@ -120,10 +118,10 @@ class FreeStart:
         k = k + S @ self.step
         return k, *self._predict(model, K, k, ends)
 
-    def _couple(self, n: int, xs: Array, us: Array) -> tuple[Array, Array, Array, list[tuple[Array, ...]]]:
+    def _couple(self, n: int, xs: Floats, us: Floats) -> tuple[Floats, Floats, Floats, list[tuple[Floats, ...]]]:
         """X, W, w at the end."""
         X, W, w = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
-        ends: list[tuple[Array, ...]] = []
+        ends: list[tuple[Floats, ...]] = []
         for term in self._terms:
             end, start, first, second = term.coupling(xs, us)
             X += end.T @ (second[:, None] * start)
@@ -132,7 +130,7 @@ class FreeStart:
             ends.append((end, start, first, second))
         return X, W, w, ends
 
-    def _newton(self, H: Array, g: Array, mu: float) -> Array:
+    def _newton(self, H: Floats, g: Floats, mu: float) -> Floats:
         """-H^-1 g on the free components, each in units of its own curvature; directions without curvature are left."""
         step = np.zeros(len(g))
         H = 0.5 * (H + H.T)[np.ix_(self._free, self._free)]
@@ -144,7 +142,7 @@ class FreeStart:
         step[self._free] = -unit * (vectors[:, curved] @ (along / (values[curved] * (1.0 + _TRUST * mu))))
         return step
 
-    def _predict(self, model: Quadratic, K: Array, k: Array, ends: list[tuple[Array, ...]]) -> tuple[float, float]:
+    def _predict(self, model: Quadratic, K: Floats, k: Floats, ends: list[tuple[Floats, ...]]) -> tuple[float, float]:
         """d0 and d1 of the step with s, from the linear rollout."""
         T, _, n = K.shape
         dx, d0, d1 = self.step, 0.0, 0.0
@@ -162,7 +160,7 @@ class FreeStart:
         return d0, d1
 
 
-def periodic_gains(model: Quadratic) -> Array | None:
+def periodic_gains(model: Quadratic) -> Floats | None:
     """K (T, nu, ndx) of the cycle around which `model` is expanded, repeated for ever; None where that has no solution.
 
     Backward passes over the cycle, each from the value at the start of the one before, until that repeats itself, too.

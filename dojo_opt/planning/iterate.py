@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solvers.status import Status
-
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
+from solvers.types import Matrix, Stack
 
 __all__ = ["Iterate", "Iteration"]
 

@@ -8,16 +8,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.planning.executors import results_in_order
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
 from sim.mechanism.memory_limit import room_for
 from sim.simulator.results import Interrupted
+from solvers.types import Matrix, Vector
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Planner = Callable[..., Plan]
 
 __all__ = ["multi_start", "of_problem", "planned"]

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.planning.options import Options
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.term import Term
-
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix
 
 _LEAST = 1e-3  # share of the largest unit: least unit of a component
 

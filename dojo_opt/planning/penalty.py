@@ -10,16 +10,9 @@ Costs have l = 0; a constraint r = 0 or r <= 0 with multiplier l and penalty rho
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from dojo_opt.planning.manifold import add_rotation_block
 from solvers.compiler import kernel
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Integers, Matrix, Stack, Vector
 
 
 @kernel

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.planning.options import Options
 from sim.mechanism import checks
@@ -19,9 +18,7 @@ from sim.simulator.npz_file import check_head, check_shapes, reading, write_npz
 from sim.simulator.results import FeedbackRollout
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
-
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
+from solvers.types import Matrix, Stack
 
 __all__ = ["History", "Plan"]
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.planning.component_names import chosen_components
 from dojo_opt.planning.manifold import tangent_layout
@@ -16,9 +16,7 @@ from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.memory_limit import check_room
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix, Vector
 
 __all__ = ["Problem"]
 

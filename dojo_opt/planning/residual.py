@@ -11,16 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.planning.function_fingerprint import fingerprint
 from dojo_opt.planning.manifold import displace
 from sim.mechanism.memory_limit import room_for
 from sim.model.interruptible_loops import rows
 from sim.simulator.simulator import Simulator
-from solvers.compiler import CompilationError, users_kernel, users_loop
-
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.compiler import CompilationError, fingerprint, users_kernel, users_loop
+from solvers.types import Integers, Matrix, Stack
 
 __all__ = ["ResidualKernels", "jit"]
 
@@ -43,8 +39,10 @@ def jit(func: Callable[..., Any] | None = None, *, boundscheck: bool = True) -> 
 
     Costs and constraints also take plain functions, and compile them. Other functions that those call need the
     decorator. Everything that Numba supports of Python and NumPy is allowed, except writing into x and u. Functions
-    with the same text and the same captured values are compiled once per process. Numba never frees code: each new text
-    or captured value keeps about 2 MiB until the process ends.
+    with the same text and the same captured values are compiled once, and kept on disk with the kernels; those that
+    capture something other than numbers, strings, tuples, arrays, enums and compiled functions of such (the compiled
+    kinematics, for one) once per process. Numba never frees code: each new text or captured value keeps about 2 MiB
+    until the process ends.
 
     Args:
         func: function of (x (nx,), u (nu,), out (dimension,)).
@@ -163,7 +161,7 @@ class ResidualKernels:
     """Loops over knots around `residual(x, u, out)` and, if given, `jacobian(x, u, out)` with out (d, ndx + nu).
 
     Without a Jacobian, central differences on the manifold with step cbrt(eps) max(1, |x_i|). At the final knot u is
-    zero. The loops are closures over the user's kernel, which Numba cannot cache: they compile once per process.
+    zero. The loops are kept on disk by the content of the user's functions (solvers/compiler/users_cache.py).
     x and u are read-only, so that a function which writes into them does not compile.
     """
 

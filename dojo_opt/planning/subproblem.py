@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.planning.ilqr_search import Direction
 from dojo_opt.planning.ilqr_start import FreeStart
@@ -18,9 +17,7 @@ from sim.simulator.derivative_results import Linearization
 from sim.simulator.horizon import Horizon
 from solvers.riccati import PredictedChange, Quadratic, Regularization, backward, value_hessian, work_size
 from solvers.status import MESSAGES, Status
-
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
+from solvers.types import Matrix
 
 __all__ = ["Subproblem"]
 

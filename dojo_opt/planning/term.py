@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.planning.component_names import component_name
 from dojo_opt.planning.manifold import state_residual
@@ -14,11 +14,7 @@ from dojo_opt.planning.residual import ResidualKernels
 from sim.mechanism import checks
 from sim.simulator.simulator import Simulator
 from solvers.rotation import inverse_right_jacobian
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Integers, Matrix, Stack, Vector
 
 _UNIT = 1e-6  # by how much the length of a quaternion may be off
 _ROUNDED = 1e-12  # below, it is as near to one as sums get

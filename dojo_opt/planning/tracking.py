@@ -5,18 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
 from solvers.status import Status
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["tracking_gains"]
 
 
-def tracking_gains(problem: Problem, plan: Any, *, kappa: float | None = None) -> Array:
+def tracking_gains(problem: Problem, plan: Any, *, kappa: float | None = None) -> Floats:
     """Gains of u_t = plan.u_t + K_t (x_t (-) plan.x_t), by the Riccati recursion along the plan:
 
         K = -(R + B^T P B)^-1 (S + B^T P A),      P := Q + A^T P A + (S^T + A^T P B) K

@@ -12,14 +12,17 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
+from dojo_opt.learn.environment_names import TASKS
+from dojo_opt.learn.gymnasium_tasks import FUNCTIONS
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
+from dojo_opt.learn.task import compile_functions
 from sim.model.state_columns import BaseState
 from sim.simulator.contact_groups import ContactGroups
 from sim.simulator.simulator import Simulator
 from solvers.compiler.optional import OptionalKernel, optional_kernels
 
-__all__ = ["CONTENTS", "run", "tasks"]
+__all__ = ["CONTENTS", "ENVIRONMENTS", "run", "tasks"]
 
 CONTENTS = ("all", "examples")
 _FIRST = (  # the longest, and code that later tasks would compile beside them
@@ -238,15 +241,22 @@ def _users() -> None:
     def residual(x: Any, u: Any, out: Any) -> None:
         out[0] = x[0]
 
-    def observation(x: Any, out: Any) -> None:
-        out[0] = x[0]
-
     tip = dojo.Kinematics(sim).compiled("pose", sim.mechanism.body_names[0])
     tip(x, np.zeros(7))
     (term,) = dojo.Problem(sim, x, 1, cost=dojo.cost.ResidualCost(residual, 1)).costs
     term.expand(np.stack([x] * 2), np.zeros((1, 1)), np.zeros((2, 3)), np.zeros((2, 3, 3)))
-    task = dojo.learn.Task(sim, 1, observation, 1, lambda x, a, after: 0.0, -np.ones(1), np.ones(1), lambda rng: x)
-    task.observe(np.stack([x] * 2), slopes=True)
+
+
+def _environments(batches: bool) -> None:
+    """Functions of the tasks of Gymnasium's registry; those of Go2 depend on its file."""
+    for name, (module, function, _) in TASKS.items():
+        if name in FUNCTIONS:
+            compile_functions(**FUNCTIONS[name](), batches=batches)
+        elif name != "Go2":
+            task = getattr(import_module(f"dojo_opt.learn.{module}"), function)()
+            compile_functions(
+                task.observation, task.reward, task.terminated, task.survival_probability, batches=batches
+            )
 
 
 def _mpc() -> None:
@@ -272,6 +282,7 @@ _BEYOND = {  # needed neither by README's examples nor by the models
     "derivatives of a flight": lambda: _flight(derivatives, 8),
     "accuracy": lambda: _accurate(False),
     "accuracy on the ground": lambda: _accurate(True),
+    "batches of environments": lambda: _environments(True),
 }
 _SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to compile for
     "hop": _hop,
@@ -284,10 +295,14 @@ _SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to co
     "closed loops": _mpc,
     "task space": _task_space,
     "functions of the user": _users,
+    "environments": lambda: _environments(False),
 }
 
 
 # -- tasks -------------------------------------------------------------------------------------------------------------
+
+
+ENVIRONMENTS = ("environments", "batches of environments")
 
 
 def _kernels() -> dict[str, OptionalKernel]:

@@ -8,6 +8,7 @@ parallel_kernel         a loop over the threads, with `prange`; `threads` sets t
 users_kernel            a function of the user; users_loop is a loop around one, users_callee a kernel that it calls
 optional, link          a kernel with a slot in a table of addresses, for features that few scenes have
 record, Field, Table    NamedTuples of arrays that kernels take as one pointer
+fingerprint             the content of a function, equal for those that compile to the same code
 reduced                 how an object is pickled that holds functions
 seconds, PAUSE          the clock of kernels
 cache_folder            the folder of the compiled code
@@ -19,6 +20,7 @@ CompilationError        Numba's error for code it cannot compile
 
 from solvers.compiler.cache import cache_folder, shipped
 from solvers.compiler.clock import PAUSE, seconds
+from solvers.compiler.function_digest import fingerprint
 from solvers.compiler.kernels import (
     CompilationError,
     compiled_signatures,
@@ -47,6 +49,7 @@ __all__ = [
     "compiled",
     "compiled_signatures",
     "entry",
+    "fingerprint",
     "inlined",
     "inner_kernel",
     "kernel",

@@ -54,6 +54,7 @@ __all__ = [
     "STORE",
     "KernelCache",
     "cache_folder",
+    "magic_of",
     "open_store",
     "prepare",
     "ship",
@@ -306,6 +307,11 @@ class _Named:
         return self._magic
 
 
+def magic_of(codegen: Any) -> tuple[str, str, str]:
+    """Those of a code generator, in keys."""
+    return _Named(*codegen.magic_tuple()).magic_tuple()
+
+
 def _for_shipped_target(codegen: Any) -> _Named:
     return _Named(codegen.magic_tuple()[0], str(shipped().target))
 
@@ -336,7 +342,12 @@ class KernelCache(FunctionCache):
     def _key(self, sig: Any, codegen: Any) -> tuple[Any, str]:
         """(dependencies of the compiled code, apart from those of the stamp; name of its file)."""
         key = (self._form, self._file, self._text, self._index_key(sig, _Named(*codegen.magic_tuple())))
-        return key, f"{self._stem}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.nbc"
+        return key, f"{self._stem}-{self.short(key)}.nbc"
+
+    @staticmethod
+    def short(key: tuple[Any, ...]) -> str:
+        """Digest of a key."""
+        return hashlib.sha256(repr(key).encode()).hexdigest()[:24]
 
     @signals_held()
     def load_overload(self, sig: Any, target_context: Any) -> Any:

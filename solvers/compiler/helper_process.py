@@ -85,7 +85,7 @@ def _size(func: Callable[..., Any], seen: set[str]) -> int:
 
 
 def _possible() -> bool:
-    """Whether a process can be started that would be of use."""
+    """Whether a helper can be started, and would save time."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     python = Path(sys.executable or "").name.lower().startswith("python")  # not a program with a Python inside
     wanted = os.environ.get(_JOBS, "2") != "1" and not numba.config.DISABLE_JIT

@@ -19,8 +19,11 @@ from numba.core.sigutils import normalize_signature
 from numba.core.types.misc import unliteral
 
 from solvers.compiler.cache import CALLEE, INNER, STORE, KernelCache, cache_folder, prepare, shipped
-from solvers.compiler.pipeline import EntryCompiler, InnerCompiler, OptionalCompiler, UsersCompiler
+from solvers.compiler.function_digest import CompiledFunction
+from solvers.compiler.pipeline import FAST, EntryCompiler, InnerCompiler, OptionalCompiler
 from solvers.compiler.signals import signals_outside_locks
+from solvers.compiler.users_cache import UsersCache
+from solvers.compiler.users_pipeline import UsersCompiler, UsersEntryCompiler, UsersInnerCompiler
 
 __all__ = [
     "FLAGS",
@@ -102,7 +105,7 @@ class _Form(CPUDispatcher):
         return super().get_call_template([unliteral(a) for a in args], {k: unliteral(a) for k, a in kws.items()})
 
 
-class Kernel:
+class Kernel(CompiledFunction):
     """A compiled function in two forms: an entry, which Python calls, and `inner`, for other kernels.
 
     Each is made on first use: a dispatcher of Numba takes a third of a millisecond to make, and of the
@@ -112,7 +115,7 @@ class Kernel:
     def __init__(self, func: Callable[..., Any], keep: bool = True, **flags: Any) -> None:
         update_wrapper(self, func)
         self.py_func, self.keep = func, keep
-        self.targetoptions = flags  # where Numba looks for `inline`
+        self.flags = self.targetoptions = flags  # where Numba looks for `inline`
 
     def __call__(self, *args: Any) -> Any:
         return self.entry(*args)
@@ -199,7 +202,7 @@ def local_kernel(func: F) -> F:
 
 
 class Callee(Kernel):
-    """A kernel that loops around functions of the user call. Those are compiled in every process, so that its code for
+    """A kernel that loops around functions of the user call. Those are compiled where the user is, so that its code for
     kernels is shipped.
     """
 
@@ -215,7 +218,7 @@ def users_callee(func: F) -> F:
 
 
 class UsersKernel(Kernel):
-    """A function of the user, or a loop around one: it may allocate, and is compiled once per process.
+    """A function of the user, or a loop around one: it may allocate, and is compiled once per process, or loaded.
 
     Numba never frees the code of a function. Without the ways in that it has no use for, there is a third of it.
     """
@@ -233,17 +236,27 @@ class UsersKernel(Kernel):
 
     @cached_property
     def entry(self) -> Any:
-        """The form with a way in for Python."""
-        return self._form()
+        """The form with a way in for Python, kept on disk where its content is known."""
+        form = self._form(UsersEntryCompiler)
+        if FAST and not self.flags.get("parallel") and (STORE.wanted or len(shipped())):
+            form._cache = UsersCache(self.py_func, self.flags)
+        else:
+            prepare()
+        return form
 
     @cached_property
     def inner(self) -> Any:
         """The form without."""
-        return self._form(no_cpython_wrapper=True)
-
-    def _form(self, **flags: bool) -> Any:
         prepare()
-        form = numba.jit(nopython=True, pipeline_class=UsersCompiler, **flags, **self.flags)(self.py_func)
+        return self._form(UsersInnerCompiler, no_cpython_wrapper=True)
+
+    def compile_for(self, *args: Any) -> None:
+        """Compile or load the entry for arguments of these types, without a call."""
+        self.entry.compile(tuple(self.entry.typeof_pyval(value) for value in args))
+
+    def _form(self, compiler: Any, **flags: bool) -> Any:
+        chosen = UsersCompiler if self.flags.get("parallel") else compiler  # whose loops are functions of their own
+        form = numba.jit(nopython=True, pipeline_class=chosen, **flags, **self.flags)(self.py_func)
         form.compile = signals_outside_locks(form.compile)
         return form
 

@@ -31,7 +31,6 @@ __all__ = [
     "PlainCompiler",
     "RolledCompiler",
     "SeldomCompiler",
-    "UsersCompiler",
     "inner_result",
 ]
 
@@ -71,12 +70,6 @@ class PlainCompiler(Compiler):
         """Compile one function."""
         with compiling(func, self.own):
             return super().compile_extra(func)
-
-
-class UsersCompiler(PlainCompiler):
-    """Plain compiler for functions of the user, and loops around them."""
-
-    own = False
 
 
 class _Compilers(NamedTuple):

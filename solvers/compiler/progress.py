@@ -121,9 +121,13 @@ def parts(items: Iterable[T], count: int) -> Iterator[T]:
         _CLOCK.part, _CLOCK.expected = "", 0
 
 
-def compiled() -> list[str]:
+def compiled(users: bool = False) -> list[str]:
     """Functions that this process compiled, in the order in which it began; those loaded from disk are not there.
 
-    Functions of the user, and the loops around them, are not counted.
+    Args:
+        users: whether to count functions of the user, and the loops around them.
+
+    Returns:
+        Their names.
     """
-    return [name for name, own in _CLOCK.names if own]
+    return [name for name, own in _CLOCK.names if own or users]

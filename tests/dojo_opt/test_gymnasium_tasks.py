@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+
+import numba
 import numpy as np
 import pytest
 
@@ -13,6 +16,8 @@ gymnasium = pytest.importorskip("gymnasium")
 pytest.importorskip("mujoco")
 from gymnasium.vector import AutoresetMode  # noqa: E402
 
+from solvers.compiler.pipeline import FAST  # noqa: E402
+from support.programs import python  # noqa: E402
 from support.robot_files import has_robots  # noqa: E402
 
 NAMES = (
@@ -36,6 +41,25 @@ def test_environments_are_as_gymnasium_has_them(name, monkeypatch):
     env.reset(seed=0)
     picture = env.render()
     assert picture.shape == (480, 480, 3) and picture.std() > 1.0
+
+
+USERS_CODE = """
+import gymnasium, json
+import numpy as np
+from solvers.compiler import compiled
+env = gymnasium.make("dojo_opt.learn:dojo/NAME-v0")
+env.reset(seed=0)
+env.step(np.zeros(env.action_space.shape, dtype=np.float32))
+print(json.dumps([name for name in compiled(users=True) if name not in compiled()]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(numba.config.DISABLE_JIT or not FAST, reason="functions of the user are kept by the fast compiler")
+def test_the_next_process_compiles_no_function_of_a_task():
+    for name in ("Pendulum", "Quadruped"):  # whose model is our own, so that Gymnasium's are not read
+        python(USERS_CODE.replace("NAME", name))
+        assert json.loads(python(USERS_CODE.replace("NAME", name))) == []
 
 
 def test_people_watch_in_the_browser(monkeypatch):

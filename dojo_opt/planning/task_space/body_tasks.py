@@ -13,9 +13,7 @@ from dojo_opt.planning.term import numbers
 from sim.mechanism import checks
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Integers, Vector
 
 _UNIT = (1.0, 0.0, 0.0, 0.0)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.planning.component_names import chosen_inputs, input_weight
 from dojo_opt.planning.task_space.body_tasks import needs_order_two
@@ -31,8 +31,7 @@ from sim.mechanism.short_repr import short_repr
 from sim.model.shape_kinds import SWAPPED, Pair
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
-
-Integers = NDArray[np.int64]
+from solvers.types import Integers
 
 __all__ = ["Clearance", "ContactForce", "FrictionUse", "Slip", "TorqueRate"]
 

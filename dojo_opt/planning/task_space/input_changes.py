@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.planning.task_space.task_term import Entries
 from dojo_opt.planning.term import Term
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Integers, Matrix, Stack, Vector
 
 
 class InputChanges(Term):

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.planning.term import Pick, PickTerm, Spec, Term, knot_list
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
-
-Integers = NDArray[np.int64]
+from solvers.types import Integers
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.simulator.simulator import Simulator
 from sim.simulator.task_space.task_space import Buffers, TaskSpace
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Integers, Matrix, Stack, Vector
 
 _SMOOTH = 1e-3  # of the normal force of the weight: below it, the size of a tangential force is rounded off
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.planning.task_space.quantity import Quantity
 from dojo_opt.planning.task_space.task_term import Entries, PeriodicTaskTerm, TaskTerm
@@ -15,10 +15,7 @@ from dojo_opt.planning.term import Spec, Term, knot_list, numbers, table
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Integers, Matrix, Vector
 
 _FREE = 1e100  # in place of an infinite bound
 

@@ -5,17 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.planning.penalty import add_dense_expansion, penalty_derivatives
 from dojo_opt.planning.task_space.quantity import Quantity
 from dojo_opt.planning.term import Term
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Integers, Matrix, Stack, Vector
 
 
 class Entries(NamedTuple):
