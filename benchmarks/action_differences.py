@@ -17,13 +17,12 @@ import gymnasium
 import numpy as np
 from command import deliver, parser
 from evaluate_policy import OPTIONS, load
-from numpy.typing import NDArray
 
 from dojo_opt.learn.registration import task_of
 from dojo_opt.report.result import Report, Row, Table
 from solvers.status import Status
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
 EPISODES, LOST = 4, 0.1
 
 

@@ -19,14 +19,12 @@ from typing import Any, NamedTuple
 import gymnasium
 import numpy as np
 from command import deliver, number, parser, progress
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from dojo_opt.learn.registration import task_of
 from dojo_opt.learn.task import Task
 from dojo_opt.report.result import Report, Table
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 H, SECONDS, GAITS, BEST, STARTS = 1e-3, 2.0, 64, 4, 4
 WITHIN, CLEARANCE = 0.05, 1e-3  # [rad]

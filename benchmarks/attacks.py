@@ -31,14 +31,12 @@ from typing import Any
 
 import numpy as np
 from command import deliver, number, parser, progress
-from numpy.typing import NDArray
 from random_mechanisms import COMMON, Recipe, heights, random_mechanism, random_state
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Report, Table
+from solvers.types import Vector
 from support.robot_texts import MJCF, URDF, mutated
-
-Vector = NDArray[np.float64]
 
 TIME_STEPS = (0.01, 0.02, 0.05)
 SECONDS = 0.3
@@ -78,8 +76,8 @@ def judge_step(sim: dojo.Simulator, x: Vector) -> str:
         result = sim.step(x)
     except Exception as error:  # whatever it is, it is counted
         return f"exception {type(error).__name__}"
-    arrays = (result.x, result.contacts.impulse, result.contacts.gap, result.contacts.slip, result.contacts.point)
-    if not all(np.isfinite(a).all() for a in arrays):
+    arrays = (result.x, result.contacts.impulse, result.contacts.slip, result.contacts.point)
+    if not all(np.isfinite(a).all() for a in arrays) or np.isnan(result.contacts.gap).any():
         return f"not finite, {result.status.name}"
     if not result.success:
         return str(result.status.name)

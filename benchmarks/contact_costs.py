@@ -17,14 +17,11 @@ from typing import Any
 
 import numpy as np
 from command import deliver, parser, progress
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from dojo_opt.report.interleaved_rounds import interleave
 from dojo_opt.report.result import Cell, Report, Row, Table
 from support.towers import EDGE, tower
-
-Vector = NDArray[np.float64]
 
 HEIGHTS = (2, 3, 5, 10, 20, 40)
 ROBOTS: dict[str, Callable[[], dojo.Mechanism]] = {

@@ -27,12 +27,10 @@ from typing import Any
 
 import numpy as np
 from command import deliver, number, parser
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Report, Table
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 H, HALF = 1.0 / 148.0, 0.0524  # [s], [m]
 GRID = (1, 2, 4, 8, 16, 40, 80, 120)

@@ -24,13 +24,12 @@ from pathlib import Path
 
 import numpy as np
 from command import deliver, number, parser, progress
-from numpy.typing import NDArray
 from urdf_zoo import package_files
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Report, Table
+from solvers.types import Vector
 
-Vector = NDArray[np.float64]
 ACCURACY = 1e-4  # [m, rad] per second
 Motion = tuple[dojo.Simulator, Vector, Vector]  # simulator, first state, inputs (T, nu)
 

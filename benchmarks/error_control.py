@@ -25,14 +25,13 @@ from typing import Any
 
 import numpy as np
 from command import deliver, number, parser, progress
-from numpy.typing import NDArray
 from reference_motions import ReferenceMotion, motions
 
 import dojo_opt as dojo
 from dojo_opt.report.engine import clocked
 from dojo_opt.report.result import Report, Table
+from solvers.types import Vector
 
-Vector = NDArray[np.float64]
 Points = list[tuple[float, float, str]]  # (error, processor time [s], order and step)
 _ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 _STEPS = (0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4)

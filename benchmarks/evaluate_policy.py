@@ -14,9 +14,9 @@ from collections.abc import Callable
 
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from solvers.types import Floats
+
 ELLIPTIC = 1  # mujoco.mjtCone.mjCONE_ELLIPTIC
 OPTIONS = {"Ant-v5": {"include_cfrc_ext_in_observation": False, "contact_cost_weight": 0.0}}
 

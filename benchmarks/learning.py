@@ -23,14 +23,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from dojo_opt.learn.gymnasium_tasks import BALANCE, DISTURBED, TRANSFER
 from dojo_opt.learn.registration import task_of
 from dojo_opt.report.result import Report, Row, Table
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _RARELY: dict[str, Any] = {"evaluations": 5, "episodes": 4}  # an evaluation takes as long as several epochs
 SETTINGS: dict[str, dict[str, dict[str, Any]]] = {  # of shac, beside those of the task

@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 from command import deliver, parser
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from dojo_opt.learn.network import Network
@@ -29,8 +28,7 @@ from dojo_opt.learn.registration import task_of
 from dojo_opt.learn.task import Task
 from dojo_opt.report.interleaved_rounds import interleave
 from dojo_opt.report.result import Cell, Report, Row, Table
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 ROWS, BEFORE, KAPPA = 64, 60, 1e-3  # actions before the measured one, smoothing [N s m]
 STEPS = {

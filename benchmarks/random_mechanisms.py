@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
+from solvers.types import Vector
 
-Vector = NDArray[np.float64]
 Rng = np.random.Generator
 
 KINDS = (

@@ -12,14 +12,13 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
+from solvers.types import Vector
 from support.linkage import plain_fourbar
 from support.scenes import ball, block
 from support.towers import tower
 
-Vector = NDArray[np.float64]
 _G = 9.81
 FALLING = ("ant", "atlas", "halfcheetah", "hopper", "humanoid", "quadruped", "raiberthopper", "walker")
 FLYING = (*FALLING, "panda", "youbot")

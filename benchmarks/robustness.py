@@ -21,13 +21,11 @@ from typing import Any
 
 import numpy as np
 from command import deliver, number, parser, progress
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Cell as TableCell
 from dojo_opt.report.result import Report, Table
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 MECHANISMS = {
     "block": lambda friction: dojo.models.block(friction=friction),
@@ -134,7 +132,7 @@ def run_cell(name: str, friction: float, h: float, kappa: float, states: int, se
             fine = np.isfinite(result.x).all() and lowest(sim, result.x) > -1e-6
             smoothing = kappa / h * len(sim.mechanism.contacts)
             cell.unreported += not (fine and gain <= GAIN * sim.kinetic_energy(x) + smoothing)
-        elif status == dojo.Status.ENERGY_STEP:
+        elif status == dojo.Status.ENERGY_GAIN:
             cell.gaining += 1
         else:
             cell.misses[status.name] += 1

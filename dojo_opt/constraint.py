@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.planning.component_names import chosen_components, chosen_inputs, component_name
 from dojo_opt.planning.residual import ResidualKernels, check_residual
@@ -33,9 +33,7 @@ from dojo_opt.planning.term import (
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
-
-Integers = NDArray[np.int64]
-Vector = NDArray[np.float64]
+from solvers.types import Integers, Vector
 
 __all__ = [
     "CenterOfMass",

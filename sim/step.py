@@ -33,7 +33,7 @@ def step(
     nq = data.theta1.shape[0]
     q = x[:nq]
     v = x[nq:]
-    r = Outcome(Status.ANGULAR_STEP.value, 0, 1e300, 0.0)
+    r = Outcome(Status.TURN_TOO_LARGE.value, 0, 1e300, 0.0)
     if begin_step(model, data, options.h, q, v, u):
         start_loops(model, data, guess.impulses)
         if model.loop_ntrans.shape[0] > 0:
@@ -63,12 +63,12 @@ def _checked(
     inputs: (q, v, u). The interior point checks the gain for every solution.
     """
     if r.status == Status.SOLVED and loops_gained(model, data, options, inputs[1]):
-        return Outcome(Status.LOOP_STEP.value, r.iterations, r.residual, r.violation)
+        return Outcome(Status.LOOP_SINGULAR.value, r.iterations, r.residual, r.violation)
     smooth = model.contact_body.shape[0] + model.limit_dof.shape[0] + model.dry_dof.shape[0] == 0
     if r.status == Status.SOLVED and smooth and step_gained(model, data, options, inputs):
-        return Outcome(Status.ENERGY_STEP.value, r.iterations, r.residual, r.violation)
+        return Outcome(Status.ENERGY_GAIN.value, r.iterations, r.residual, r.violation)
     if r.status == Status.SOLVED and not ends_below_half(model, data, options.h):
-        return Outcome(Status.ANGULAR_STEP.value, r.iterations, r.residual, r.violation)
+        return Outcome(Status.TURN_TOO_LARGE.value, r.iterations, r.residual, r.violation)
     return r
 
 

@@ -226,7 +226,7 @@ def test_half_a_turn_per_step_is_refused(mech):
     x = np.array(sim.neutral())
     x[sim.nq + 3] = 32.0
     result = sim.step(x, np.zeros(sim.nu))
-    assert dojo.Status(result.status).name == "ANGULAR_STEP"
+    assert dojo.Status(result.status).name == "TURN_TOO_LARGE"
     trajectory = sim.rollout(x, np.zeros((3, sim.nu)))
     assert trajectory.status == result.status and trajectory.solved_steps == 0
     with pytest.raises(Exception, match=re.compile("turn|angular", re.IGNORECASE)):

@@ -30,6 +30,11 @@ OLD: dict[str, tuple[Callable[[], Any], Callable[[], Any], str]] = {
     "step.share": (lambda: SIM.step(X).share, lambda: 1.0, "StepResult.momentum_fraction"),
     "feedback.knot": (lambda: SIM.rollout_feedback(X, US).knot, lambda: 3, "FeedbackRollout.solved_knots"),
     "batch.knot": (lambda: SIM.rollout_batch([X], [US]).knot, lambda: [3], "RolloutBatch.solved_steps"),
+    "terrain": (
+        lambda: dojo.models.sphere().on(dojo.Terrain.slope(0.2)).contacts[0].normal,
+        lambda: dojo.models.sphere().with_terrain(dojo.Terrain.slope(0.2)).contacts[0].normal,
+        "Mechanism.with_terrain",
+    ),
     "keyword of ilqr": (
         lambda: dojo.ilqr(swingup(), violation=1e-4, shooting=0.0).x,
         lambda: dojo.ilqr(swingup(), violation_tolerance=1e-4, multiple_shooting_below=0.0).x,
@@ -45,6 +50,23 @@ def test_old_names_of_simulators_and_results(name: str) -> None:
         found = old()
     assert any(word in str(warning.message) and warning.filename == __file__ for warning in told)
     np.testing.assert_array_equal(found, new())
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("ANGULAR_STEP", "TURN_TOO_LARGE"),
+        ("LOOP_STEP", "LOOP_SINGULAR"),
+        ("COLLISION_STEP", "SHAPES_CROSSED"),
+        ("ENERGY_STEP", "ENERGY_GAIN"),
+        ("TOLERANCE_STEP", "ACCURACY_NOT_REACHED"),
+    ],
+)
+def test_old_names_of_statuses(old: str, new: str) -> None:
+    with pytest.warns(DeprecationWarning, match=f"Status.{old} is now Status.{new}") as told:
+        found = getattr(dojo.Status, old)
+    assert told[0].filename == __file__
+    assert found is dojo.Status[new] and old not in dojo.Status.__members__
 
 
 def test_old_names_of_modules() -> None:

@@ -59,7 +59,7 @@ def parts() -> Calls:
         "Perturbation": (dojo.Perturbation, usual(dojo.Perturbation)),
         "Mechanism": (dojo.Mechanism, usual(dojo.Mechanism, bodies=[ARM], joints=[HINGE])),
         "Mechanism.add": (HOPPER.add, usual(HOPPER.add, other=dojo.models.block())),
-        "Mechanism.on": (HOPPER.on, {"terrain": TERRAIN, "contacts": None, "bodies": ()}),
+        "Mechanism.with_terrain": (HOPPER.with_terrain, {"terrain": TERRAIN, "contacts": None, "bodies": ()}),
         "Mechanism.with_obstacle": (
             HOPPER.with_obstacle,
             {"shape": SHAPES["Box"], "bodies": [HOPPER.bodies[0].name], "name": "wall"},

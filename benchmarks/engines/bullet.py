@@ -25,8 +25,7 @@ from dojo_opt.report.engine import Run, clocked, held, nodes, observe
 from sim.mechanism.mechanism import Mechanism
 from sim.model.model import InputKind, Model
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _LOST = 1e8  # [m/s, rad/s] faster than this, the simulation has blown up
 

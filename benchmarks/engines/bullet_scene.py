@@ -14,13 +14,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from benchmarks.engines.mujoco_scene import POINT_RADIUS, is_free
 from sim.model.model import InputKind, Model
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 @dataclass

@@ -12,12 +12,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.engines.mujoco_scene import POINT_RADIUS, is_free
 from sim.model.model import InputKind, Model
-
-Floats = NDArray[np.float64]
 
 
 @dataclass

@@ -16,8 +16,7 @@ from benchmarks.engines.separate_process import apart
 from dojo_opt.report.engine import Run, clocked, held, nodes, observe
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 INTEGRATORS = ("Euler", "implicitfast", "implicit", "discrete", "RK4")
 _LOST = 1e8  # [m/s, rad/s] faster than this, the simulation has blown up

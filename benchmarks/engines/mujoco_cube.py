@@ -7,11 +7,9 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 from mujoco import minimize, rollout
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["MujocoCube", "fit"]
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.engines import mujoco_scene
 from benchmarks.engines.mujoco_warnings import quiet
 from sim.simulator.simulator import Simulator
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
 _REST = 200  # steps until a body rests on the ground
 
 

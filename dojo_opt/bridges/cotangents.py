@@ -11,12 +11,10 @@ Going there and back removes from g_q the part along q; all other numbers are th
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.planning.manifold import cross, tangent_layout
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 class Cotangents:

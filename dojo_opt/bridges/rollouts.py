@@ -9,7 +9,6 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.bridges.cotangents import Cotangents
 from dojo_opt.identification.parameter_space import ParameterSpace
@@ -17,8 +16,7 @@ from sim.mechanism import checks
 from sim.simulator.results import SimulationError
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _KEPT = 64  # simulators of other parameters, from a rollout to its gradient
 

@@ -10,8 +10,7 @@ from dojo_opt.gaits.gait import Gait, assemble, check_length
 from sim.mechanism import checks
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["step"]
 
@@ -108,13 +107,13 @@ def _swung(feet: Feet, swinging: str | None) -> NDArray[np.bool_]:
     return np.asarray(owner == moving)
 
 
-def _smooth(t: Array) -> Array:
+def _smooth(t: Floats) -> Floats:
     """0 before 0, 1 after 1, with two derivatives zero at both: 10 t^3 - 15 t^4 + 6 t^5."""
     t = np.clip(t, 0.0, 1.0)
     return np.asarray(t**3 * (10.0 - 15.0 * t + 6.0 * t**2))
 
 
-def _end(sim: Simulator, after: Gait) -> Array:
+def _end(sim: Simulator, after: Gait) -> Floats:
     """The last state of `after`, at rest."""
     if not isinstance(after, Gait):
         raise TypeError(f"gaits.step(after=...): expected a Gait, got {after!r}")
@@ -129,7 +128,7 @@ def _end(sim: Simulator, after: Gait) -> Array:
     return np.asarray(state)
 
 
-def balanced(feet: Feet, x: Array, path: Array, goal: Array) -> Array:
+def balanced(feet: Feet, x: Floats, path: Floats, goal: Floats) -> Floats:
     """Poses of the base near those of given states for which the centre of mass is where it should be.
 
     Args:
@@ -156,7 +155,7 @@ def balanced(feet: Feet, x: Array, path: Array, goal: Array) -> Array:
     return np.asarray(x[:, BaseState.POSE])
 
 
-def over_its_feet(sim: Simulator) -> Array:
+def over_its_feet(sim: Simulator) -> Floats:
     """The neutral state with the centre of mass above the middle of the soles, and all hinges off their stops.
 
     Args:
@@ -174,7 +173,7 @@ def over_its_feet(sim: Simulator) -> Array:
     return np.asarray(feet.place(x, places)[0])
 
 
-def _inside(sim: Simulator) -> Array:
+def _inside(sim: Simulator) -> Floats:
     """The stance (nx,) with all hinges off their stops, where a smooth stop would push with an infinite torque."""
     x, mech = sim.neutral(), sim.mechanism
     for joint in mech.joints[1:]:

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.gaits.feet import Feet
 from sim.mechanism import checks
 from sim.simulator.simulator import Simulator
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["equilibrium", "input_map", "potential_gradient"]
 
@@ -25,7 +24,7 @@ _NEAR = 0.01  # [m] contacts may carry that are not further from the ground than
 _LOWEST = (_NEAR, 1e-3, 1e-4)  # [m] likewise, than the nearest of their body: of a round hull few corners touch at once
 
 
-def potential_gradient(sim: Simulator, x: ArrayLike) -> Array:
+def potential_gradient(sim: Simulator, x: ArrayLike) -> Floats:
     """dV/dq (..., nv) of gravity and springs at the coordinates of x (..., nx), by central differences [N, N m]."""
     rest = np.array(x, dtype=float)
     rest[..., sim.nq :] = 0.0
@@ -37,7 +36,7 @@ def potential_gradient(sim: Simulator, x: ArrayLike) -> Array:
     return np.asarray((V[..., : sim.nv] - V[..., sim.nv :]) / (2.0 * _STEP))
 
 
-def input_map(sim: Simulator) -> Array:
+def input_map(sim: Simulator) -> Floats:
     """(nv, nu) generalised forces per unit of every input on a joint; those on bodies, such as pushes, have none."""
     out = np.zeros((sim.nv, sim.nu))
     for k, part in enumerate(sim.mechanism.inputs or ()):
@@ -47,7 +46,7 @@ def input_map(sim: Simulator) -> Array:
     return out
 
 
-def least_pushes(pushes: Array, load: Array, even: float) -> Array:
+def least_pushes(pushes: Floats, load: Floats, even: float) -> Floats:
     """(k,) factors f >= 0 of the rows of `pushes` (k, n) with least |pushes^T f - load|^2 + even^2 |f|^2."""
     from scipy.optimize import nnls  # .3 s, which only legged robots at rest or on a gait need
 
@@ -55,7 +54,7 @@ def least_pushes(pushes: Array, load: Array, even: float) -> Array:
     return np.asarray(nnls(rows, np.concatenate([load, np.zeros(len(pushes))]))[0])
 
 
-def _between_stops(sim: Simulator, x: Array) -> Iterator[tuple[str, Array, Array, Array]]:
+def _between_stops(sim: Simulator, x: Floats) -> Iterator[tuple[str, Floats, Floats, Floats]]:
     """(joint, q, lo, hi) of all joints with scalar coordinates."""
     for joint in sim.mechanism.joints:
         if joint.nrot != 3:
@@ -63,7 +62,7 @@ def _between_stops(sim: Simulator, x: Array) -> Iterator[tuple[str, Array, Array
             yield joint.name, x[sim.mechanism.q_slice(joint.name)], lo, hi
 
 
-def stop_torques(sim: Simulator, x: Array) -> Array:
+def stop_torques(sim: Simulator, x: Floats) -> Floats:
     """(nv,) mean torque of the joint stops at rest, kappa / (h distance) away from each [N, N m]."""
     out = np.zeros(sim.nv)
     for name, q, lo, hi in _between_stops(sim, x):
@@ -71,7 +70,7 @@ def stop_torques(sim: Simulator, x: Array) -> Array:
     return out
 
 
-def _check_stops(sim: Simulator, x: Array) -> None:
+def _check_stops(sim: Simulator, x: Floats) -> None:
     """Refuse a joint at its stop, which pushes it away with an infinite torque on the central path."""
     for name, q, lo, hi in _between_stops(sim, x):
         if lo.size and not np.all((lo < q) & (q < hi)):
@@ -80,14 +79,14 @@ def _check_stops(sim: Simulator, x: Array) -> None:
             )
 
 
-def _under(feet: Feet, state: Array) -> tuple[Array, Array, Array]:
+def _under(feet: Feet, state: Floats) -> tuple[Floats, Floats, Floats]:
     """d(gaps)/dq (k, nv), generalised forces (k, nv) of unit vertical forces, and the cosines of the slopes (k,)."""
     normal = feet.normals(state)
     gaps = np.einsum("kc,kcv->kv", normal, feet.jacobian(state))
     return gaps, feet.touching(state).jacobian(state)[:, 2], normal[:, 2]
 
 
-def _check_friction(name: str, feet: Feet, cosines: Array, force: Array) -> None:
+def _check_friction(name: str, feet: Feet, cosines: Floats, force: Floats) -> None:
     """Refuse vertical forces outside the friction cones."""
     for contact, cosine, loaded in zip(feet.contacts, cosines, force > 0.0, strict=True):
         limit = 0.0 if contact.law == "impact" else contact.friction
@@ -100,8 +99,8 @@ def _check_friction(name: str, feet: Feet, cosines: Array, force: Array) -> None
 
 
 def _standing(
-    sim: Simulator, feet: Feet, state: Array, among: tuple[NDArray[np.bool_], float], iterations: int
-) -> tuple[Array, Array]:
+    sim: Simulator, feet: Feet, state: Floats, among: tuple[NDArray[np.bool_], float], iterations: int
+) -> tuple[Floats, Floats]:
     """The state near `state` in which contacts carry the load as evenly as they can, and their forces.
 
     among: the degrees of freedom without an input, and how far above the lowest contact of its body another one may
@@ -130,7 +129,7 @@ def _standing(
     return _pressed(sim, feet, state, free)
 
 
-def _pressed(sim: Simulator, feet: Feet, state: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _pressed(sim: Simulator, feet: Feet, state: Floats, free: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     """The state moved until the forces kappa / (h gap) of all contacts balance the free degrees of freedom; the forces.
 
     Newton's method with the smallest motion. Four balls under a rigid foot cannot float at four given heights, so the
@@ -150,7 +149,7 @@ def _pressed(sim: Simulator, feet: Feet, state: Array, free: NDArray[np.bool_]) 
     return state, sim.kappa / (sim.time_step * _under(feet, state)[2] * np.maximum(feet.gaps(state), 1e-12))
 
 
-def _held(sim: Simulator, state: Array, left: Array, by: str) -> Array:
+def _held(sim: Simulator, state: Floats, left: Floats, by: str) -> Floats:
     """(nu,) inputs that balance the generalised forces `left` (nv,).  ValueError: those that have no input remain."""
     B = input_map(sim)
     free = ~B.any(axis=1)
@@ -169,7 +168,7 @@ def _named(names: tuple[str, ...]) -> str:
     return few if len(names) <= _FEW else f"{few} and {len(names) - _FEW} more contacts"
 
 
-def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int = 20) -> tuple[Array, Array]:
+def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int = 20) -> tuple[Floats, Floats]:
     """A state of rest near x, and the input that holds it: for robots on feet, arms, and hands that hold an object.
 
     The contacts press straight down, so nothing creeps on level ground, and share the load as evenly as balance allows.

@@ -7,15 +7,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.planning.manifold import cross
 from sim.mechanism import checks
 from sim.model.interruptible_loops import rows
 from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["Feet"]
 
@@ -62,7 +61,7 @@ class Feet:
         """Whether some feet have several contacts, and so an attitude on the ground."""
         return len({contact.body for contact in self.contacts}) < len(self.contacts)
 
-    def positions(self, x: ArrayLike) -> Array:
+    def positions(self, x: ArrayLike) -> Floats:
         """Places of the balls.
 
         Args:
@@ -76,7 +75,7 @@ class Feet:
         side = cross(v, self._point)
         return np.asarray(z[..., BodyState.POSITION] + self._point + 2.0 * (w * side + cross(v, side)))
 
-    def gaps(self, x: ArrayLike) -> Array:
+    def gaps(self, x: ArrayLike) -> Floats:
         """Distances of the balls from the ground.
 
         Args:
@@ -88,7 +87,7 @@ class Feet:
         at = self.positions(x)
         return np.stack([c.gap(at[..., k, :]) for k, c in enumerate(self.contacts)], axis=-1)
 
-    def put_down(self, x: Array) -> Array:
+    def put_down(self, x: Floats) -> Floats:
         """Move a robot on a floating base up or down until its lowest ball touches the ground.
 
         Args:
@@ -105,7 +104,7 @@ class Feet:
                 break
         return out
 
-    def normals(self, x: Array) -> Array:
+    def normals(self, x: Floats) -> Floats:
         """Outward normals of the ground at the balls.
 
         Args:
@@ -116,7 +115,7 @@ class Feet:
         """
         return np.stack([c.normal_at(p) for c, p in zip(self.contacts, self.positions(x), strict=True)])
 
-    def touching(self, x: Array) -> Feet:
+    def touching(self, x: Floats) -> Feet:
         """The points of the balls nearest to the ground, instead of their centres.
 
         Args:
@@ -132,7 +131,7 @@ class Feet:
         other._point = self._point + arm + 2.0 * (w * side + cross(v, side))
         return other
 
-    def jacobian(self, x: ArrayLike) -> Array:
+    def jacobian(self, x: ArrayLike) -> Floats:
         """Derivatives of the positions by the coordinates, by central differences.
 
         Args:
@@ -150,7 +149,7 @@ class Feet:
             out[part] = self._slopes(flat[part])
         return out.reshape(*states.shape[:-1], *out.shape[1:])
 
-    def _slopes(self, x: Array) -> Array:
+    def _slopes(self, x: Floats) -> Floats:
         """`jacobian` of states (..., nx), which takes 2 nv states for each of them."""
         sim = self.sim
         steps = np.zeros((2 * sim.nv, sim.ndx))
@@ -160,7 +159,7 @@ class Feet:
         slope = (moved[..., : sim.nv, :, :] - moved[..., sim.nv :, :, :]) / (2.0 * _STEP)
         return np.moveaxis(slope, -3, -1)
 
-    def place(self, x: ArrayLike, targets: ArrayLike) -> Array:
+    def place(self, x: ArrayLike, targets: ArrayLike) -> Floats:
         """Inverse kinematics: joint angles for given places of the feet, with a fixed base.
 
         Damped Gauss-Newton starts at the joint angles of x, so a knee stays bent to its side. It solves all states at
@@ -198,7 +197,7 @@ class Feet:
         self._check_stops(x)
         return x
 
-    def _check_stops(self, x: Array) -> None:
+    def _check_stops(self, x: Floats) -> None:
         """Refuse angles beyond the limits of a joint."""
         for joint in self.sim.mechanism.joints[1:]:
             q = x[:, self.sim.mechanism.q_slice(joint.name)]

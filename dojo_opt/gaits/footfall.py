@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Booleans = NDArray[np.bool_]
+from solvers.types import Flags, Floats
 
 _GRID = 512  # points of a period on which the sway of the base is integrated
 _ROUND = 1e-9  # of a period: a knot this near to a change of feet belongs to the next phase
@@ -19,13 +17,13 @@ _ROUND = 1e-9  # of a period: a knot this near to a change of feet belongs to th
 class Footfall:
     """A periodic pattern: foot i is on the ground in the share `duty` of every period from offset[i] on."""
 
-    offset: Array  # (k,) share of the period at which a foot comes down
+    offset: Floats  # (k,) share of the period at which a foot comes down
     duty: float
     period: float  # [s]
     step_height: float  # [m]
     velocity: complex  # of the base, forward + i sideways, in the axes of its heading [m/s]
     heading_rate: float  # [rad/s]
-    foothold: Array  # (k,) complex, forward + i sideways from the base, in the middle of a stance [m]
+    foothold: Floats  # (k,) complex, forward + i sideways from the base, in the middle of a stance [m]
 
     def base(self, t: Any) -> tuple[Any, Any]:
         """(place x + i y, heading) at the times t."""
@@ -40,11 +38,11 @@ class Footfall:
         number = np.floor(phase)
         return number, phase - number
 
-    def contact(self, t: Any) -> Booleans:
+    def contact(self, t: Any) -> Flags:
         """(n, k) whether a foot is on the ground; at its lift-off it still is."""
         return np.asarray(self.cycle(t)[1] <= self.duty + 2.0 * _ROUND)
 
-    def feet(self, t: Any) -> tuple[Any, Array]:
+    def feet(self, t: Any) -> tuple[Any, Floats]:
         """(places x + i y, heights above their lowest), both (n, k)."""
         number, share = self.cycle(t)
         swing = np.clip((share - self.duty) / max(1.0 - self.duty, _ROUND), 0.0, 1.0)
@@ -57,7 +55,7 @@ class Footfall:
         place, heading = self.base((number + self.offset + 0.5 * self.duty) * self.period)
         return place + np.exp(1j * heading) * self.foothold
 
-    def sway(self, t: Any, inertia: tuple[float, float, float], tilt: float) -> Array:
+    def sway(self, t: Any, inertia: tuple[float, float, float], tilt: float) -> Floats:
         """(n, 3) height [m], roll and pitch [rad] of the base about their means.
 
         Every foot on the ground is taken to carry the same constant weight, straight down: twice integrated over a
@@ -77,7 +75,7 @@ class Footfall:
         ends = np.concatenate([path, path[:1]])
         return np.stack([np.interp(wrapped, np.linspace(0.0, 1.0, _GRID + 1), c) for c in ends.T], axis=1)
 
-    def shift(self, t: Any, height: float) -> Array:
+    def shift(self, t: Any, height: float) -> Floats:
         """(n,) displacement of the base to the left [m], for two feet, on which a robot balances in turn.
 
         The periodic motion y of a linear inverted pendulum, y'' = g/height (y - p), over the middle p of the feet on
@@ -95,7 +93,7 @@ class Footfall:
         return np.interp(wrapped, np.linspace(0.0, 1.0, _GRID + 1), [*path, path[0]])
 
 
-def _integral(values: Array, period: float) -> Array:
+def _integral(values: Floats, period: float) -> Floats:
     """Periodic integral of samples of one period, mean removed before and after."""
     values = values - values.mean(axis=0)
     total = np.cumsum(values, axis=0) * (period / len(values))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.gaits.equilibrium import input_map, least_pushes
 from dojo_opt.gaits.feet import Feet
@@ -16,9 +15,7 @@ from sim.mechanism.servos import passive
 from sim.mechanism.short_repr import short_repr
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
-
-Array = NDArray[np.float64]
-Booleans = NDArray[np.bool_]
+from solvers.types import Flags, Floats
 
 __all__ = ["Gait"]
 
@@ -48,10 +45,10 @@ class Gait:
 
     name: str
     simulator: Simulator
-    time: Array
-    x: Array
-    feet: Array
-    contact: Booleans
+    time: Floats
+    x: Floats
+    feet: Floats
+    contact: Flags
     foot_names: tuple[str, ...]
 
     __repr__ = short_repr
@@ -69,7 +66,7 @@ class Gait:
         time = np.concatenate([self.time, self.time[-1] + other.time[1:]])
         return replace(self, time=time, x=x, feet=feet, contact=contact)
 
-    def torques(self, *, iterations: int = 3) -> Array:
+    def torques(self, *, iterations: int = 3) -> Floats:
         """Inputs by inverse dynamics: they move the joints along the reference while the feet carry the robot.
 
         The generalised forces of the motion come from steps of the same mechanism in the air with an input on every
@@ -101,7 +98,7 @@ class Gait:
             us[t] = np.linalg.lstsq(B, left, rcond=None)[0]
         return us
 
-    def _generalized_forces(self, iterations: int) -> Array:
+    def _generalized_forces(self, iterations: int) -> Floats:
         """(T, nv) forces that lead from each state to the velocity of the next, without the ground."""
         mech = passive(self.simulator.mechanism)
         joints = [_with_far_stops(j) for j in mech.joints]
@@ -126,7 +123,7 @@ def _with_far_stops(joint: Joint) -> Joint:
     return replace(joint, limits=far, friction=0.0)
 
 
-def _pyramid(feet: Feet) -> Array:
+def _pyramid(feet: Feet) -> Floats:
     """(k, 4, 3) edges of a pyramid inside the friction cone of every foot, unit normal force."""
     out = np.empty((len(feet.names), 4, 3))
     for k, contact in enumerate(feet.contacts):
@@ -156,7 +153,7 @@ def check_length(call: str, sim: Simulator, steps: float, remedy: str) -> None:
     check_room(call, int(steps), 8.0 * (sim.nx + sim.ndx * (sim.ndx + sim.nu)), remedy)
 
 
-def assemble(sim: Simulator, name: str, base: Array, feet: Array, contact: Booleans, *, names: tuple[str, ...]) -> Gait:
+def assemble(sim: Simulator, name: str, base: Floats, feet: Floats, contact: Flags, *, names: tuple[str, ...]) -> Gait:
     """Gait from the pose of the base (T + 2, 7) and the feet (T + 2, k, 3) at times -h, 0, ..., T h."""
     x = np.tile(sim.neutral(), (len(base), 1))
     x[:, BaseState.POSE] = base

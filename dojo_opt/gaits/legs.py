@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.gaits.feet import Feet
 from sim.mechanism import checks
@@ -18,8 +17,7 @@ from sim.model.state_columns import BodyState
 from sim.simulator.inverse_kinematics import ik
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["Legs"]
 
@@ -99,7 +97,7 @@ class Legs:
         """
         return Simulator(self.mechanism, time_step=time_step, kappa=kappa)
 
-    def bends(self) -> Array:
+    def bends(self) -> Floats:
         """Changes of the stance that bend a leg: its foot rises below the hip, and stays level on an ankle.
 
         Returns:
@@ -176,7 +174,7 @@ def _named(mech: Mechanism, kin: Kinematics, name: str, given: Any) -> list[Cont
     return [Contact(body, point, radius, friction=own[0].friction if own else 0.8, name=name)]
 
 
-def _stance(sim: Simulator) -> Array:
+def _stance(sim: Simulator) -> Floats:
     """A state with bent legs, the feet below the hips."""
     mech, x = sim.mechanism, sim.neutral()
     feet = Feet(sim)
@@ -211,7 +209,9 @@ def _stance(sim: Simulator) -> Array:
     return out
 
 
-def _bent(sim: Simulator, kin: Kinematics, places: dict[str, Array], knees: list[Joint], x: Array, sign: float) -> Any:
+def _bent(
+    sim: Simulator, kin: Kinematics, places: dict[str, Floats], knees: list[Joint], x: Floats, sign: float
+) -> Any:
     """The search from knees that are bent to one side."""
     start = x[: sim.nq].copy()
     for joint in knees:
@@ -222,13 +222,13 @@ def _bent(sim: Simulator, kin: Kinematics, places: dict[str, Array], knees: list
     return ik(kin, places, start, fixed=(base,), tolerance=1e-6, attempts=_TRIES)
 
 
-def _origin_of(sim: Simulator, bodies: dict[str, Joint], knees: list[str], q: Array) -> float:
+def _origin_of(sim: Simulator, bodies: dict[str, Joint], knees: list[str], q: Floats) -> float:
     """Mean place of the knees along x [m]."""
     x = np.concatenate([q, np.zeros(sim.nv)])
     return float(np.mean([_origin(sim, bodies[name], x)[0] for name in knees]))
 
 
-def _pitching(kin: Kinematics, bodies: dict[str, Joint], body: str, q: Array) -> list[str]:
+def _pitching(kin: Kinematics, bodies: dict[str, Joint], body: str, q: Floats) -> list[str]:
     """Joints from the base to a body whose axis is nearly y, by the names of the bodies they carry."""
     mech, out = kin.mechanism, []
     J = kin.jacobian(body, q)[3:]
@@ -240,7 +240,7 @@ def _pitching(kin: Kinematics, bodies: dict[str, Joint], body: str, q: Array) ->
     return out[::-1]
 
 
-def _origin(sim: Simulator, joint: Joint, x: Array) -> Array:
+def _origin(sim: Simulator, joint: Joint, x: Floats) -> Floats:
     """Place of the joint point on the child of a joint."""
     i = sim.mechanism.body_names.index(joint.child)
     z = sim.body_states(x[: sim.nq], np.zeros(sim.nv))[i]

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.gaits.biped import balanced
 from dojo_opt.gaits.feet import Feet
@@ -20,8 +20,7 @@ from dojo_opt.gaits.gait import Gait, assemble, check_length
 from sim.mechanism import checks
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["Gait", "bound", "hop", "jump", "pace", "stand", "trot", "turn", "walk"]
 
@@ -262,7 +261,7 @@ def jump(
     return assemble(sim, "jump", base, feet, contact, names=soles.names)
 
 
-def _jump_path(t: Array, ends: Array, distance: float, crouch: float, height: float) -> tuple[Array, Array]:
+def _jump_path(t: Floats, ends: Floats, distance: float, crouch: float, height: float) -> tuple[Floats, Floats]:
     """Base forward and up [m] over time: cosine, constant acceleration, parabola, and the same backwards."""
     rise = np.zeros_like(t)
     half = 0.5 * (ends[2] + ends[3])
@@ -292,7 +291,7 @@ def _check_legs(call: str, sim: Simulator) -> None:
         raise ValueError(f"{call}(sim): expected a robot with legs on a floating base, got {sim.mechanism!r}")
 
 
-def _ground(sim: Simulator) -> Array:
+def _ground(sim: Simulator) -> Floats:
     """(k, 3) feet of the neutral state, put onto the ground."""
     feet = Feet(sim)
     places = feet.positions(sim.neutral())
@@ -363,7 +362,7 @@ def _periodic(
     return assemble(sim, name, base, targets, pattern.contact(t), names=feet.names)
 
 
-def _offsets(offsets: dict[tuple[bool, bool], float], places: Array, bodies: Sequence[str]) -> Array:
+def _offsets(offsets: dict[tuple[bool, bool], float], places: Floats, bodies: Sequence[str]) -> Floats:
     """(k,) when each contact comes down, with those of its body, which is a foot: by left of two feet, by front and
     left of four, in turn along each side of more.
     """
@@ -380,7 +379,7 @@ def _offsets(offsets: dict[tuple[bool, bool], float], places: Array, bodies: Seq
     return np.array([offsets[bool(x), bool(y)] for x, y in zip(front, left, strict=True)])[owner]
 
 
-def _attitude(yaw: Array, pitch: Array, roll: Array) -> Array:
+def _attitude(yaw: Floats, pitch: Floats, roll: Floats) -> Floats:
     """Quaternions (n, 4) of a turn about z, then y, then x, each in the axes of the one before."""
     (a, b, c), (d, e, f) = (np.cos([yaw / 2, pitch / 2, roll / 2]), np.sin([yaw / 2, pitch / 2, roll / 2]))
     return np.stack(

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.identification.windows import Window
 from sim.mechanism import checks
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["DelayedSpace"]
 

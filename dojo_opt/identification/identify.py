@@ -23,7 +23,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.identification.delayed_space import DelayedSpace
 from dojo_opt.identification.normal_equations import NormalEquations
@@ -36,8 +36,7 @@ from sim.mechanism.short_repr import short_table
 from sim.simulator.results import Trajectory
 from sim.simulator.simulator import Simulator
 from solvers.status import MESSAGES, Status
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["Identified", "IdentifyOptions", "identify"]
 

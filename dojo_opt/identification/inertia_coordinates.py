@@ -13,11 +13,9 @@ of which none exceeds the sum of the others.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism import checks
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 SIZE = 10
 LABELS = ("a", "d0", "d1", "d2", "s0", "s1", "s2", "t0", "t1", "t2")

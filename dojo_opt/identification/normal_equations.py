@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.identification.windows import WindowErrors
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["NormalEquations"]
 

@@ -7,13 +7,13 @@ from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.identification import inertia_coordinates
 from sim.mechanism import checks
 from sim.simulator.simulator import Simulator
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
 Chart = Callable[[Floats], tuple[Floats, Floats]]  # coordinates -> values of parameters, and their derivative
 
 _VECTORS = ("orientation", "axis", "contact_normal")  # whose derivatives are those from where they have come to

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.planning.manifold import tangent_layout
 from sim.mechanism import checks
@@ -19,9 +18,7 @@ from sim.simulator.derivative_results import Linearization
 from sim.simulator.results import Trajectory, states_and_inputs
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Floats, Integers
 
 __all__ = ["Window", "WindowErrors", "cut_windows", "difference_slopes", "slopes_along"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.io.urdf.inertia import RigidInertia, combined
 from sim.mechanism.body import Body
@@ -17,8 +17,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pose import Pose, quaternion, roll_pitch_yaw
 from sim.mechanism.shapes import Capsule, Shape
 from sim.mechanism.stance import gaps
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 LINK_BYTES = 20_000.0  # of memory, of a link as a part and in the arrays of kernels
 _PAD = 0.04  # [m] radius of a ball that stands for a link of 1 kg

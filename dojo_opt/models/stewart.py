@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.models.links import from_z
@@ -14,8 +14,7 @@ from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Cylinder
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 @checked_numbers("models")

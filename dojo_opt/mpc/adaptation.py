@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.identification.windows import slopes_along
@@ -28,9 +28,7 @@ from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.adjustable_simulator import AdjustableSimulator
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix, Vector
 
 _ROUNDING = 1e-9  # [s]
 _OUTLIER = 2.0  # standard deviations beyond which an innovation counts less, and a change of the estimate is shortened

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.mpc.adaptation import ParameterEstimator
 from dojo_opt.mpc.delay import Delay, Prediction
@@ -31,10 +31,7 @@ from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.adjustable_simulator import AdjustableSimulator
 from solvers.status import Status
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
+from solvers.types import Matrix, Stack, Vector
 
 _SCALES = (1.0, 0.5, 0.0)  # of the gains of the rollouts that guess="feedback" chooses from
 _ROUNDING = 1e-9  # [s] times are sums of floating-point steps

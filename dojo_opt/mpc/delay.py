@@ -6,12 +6,10 @@ from collections import deque
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.mpc.measurement import Measurement
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 _PREDICTION = 5e-3  # longest step of the prediction [s]
 _HARD = 1e-6  # [N s m] a robot does not hover: at 1e-3, as in plans, a foot under 20 N would by 10 mm in such steps

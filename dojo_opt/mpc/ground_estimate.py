@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.planning.manifold import cross
 from dojo_opt.plant.ground_plane import GroundPlane
 from sim.model.state_columns import BodyState
 from sim.simulator.adjustable_simulator import AdjustableSimulator
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
+from solvers.types import Matrix, Stack, Vector
 
 _TOUCHING = 5e-3  # gap of a contact that counts as touching [m]
 _PLANNED = 1e-2  # planned gap of a contact that is meant to stand [m]

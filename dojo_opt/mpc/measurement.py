@@ -5,12 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 _OFF = 0.5  # of the interval: a sample further from its beginning says little about its mean velocity
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.planning.component_names import chosen_components
 from dojo_opt.planning.problem import Problem
@@ -14,10 +14,8 @@ from dojo_opt.planning.term import PickTerm, StateTerm
 from dojo_opt.plant.ground_plane import GroundPlane
 from sim.mechanism import checks
 from sim.simulator.simulator import Simulator
+from solvers.types import Integers, Matrix, Vector
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Moving = Callable[[Any], ArrayLike]  # times (n,) [s] -> rows (n, nx) or (n, nu)
 
 _ROUNDING = 1e-9  # laps: times are sums of floating-point steps

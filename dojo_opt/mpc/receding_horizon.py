@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.mpc.moving_reference import References
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.planning.term import PickTerm, StateTerm, Term
-
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix
 
 __all__ = ["shift_multipliers", "tail"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.planning.manifold import tangent_layout
@@ -13,9 +13,7 @@ from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.model.model import InputKind
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Integers, Vector
 
 __all__ = ["ModelServo", "Servo"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.planning.component_names import chosen_components
 from dojo_opt.plant.ground_plane import GroundPlane
@@ -19,10 +19,8 @@ from sim.mechanism.short_repr import short_table
 from sim.simulator.results import Contacts, Interrupted
 from sim.simulator.simulator import Simulator
 from solvers.status import MESSAGES, Status
+from solvers.types import Integers, Matrix, Vector
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Controller = Callable[[float, Vector], ArrayLike]
 
 __all__ = ["ClosedLoop", "closed_loop", "steps_of"]

@@ -10,7 +10,6 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.planning.executors import check_executor, results_in_order
 from dojo_opt.plant.closed_loop import closed_loop, steps_of
@@ -21,8 +20,8 @@ from sim.mechanism.checks import whole_number
 from sim.mechanism.memory_limit import room_for
 from sim.mechanism.short_repr import short_repr, short_table
 from sim.simulator.results import Interrupted
+from solvers.types import Vector
 
-Vector = NDArray[np.float64]
 Sampler = Callable[[np.random.Generator], Perturbation]
 
 _RUN = 2000.0  # bytes of the objects that keep a run

@@ -17,9 +17,7 @@ from sim.mechanism.short_repr import short_repr
 from sim.mechanism.terrain import Terrain
 from sim.model.state_columns import BaseState
 from sim.simulator.contact_settings import with_contacts
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix, Vector
 
 __all__ = ["Perturbation", "Push"]
 
@@ -176,7 +174,7 @@ class Perturbation:
             for axis, force in zip("xyz", np.eye(3), strict=True):
                 inputs.append(Input(body=name, force=force, name=f"push {name} {axis}"))
         changed = replace(mechanism, bodies=bodies, joints=joints, contacts=contacts, inputs=inputs)
-        changed = changed if self.terrain is None else changed.on(self.terrain)
+        changed = changed if self.terrain is None else changed.with_terrain(self.terrain)
         return changed if self.friction is None else with_contacts(changed, "friction", self.friction)
 
     def push_forces(self, mechanism: Mechanism, begin: float, end: float) -> Vector:

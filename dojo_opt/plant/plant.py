@@ -6,7 +6,7 @@ from collections import deque
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.plant.perturbation import Perturbation
@@ -17,8 +17,7 @@ from sim.mechanism.shapes import rotation_matrix
 from sim.model.state_columns import BodyState
 from sim.simulator.results import StepResult
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 __all__ = ["Plant"]
 

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.short_repr import short_repr
 from solvers.status import Status
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 __all__ = ["Tick", "milliseconds"]
 

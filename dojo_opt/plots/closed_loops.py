@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.plant.monte_carlo import MonteCarlo
@@ -18,12 +17,12 @@ from dojo_opt.plant.tick import Tick, milliseconds
 from dojo_opt.plots.axes import finish, plain_ticks, units
 from dojo_opt.plots.trajectory import controls, state, velocities
 from dojo_opt.viewer.motion import motion
+from solvers.types import Matrix
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Matrix = NDArray[np.float64]
 
 __all__ = ["base_height", "base_path", "closed_loop", "study", "survival", "tick_times", "tracking"]
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dojo_opt.plots.axes import finish, panel
-from dojo_opt.viewer.motion import Array, Motion, motion
+from dojo_opt.viewer.motion import Motion, motion
 from sim.simulator.simulator import Simulator
+from solvers.types import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,7 +58,7 @@ def _loaded(m: Motion) -> Any:
     return m.normal_force > _LOADED * m.normal_force.max(initial=1e-12)
 
 
-def _edges(m: Motion) -> Array:
+def _edges(m: Motion) -> Floats:
     """Bounds of the simulation steps [s]."""
     return np.concatenate([[0.0], m.contact_time])
 

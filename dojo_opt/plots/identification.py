@@ -8,18 +8,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.identification.identify import Identified
 from dojo_opt.identification.windows import Window
 from dojo_opt.plots.axes import finish
 from sim.simulator.results import Trajectory
+from solvers.types import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 _CURVES = 3  # coordinates that are drawn: those that move most
 _NAMED = 14  # parameters whose names fit beside the correlations

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from dojo_opt.plots.axes import shade
-from dojo_opt.viewer.motion import Array, Motion
+from dojo_opt.viewer.motion import Motion
 from sim.mechanism.mechanism import Mechanism
+from solvers.types import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,7 +80,7 @@ def stands(m: Motion, branch: Branch) -> list[tuple[float, float]]:
     return [(float(edges[a]), float(edges[b])) for a, b in zip(changes[::2], changes[1::2], strict=True)]
 
 
-def joint_panel(m: Motion, branch: Branch, values: list[Array], ax: Axes) -> Axes:
+def joint_panel(m: Motion, branch: Branch, values: list[Floats], ax: Axes) -> Axes:
     """Coordinates of the joints of a branch; its stances are shaded, limits nearby are dashed."""
     for dof, label in zip(branch.dofs, branch.labels, strict=True):
         ax.plot(m.time, values[dof], label=label)

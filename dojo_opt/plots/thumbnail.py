@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.joint import WORLD
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Solid, rotation_matrix
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _VIEW = np.radians((30.0, 18.0))  # azimuth and elevation of the camera
 _FILL, _EDGE, _BONE, _CONTACT, _GROUND = "#b9cde4", "#33557a", "#8a8f99", "#c8442d", "#dddddd"

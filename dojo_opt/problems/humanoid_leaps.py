@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt import models
 from dojo_opt.constraint import Goal
@@ -20,8 +19,7 @@ from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.simulator.simulator import Simulator
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["humanoid_leap"]
 
@@ -90,14 +88,14 @@ def humanoid_leap(
     )
 
 
-def _moved(x: Array, ahead: float, up: float) -> Array:
+def _moved(x: Floats, ahead: float, up: float) -> Floats:
     """The state (nx,) with the base so far [m] ahead and up."""
     out = x.copy()
     out[[0, 2]] += ahead, up
     return out
 
 
-def _weights(legs: Legs, sim: Simulator) -> Array:
+def _weights(legs: Legs, sim: Simulator) -> Floats:
     """(ndx,) weights per second of squares, in units of the robot's height and time."""
     joints, size = np.ones(sim.nv - 6), legs.size
     place = np.array([_PLACE, _PLACE, _UP]) / size**2

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt import models
 from dojo_opt.constraint import Goal
@@ -19,8 +18,7 @@ from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.memory_limit import check_room
 from sim.simulator.simulator import Simulator
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["leap"]
 
@@ -98,7 +96,7 @@ def leap(
     )
 
 
-def _moved(x: Array, ahead: float, up: float) -> Array:
+def _moved(x: Floats, ahead: float, up: float) -> Floats:
     """The state (nx,) with the base so far [m] ahead and up."""
     out = x.copy()
     out[[0, 2]] += ahead, up

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt import gaits
 from dojo_opt.gaits.biped import balanced
@@ -22,8 +22,7 @@ from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 # of a robot as high as the A1: lengths go with the height, times and speeds with its root
 _PERIOD, _SPEED, _LIFT = 0.6, 0.2, 0.04  # of a trot [s], [m/s], [m]
@@ -272,7 +271,7 @@ def _deepest(sim: Simulator, height: float) -> float:
     return float((1.0 - low) * height)
 
 
-def _lowered(sim: Simulator, by: Array) -> tuple[Array, Array]:
+def _lowered(sim: Simulator, by: Floats) -> tuple[Floats, Floats]:
     """Poses (n, 7) of the base, lower by so much, and places (n, k, 3) of the feet, which stand.
 
     The centre of mass of a robot on flat feet stays over their middle: no leg before or behind keeps it from falling.

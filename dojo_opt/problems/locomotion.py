@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt import gaits, models
 from dojo_opt.constraint import Goal, Periodic
@@ -20,8 +20,7 @@ from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.simulator.simulator import Simulator
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["bound", "follow", "jump", "pace", "trot", "turn", "walk"]
 
@@ -108,20 +107,20 @@ def follow(
     )
 
 
-def weights(sim: Simulator, place: ArrayLike, attitude: float, angle: float) -> Array:
+def weights(sim: Simulator, place: ArrayLike, attitude: float, angle: float) -> Floats:
     """(ndx,) weights of squares: base place and attitude, joint angles, then their velocities."""
     legs = sim.nv - 6
     pose = [np.broadcast_to(place, 3), np.full(3, attitude), np.full(legs, angle)]
     return np.concatenate([*pose, np.full(6, VELOCITY), np.full(legs, RATE)])
 
 
-def standing(sim: Simulator, feet: tuple[str, ...] | None = None) -> tuple[Array, Array]:
+def standing(sim: Simulator, feet: tuple[str, ...] | None = None) -> tuple[Floats, Floats]:
     """State and torques of a standing robot at the first smoothing of the planner."""
     on_feet = replace(sim.mechanism, contacts=Feet(sim, feet).contacts)
     return equilibrium(sim.replace(mechanism=on_feet, kappa=CONTINUATION[0].kappa_eval))
 
 
-def _stride(sim: Simulator, reference: Array) -> Array:
+def _stride(sim: Simulator, reference: Floats) -> Floats:
     """(ndx,) displacement of the reference over its period: a translation of the base."""
     stride = sim.difference(reference[-1], reference[0])
     if np.abs(stride[2:]).max() > 1e-6:

@@ -24,8 +24,7 @@ from sim.mechanism.shapes import Solid, Sphere
 from sim.simulator.inverse_kinematics import ik
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["push"]
 
@@ -135,7 +134,7 @@ def _arm(arm: Mechanism | Simulator, frame: str | None, offset: ArrayLike, time_
     return kin
 
 
-def _holding(arm: Simulator, q: Array) -> Array:
+def _holding(arm: Simulator, q: Floats) -> Floats:
     """(n, nu) inputs within their limits that hold the arm against gravity at coordinates (n, nq) [N m]."""
     resting = np.concatenate([q, np.zeros((len(q), arm.nv))], axis=1)
     held = np.linalg.lstsq(input_map(arm), potential_gradient(arm, resting).T, rcond=None)[0].T
@@ -150,20 +149,20 @@ def _hand(mech: Mechanism) -> str:
     return max(mech.body_names, key=lambda name: depth[name])
 
 
-def _heading(forward: Array) -> list[float]:
+def _heading(forward: Floats) -> list[float]:
     """The quaternion that turns x to a level direction (3,)."""
     half = 0.5 * float(np.arctan2(forward[1], forward[0]))
     return [np.cos(half), 0.0, 0.0, np.sin(half)]
 
 
-def _half(body: Body, direction: Array) -> float:
+def _half(body: Body, direction: Floats) -> float:
     """How far the shapes of a body reach in a direction (3,) from its centre of mass [m]."""
     if not body.shapes:
         raise ValueError(f"{_CALL}(object): body {body.name!r} has no shape")
     return max(_reach(shape, direction) for shape in body.shapes)
 
 
-def _reach(shape: Solid, direction: Array) -> float:
+def _reach(shape: Solid, direction: Floats) -> float:
     """How far a shape on its body reaches in a direction (3,) [m]."""
     stance = shape.stance()
     if stance is None:
@@ -171,7 +170,7 @@ def _reach(shape: Solid, direction: Array) -> float:
     return float((shape.place(stance.points) @ direction).max()) + stance.radius
 
 
-def _ahead(kin: Kinematics, way: Array) -> list[Array]:
+def _ahead(kin: Kinematics, way: Floats) -> list[Floats]:
     """Points of the ground before the base, from which an object that moves by `way` (3,) stays within reach."""
     mech = kin.mechanism
     joint_of = {joint.child: joint for joint in mech.joints}
@@ -187,7 +186,7 @@ def _ahead(kin: Kinematics, way: Array) -> list[Array]:
     return [base + share * reach / far * way for share in _AHEAD if share * reach + far < reach]
 
 
-def _reached(kin: Kinematics, q: Array, tables: list[Array], hand: Array) -> tuple[Array, Array]:
+def _reached(kin: Kinematics, q: Floats, tables: list[Floats], hand: Floats) -> tuple[Floats, Floats]:
     """The first of some points (3,) from which the hand (n, 3) can go its way, and the coordinates (n, nq) there."""
     errors = []
     for below in tables:
@@ -198,7 +197,7 @@ def _reached(kin: Kinematics, q: Array, tables: list[Array], hand: Array) -> tup
     raise errors[0]
 
 
-def _follow(kin: Kinematics, q: Array, tips: Array) -> Array:
+def _follow(kin: Kinematics, q: Floats, tips: Floats) -> Floats:
     """(n, nq) coordinates of the arm with its ball at the places (n, 3), each from those before."""
     out = []
     for place in tips:
@@ -212,7 +211,7 @@ def _follow(kin: Kinematics, q: Array, tips: Array) -> Array:
     return np.array(out)
 
 
-def _scene(kin: Kinematics, thing: Body, pose: Array, radius: float, table: float) -> Simulator:
+def _scene(kin: Kinematics, thing: Body, pose: Floats, radius: float, table: float) -> Simulator:
     """The arm, the object on the table, and the ball between them."""
     mech = kin.mechanism
     rough = max((shape.friction for shape in thing.shapes if shape.friction is not None), default=_ROUGH)
@@ -230,7 +229,7 @@ def _scene(kin: Kinematics, thing: Body, pose: Array, radius: float, table: floa
     return Simulator(mech.add(alone).with_collisions(*pairs), time_step=kin.sim.time_step, kappa=PLANNED)
 
 
-def _states(sim: Simulator, hands: Array, places: Array) -> Array:
+def _states(sim: Simulator, hands: Floats, places: Floats) -> Floats:
     """States (n - 1, nx) along coordinates of the arm (n, nq) and places of the object (n, 3)."""
     x = np.tile(sim.neutral(), (len(hands), 1))
     x[:, : hands.shape[1]] = hands
@@ -241,7 +240,7 @@ def _states(sim: Simulator, hands: Array, places: Array) -> Array:
     return x
 
 
-def _weights(arm: int, far: float) -> Array:
+def _weights(arm: int, far: float) -> Floats:
     """(ndx,) weights of squares of a scene with a given number of degrees of freedom of the arm."""
     place = [*[_PLACE / far**2] * 3, *[_TURN] * 3]
     return np.array([_ANGLE] * arm + place + [_RATE] * arm + [_RATE * w for w in place])
@@ -252,6 +251,6 @@ def _ends(arm: int) -> NDArray[np.int64]:
     return np.concatenate([arm + np.array([0, 1, 5]), np.arange(arm + 6, 2 * (arm + 6))])
 
 
-def _smooth(t: Array) -> Array:
+def _smooth(t: Floats) -> Floats:
     """0 at 0, 1 at 1, with two derivatives zero at both: 10 t^3 - 15 t^4 + 6 t^5."""
     return np.asarray(t**3 * (10.0 - 15.0 * t + 6.0 * t**2))

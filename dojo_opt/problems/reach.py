@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.constraint import Frame, Goal, SpeedLimits
 from dojo_opt.cost import Effort, Tracking
@@ -19,8 +19,7 @@ from sim.mechanism.memory_limit import check_room
 from sim.simulator.inverse_kinematics import ik
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
-
-Array = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["reach"]
 
@@ -120,7 +119,7 @@ def _simulator(arm: Any, time_step: float) -> Simulator:
     return Simulator(arm, time_step=time_step)
 
 
-def _target(target: Any) -> tuple[Array, Array | None]:
+def _target(target: Any) -> tuple[Floats, Floats | None]:
     """Place and quaternion."""
     pair = isinstance(target, tuple | list) and len(target) == 2
     place, turn = target if pair else (target, None)
@@ -128,7 +127,7 @@ def _target(target: Any) -> tuple[Array, Array | None]:
     return at, None if turn is None else np.asarray(checks.quaternion("problems.reach(target)", turn))
 
 
-def _start(sim: Simulator, given: ArrayLike | None) -> Array:
+def _start(sim: Simulator, given: ArrayLike | None) -> Floats:
     """The first state."""
     if given is None:
         return sim.neutral()
@@ -145,13 +144,13 @@ def _start(sim: Simulator, given: ArrayLike | None) -> Array:
     return x
 
 
-def _path(sim: Simulator, first: Array, q: Array, horizon: int, substeps: int) -> Array:
+def _path(sim: Simulator, first: Floats, q: Floats, horizon: int, substeps: int) -> Floats:
     """(T + 1, nx) states on the smoothest way from the start to coordinates q, at rest at both ends."""
     last = np.concatenate([q, np.zeros(sim.nv)])
     way = sim.difference(last, first)[: sim.nv]
     step = 1.0 / (horizon * substeps)
 
-    def along(share: Array) -> Array:
+    def along(share: Floats) -> Floats:
         return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
 
     share = np.arange(horizon + 1) / horizon

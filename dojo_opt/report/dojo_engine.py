@@ -11,8 +11,7 @@ from dojo_opt.report.engine import Run, clocked, held, nodes, observe
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.results import SimulationError
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _PIECE = 10_000  # steps per rollout: a long run keeps its samples, not all its states
 

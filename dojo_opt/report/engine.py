@@ -13,8 +13,7 @@ from sim.dynamics import maximal_energy
 from sim.mechanism.mechanism import Mechanism
 from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 class Run(NamedTuple):

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.report.engine import Run
 from sim.mechanism.mechanism import Mechanism
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 def gaps(mechanism: Mechanism, run: Run) -> Floats:

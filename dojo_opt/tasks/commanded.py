@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.gaits.gait import Gait
 from dojo_opt.mpc.moving_reference import SampledReference
 from sim.mechanism import checks
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
+from solvers.types import Matrix, Vector
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Maker = Callable[[Simulator, Vector], Gait]
 
 __all__ = ["CommandedGait", "SteeredGait"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt import models
 from dojo_opt.cost import Effort, ResidualCost, Slip, Tracking
@@ -18,9 +18,7 @@ from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix, Vector
 
 __all__ = ["GaitWeights", "Lead", "free_gait_mpc"]
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt import models
 from dojo_opt.cost import Effort, Tracking
@@ -18,9 +18,7 @@ from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix, Vector
 
 __all__ = ["Hopping", "hopper_mpc"]
 

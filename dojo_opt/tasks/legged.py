@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt import gaits
 from dojo_opt.cost import Effort, Tracking
@@ -20,8 +20,7 @@ from dojo_opt.tasks.commanded import CommandedGait, SteeredGait
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 __all__ = ["legged_mpc"]
 

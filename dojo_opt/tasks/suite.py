@@ -21,8 +21,7 @@ from sim.mechanism.overlaps import overlaps
 from sim.mechanism.short_repr import short_repr
 from sim.mechanism.stance import gaps
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 __all__ = ["TaskOutcome", "SuiteTask", "held", "lifted", "quadratic", "servo_effort", "timed"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt import gaits, models
 from dojo_opt.cost import Effort, Tracking
@@ -17,8 +17,7 @@ from dojo_opt.planning.problem import Problem
 from sim.mechanism.checks import whole_number
 from sim.mechanism.terrain import Terrain
 from sim.simulator.simulator import Simulator
-
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix
 
 __all__ = ["quadruped_mpc"]
 
@@ -68,7 +67,7 @@ def quadruped_mpc(
     advance[6:] = 0.0  # joints and velocities come round
     reference: Any = SampledReference(fine.time, fine.x, sim, advance).with_mean_velocities(sim.time_step)
     if terrain is not None:
-        sim, reference = sim.replace(mechanism=sim.mechanism.on(terrain)), _OnTerrain(reference, terrain)
+        sim, reference = sim.replace(mechanism=sim.mechanism.with_terrain(terrain)), _OnTerrain(reference, terrain)
     torque = gaits.trot(level, speed=speed, period=period, cycles=1, step_height=step_height).torques()
     held = SampledReference(
         sim.time_step * np.arange(len(torque) + 1), np.vstack([torque, torque[:1]]), cycle=np.zeros(sim.nu)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.io.meshes.shading import clustered, shaded
 from sim.io.meshes.triangles import MeshError, TriangleMesh, read_mesh
@@ -15,8 +14,7 @@ from sim.mechanism.joint import WORLD
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Capsule, Primitive, Solid, Sphere, rotation_matrix
 from sim.mechanism.visual import STEEL, Visual
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 TRIANGLES = 36_000  # of a picture at most: about 2 MB of a page
 _FINEST, _COARSER = 500.0, 1.4  # cells along the longest side of the robot, and the growth of a cell

@@ -19,9 +19,7 @@ from sim.mechanism.short_repr import short_repr
 from sim.model.state_columns import BodyState
 from sim.simulator.results import Trajectory
 from sim.simulator.simulator import Simulator
-from solvers.types import Vector
-
-Array = Vector
+from solvers.types import Floats
 
 
 @dataclass(frozen=True)
@@ -44,17 +42,17 @@ class Motion:
     """
 
     mechanism: Mechanism
-    time: Array
-    x: Array
-    u: Array
-    position: Array
-    quaternion: Array
-    contact_time: Array
-    normal_force: Array
-    friction_force: Array
-    force: Array
-    point: Array
-    goal: Array | None = None
+    time: Floats
+    x: Floats
+    u: Floats
+    position: Floats
+    quaternion: Floats
+    contact_time: Floats
+    normal_force: Floats
+    friction_force: Floats
+    force: Floats
+    point: Floats
+    goal: Floats | None = None
 
     @cached_property
     def pieces(self) -> dict[str, list[Piece]]:
@@ -62,7 +60,7 @@ class Motion:
         return pieces(self.mechanism)
 
     @cached_property
-    def bounds(self) -> tuple[Array, Array]:
+    def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest coordinates (3,) of the drawing of the first pose [m]."""
         turn = [rotation_matrix(q) for q in self.quaternion[0]]
         names = self.mechanism.body_names
@@ -78,7 +76,7 @@ class Motion:
 
     __repr__ = short_repr
 
-    def points(self, body: int, point: Any) -> Array:
+    def points(self, body: int, point: Any) -> Floats:
         """Path of a point of a body.
 
         Args:
@@ -138,7 +136,7 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
     )
 
 
-def _goal(result: Any, sim: Simulator) -> Array | None:
+def _goal(result: Any, sim: Simulator) -> Floats | None:
     """(nx,) target of the last knot of a plan, if it has a `Goal` there; coordinates that it leaves free as planned."""
     problem: Any = getattr(result, "problem", None)
     for spec in () if problem is None else problem.specs[1]:
@@ -175,12 +173,12 @@ def _standing(mech: Mechanism) -> Motion:
     )
 
 
-def _contact_forces(sim: Simulator, x: Array, u: Array, substeps: int) -> tuple[Array, ...]:
+def _contact_forces(sim: Simulator, x: Floats, u: Floats, substeps: int) -> tuple[Floats, ...]:
     """Forces of every simulation step, as `_of`; a knot spans `substeps` of them."""
     knots = [_of(sim.rollout(x[t], np.tile(u[t], (substeps, 1)), throw=True).contacts) for t in range(len(u))]
     return tuple(np.concatenate(parts) for parts in zip(*knots, strict=True))
 
 
-def _of(contacts: Any) -> tuple[Array, ...]:
+def _of(contacts: Any) -> tuple[Floats, ...]:
     """Normal and friction force (N, k), the force and its point of action (N, k, 3)."""
     return contacts.normal_force, contacts.friction_force, contacts.force, contacts.point

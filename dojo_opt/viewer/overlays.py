@@ -5,13 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.viewer import drawing
 from dojo_opt.viewer.key_frames import FRAMES, sparse
 from dojo_opt.viewer.motion import Motion
-
-Floats = NDArray[np.float64]
 
 _BARS = 64  # forces at most, of the contacts that carry most
 _LEAST = 0.01  # of the weight: smaller forces are not drawn

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from dojo_opt.viewer.motion import Array, Motion
+from dojo_opt.viewer.motion import Motion
+from solvers.types import Floats
 
 __all__ = ["page"]
 
@@ -125,7 +126,7 @@ def spacing(motions: Sequence[Motion]) -> float:
     return max(float((m.bounds[1] - m.bounds[0])[1] + np.ptp(m.position[..., 1])) for m in motions) + _ROOM
 
 
-def _path(m: Motion) -> tuple[Array, float]:
+def _path(m: Motion) -> tuple[Floats, float]:
     """The middle of the moving parts at even times (n, 3), and their radius [m].
 
     The camera does not move in a direction in which the parts stay within a radius.

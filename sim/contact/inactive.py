@@ -145,7 +145,7 @@ def _leave_out(model: Model, data: Data, options: StepOptions, c: int) -> float:
 
 @kernel
 def _radius_of_few(model: Model, options: StepOptions, c: int) -> float:
-    """Half gap a at which e of the contacts of a cluster is COUPLED, if all of its body were as near."""
+    """Half gap a at which e of a cluster's contacts is COUPLED, if all contacts of its body were as near."""
     p, h = model.cluster[c], options.h
     mu = p[Cluster.FRICTION]
     n = p[Cluster.CONTACTS] * options.kappa / COUPLED
@@ -263,7 +263,7 @@ def _came_near(model: Model, data: Data, c: int) -> bool:
 
 @kernel
 def _enlist_all(model: Model, data: Data) -> None:
-    """`active` and inactive_first anew."""
+    """Rebuild `active` and inactive_first."""
     data.active_ground_count[0] = 0
     data.inactive_count[0] = 0
     for c in range(model.contact_height.shape[0]):

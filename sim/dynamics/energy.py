@@ -187,7 +187,7 @@ def kinetic_energy(model: Model, data: Data, h: float, x: Vector) -> float:
 
 @kernel
 def gravity_energy(model: Model, pos: Matrix) -> float:
-    """Sum of -m g.x [J], of g the share that acts.   pos: (nbody, 3) positions of the bodies, or displacements."""
+    """Sum of -m g.x [J], with each share of g.   pos: (nbody, 3) positions of the bodies, or displacements."""
     energy = 0.0
     for i in range(pos.shape[0]):
         m = model.body_mass[i] * model.body_weight[i]

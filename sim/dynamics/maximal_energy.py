@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.model.model import Model
 from sim.model.state_columns import BodyState
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 def kinetic_energy(model: Model, z: Floats) -> Floats:

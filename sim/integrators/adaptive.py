@@ -47,7 +47,7 @@ from solvers.types import Vector
 NEAR = -1  # in place of a Status: a contact or limit is near at the end of the step
 
 _SOLVED = int(Status.SOLVED)
-_TOLERANCE_STEP = int(Status.TOLERANCE_STEP)
+_TOLERANCE_STEP = int(Status.ACCURACY_NOT_REACHED)
 _NOT_FINITE, _CONTACT_SUNK = int(Status.NOT_FINITE), int(Status.CONTACT_SUNK)
 _KINK, _KINKS = 0.05, 0.2  # error of a step with a kink, and of all in a step, in accuracies
 _INSTANT = 1e-13  # [s] between a landing and the node before it

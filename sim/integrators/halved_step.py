@@ -20,7 +20,7 @@ FAILED = 1e300
 _SOLVED = int(Status.SOLVED)
 _TOUCHING = 0.125  # gap of a contact that closes, in accuracies
 _PRESSED, _HELD = 8.0, 4.0
-# [m, rad] error that is not seen: the gap of a contact on the central path is as exact; that of a loop
+# [m, rad] invisible error: the gap of a contact on the central path is no more exact, nor that of a loop
 _NOISE, _CLOSED = 1e-10, 1e-12
 _OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes deeper ones, whatever its length
 _AHEAD = 1e-3  # [s] least length of the steps behind an impact whose velocities are compared

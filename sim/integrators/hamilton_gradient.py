@@ -121,7 +121,7 @@ def _tree_pairs(model: Model, data: Data, slopes: Slopes) -> None:
                 _pair(S, slopes, d, k, True)
                 _pair(S, slopes, k, d, False)
             p = model.body_parent[p]
-    for d in range(model.dof_body.shape[0]):  # the rows of free roots are others
+    for d in range(model.dof_body.shape[0]):  # free roots have other rows
         root = model.dof_body[d]
         while model.body_parent[root] >= 0:
             root = model.body_parent[root]

@@ -49,8 +49,8 @@ from solvers.types import Matrix, Vector
 _SOLVED = int(Status.SOLVED)
 _NOT_FINITE = int(Status.NOT_FINITE)
 _SINGULAR = int(Status.SINGULAR)
-_ANGULAR_STEP = int(Status.ANGULAR_STEP)
-_ENERGY_STEP = int(Status.ENERGY_STEP)
+_ANGULAR_STEP = int(Status.TURN_TOO_LARGE)
+_ENERGY_STEP = int(Status.ENERGY_GAIN)
 
 
 @kernel

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.mechanism.joint import Joint
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 def translation_axes(ntrans: int, axis: ArrayLike) -> Floats:

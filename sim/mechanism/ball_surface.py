@@ -8,11 +8,9 @@ By the envelope theorem, dF by anything that f depends on is that of f where the
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.spline import spline, spline_values
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 def raised(coefficients: Floats, spacing: Floats, here: Floats, radius: float) -> tuple[Floats, Floats]:

@@ -30,8 +30,8 @@ class Body:
         inertia: (3,) principal moments or (3, 3) matrix, about the centre of mass, body axes [kg m^2] (default None:
             that of `shape`).
         shape: shape for inertia, collisions and drawings, or several (default None: no shape). All of them can touch
-            the ground (`Mechanism.on`), obstacles and other bodies, each with its own friction and restitution. Several
-            shapes share the mass in proportion to their volumes; `shapes` has them as a tuple.
+            the ground (`Mechanism.with_terrain`), obstacles and other bodies, each with its own friction and
+            restitution. Several shapes share the mass in proportion to their volumes; `shapes` has them as a tuple.
         visuals: picture of the body, if it differs from the shapes (default none).
         gravity_compensation: compensated share of its weight: 1 for a body that floats, such as the link of an arm
             whose drives carry it, 0 for none (default 0).

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _MOST_LISTED = 20  # words in a message
 _LONG = 8192  # numbers; OpenBLAS divides products of 10,000 and more among threads
@@ -32,7 +32,7 @@ def shown(value: Any) -> str:
 def floats(call: str, value: Any) -> Floats:
     """`value` as a C-contiguous float64 array; complex numbers, text and ragged lists are refused.
 
-    One that must not be written to is copied: compiled code would take it for another type, and be compiled again.
+    A read-only array is copied: kernels would be compiled again for it, because it is another type.
     """
     if type(value) is np.ndarray and value.dtype == np.float64 and value.flags.carray:
         return value
@@ -114,7 +114,7 @@ def points(call: str, value: Any) -> Floats:
 def number(
     call: str, value: Any, at_least: float | None = None, above: float | None = None, *, finite: bool = True
 ) -> float:
-    """`value` as a float within the stated bound, finite unless that is not asked for."""
+    """`value` as a float within the bounds; an infinite one only with finite=False."""
     if type(value) is float and isfinite(value):
         out = value
     elif ndim(call, value) != 0:
@@ -305,7 +305,7 @@ def whole_number(call: str, value: Any, least: int = 1) -> int:
 
 
 def within_range(call: str, result: Any) -> Floats:
-    """A result of finite arguments, refused where it has overflowed."""
+    """A result of finite arguments; one that has overflowed is refused."""
     out = np.asarray(result)
     if not all_finite(out):
         raise ValueError(f"{call}: the result is not finite: an argument is too large")

@@ -42,8 +42,8 @@ class Collision:
         restitution: share of the normal velocity that an impact gives back, 0 to 1 (default None: the larger one of the
             two shapes, 0 where they have none).
         reach: gap beyond which the shapes do not act on one another [m]; below half of it, the contact law is
-            unchanged. Shapes farther apart than twice the reach cost next to nothing, and their contacts have a gap of
-            1e9 m in results (default None: an impulse kappa/gap at every distance).
+            unchanged. Shapes farther apart than twice the reach cost next to nothing, and their contacts have an
+            infinite gap in results (default None: an impulse kappa/gap at every distance).
 
     Raises:
         ValueError: for one body on both sides, an obstacle without a shape, or a value out of range.

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.shapes import Solid
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 def composite(shapes: Sequence[Solid], mass: float) -> tuple[Floats, Floats]:

@@ -29,7 +29,7 @@ class Contact:
         normal: (3,) outward normal of the ground, world axes (default z).
         height: height of the ground along its normal; of terrain, its rise [m] (default 0).
         name: name of the contact (default that of the body, numbered if the body has several).
-        terrain: ground that is not a half-space, see `dojo.Terrain`, and `Mechanism.on` for all contacts at once
+        terrain: ground that is not a half-space, see `dojo.Terrain`, and `Mechanism.with_terrain` for all contacts
             (default None: the half-space).
         restitution: share of the normal velocity that an impact gives back, 0 to 1, see sim/contact/restitution.py
             (default 0).

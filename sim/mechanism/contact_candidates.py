@@ -8,7 +8,6 @@ from itertools import groupby
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
@@ -17,8 +16,8 @@ from sim.mechanism.polytope import Polytope, hull_table
 from sim.mechanism.shapes import HalfSpace, Solid, String, rotation_matrix
 from sim.mechanism.signed_distance import SignedDistance
 from sim.model import shape_kinds
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
 End = tuple[int, Solid]  # body, -1 for the world, and shape
 
 

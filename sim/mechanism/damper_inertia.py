@@ -15,16 +15,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.pose import turn
 from sim.mechanism.shapes import rotation_matrix
 from sim.model.model import Model
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 BEND = 0.5  # [rad]
-_SINGULAR = 1e-13  # of the largest eigenvalue of a singular M: those below count as that
+_SINGULAR = 1e-13  # times the largest eigenvalue of M: with a smaller one M counts as singular
 
 
 class Bent(NamedTuple):

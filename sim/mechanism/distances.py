@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.level_set import LevelSet
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Floats, Integers
 
 _ROUNDS = 40  # of the search for a nearest point
 _NARROW_BAND = 3.0  # [cells] from the surface, where distances are to the level set itself, and not to its triangles

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.axes import translation_axes
 from sim.mechanism.joint import Joint
 from sim.mechanism.pose import HERE, Pose, turn
 from sim.mechanism.shapes import rotation_matrix
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 def body_poses(joints: Sequence[Joint], q: Floats) -> dict[str, Pose]:

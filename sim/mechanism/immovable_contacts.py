@@ -15,14 +15,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.contact import Contact
 from sim.mechanism.shapes import rotation_matrix
 from sim.model.model import Model
-from solvers.types import Integers
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats, Integers
 
 IDLE, SUNK = 1, 2
 _DEEP = 1e-8  # [m], the usual tolerance of a step

@@ -90,7 +90,7 @@ class Input:
 
 
 def check_servo(call: str, part: Input) -> None:
-    """Gains of servos on joints, and of nothing else."""
+    """Check that gains are given for servos, and that servos act on joints."""
     for field in ("stiffness", "damping"):
         value = checks.number(f"{call}, {field}=...)", getattr(part, field), at_least=0.0)
         object.__setattr__(part, field, value)

@@ -15,9 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mechanism.spline import spline_basis, spline_coefficients_along
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Floats, Integers
 
 _PARTS = 4  # of a cell along each axis, where its volume is counted
 _CHUNK = 20_000  # points at once

@@ -22,14 +22,14 @@ from sim.mechanism.input import Input
 from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.loop_joints import carried
 from sim.mechanism.naming import name_contacts, name_inputs
+from sim.mechanism.renamed import renamed
 from sim.mechanism.self_collisions import self_collisions
 from sim.mechanism.shape_contacts import shape_contacts
 from sim.mechanism.shapes import Solid, Sphere, rotation_matrix
 from sim.mechanism.terrain import Terrain
 from sim.mechanism.tree import check_axes, check_loops, check_masses, sort_tree
 from sim.mechanism.visual import Visual
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 @dataclass(frozen=True, repr=False)
@@ -246,7 +246,9 @@ class Mechanism:
         """
         return _added(self, other, pose, prefix, checks.name_or("Mechanism.add(name=...)", name, self.name))
 
-    def on(
+    on = renamed("with_terrain")
+
+    def with_terrain(
         self, terrain: Terrain, contacts: Sequence[str] | None = None, bodies: Sequence[str] = (), **options: Any
     ) -> Mechanism:
         """The same mechanism on other ground; its neutral state stands on it with the lowest contact.
@@ -502,8 +504,8 @@ def _with_obstacle(mech: Mechanism, shape: Solid, bodies: Sequence[str] | None, 
 def _on_terrain(
     mech: Mechanism, terrain: Terrain, contacts: Sequence[str] | None, bodies: Sequence[str], **options: Any
 ) -> Mechanism:
-    """See `Mechanism.on`."""
-    call = "Mechanism.on"
+    """See `Mechanism.with_terrain`."""
+    call = "Mechanism.with_terrain"
     if not isinstance(terrain, Terrain):
         raise ValueError(f"{call}(terrain): expected a Terrain, got {terrain!r}")
     names = [c.name for c in mech.contacts]

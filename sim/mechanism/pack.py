@@ -22,8 +22,6 @@ from sim.model.layout import Sizes, allocate_model
 from sim.model.model import InputKind, Law, Model
 from solvers.lanes import LANES
 
-Floats = NDArray[np.float64]
-
 _CONE = 0.0  # instead of the sign of a bound
 
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.model.model import Model
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 STIFFNESS = 1000.0  # largest e (inactive.py) of an omitted contact, in units of the tolerance
 

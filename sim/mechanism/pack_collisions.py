@@ -6,14 +6,12 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.contact_candidates import ContactCandidate, couples
 from sim.mechanism.mechanism import Mechanism
 from sim.model import shape_kinds
 from sim.model.model import Law, Model
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 def pack_collisions(mech: Mechanism, model: Model) -> None:
@@ -67,7 +65,7 @@ def tables_of(found: Sequence[ContactCandidate]) -> list[Floats]:
 
 
 def _pack_hulls(found: Sequence[ContactCandidate], model: Model) -> None:
-    """hull, and where in it the shapes of every point have theirs."""
+    """Fill the table of hulls, and the row at which the hulls of each point begin."""
     end, rows, starts = 0, [0, 0], {}
     for table in tables_of(found):
         starts[id(table)] = end

@@ -7,15 +7,14 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
 from sim.mechanism.shapes import Primitive, Solid, Stance, rotation_matrix
 from sim.mechanism.short_repr import short_repr
 from sim.model import shape_kinds
 from sim.model.shape_kinds import Size
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _PARALLEL = 1e-9  # difference of the normals of two facets in one plane
 _FLAT = 1e-9  # volume, relative to that of the box around the points, below which they span no body

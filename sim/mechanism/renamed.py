@@ -36,7 +36,7 @@ class renamed:
         warn_renamed(f"{kind}.{self._old}", f"{kind}.{self._new}")
         return getattr(instance, self._new)
 
-    def __set__(self, instance: Any, value: Any) -> None:  # with it, help() lists a name, and not a method
+    def __set__(self, instance: Any, value: Any) -> None:  # with it, help() lists an attribute, not a method
         raise AttributeError(f"{type(instance).__name__}.{self._old} is now {self._new}, and can only be read")
 
 

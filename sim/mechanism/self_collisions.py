@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
@@ -14,13 +13,12 @@ from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.pose import Pose
 from sim.mechanism.shapes import HalfSpace, Solid, String
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["self_collisions", "separation"]
 
 _ONE = 1e3  # weight of the convexity constraint against distances in units of the shapes
-_REACH = 0.01  # of the extent of a robot: its links act on one another from this gap on
+_REACH = 0.01  # times the extent of a robot: the gap below which its links act on one another
 _TOUCHING = 1e-5  # of the size of two shapes: nearer ones overlap
 
 

@@ -2,8 +2,8 @@
 
     sphere     itself          capsule    a ball at either end          box, polytope    its corners
 
-On a plane these are all there is to touch. On curved ground the rest of the surface touches nothing: a hump between
-two corners, or a ridge below an edge, goes into the shape. So it is for ground whose humps are wider than the shape.
+A plane touches nothing else. On curved ground the rest of the surface has no contacts: a hump between two corners, or
+a ridge below an edge, penetrates the shape. So use it on ground whose humps are wider than the shape.
 """
 
 from __future__ import annotations

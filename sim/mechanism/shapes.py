@@ -12,13 +12,12 @@ from math import hypot, inf, pi
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
 from sim.model import shape_kinds
 from sim.model.shape_kinds import Size
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 def rotation_matrix(quat: ArrayLike) -> Floats:

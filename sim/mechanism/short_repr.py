@@ -18,7 +18,7 @@ _ROWS = 50  # of a table
 
 
 def short_repr(self: Any) -> str:
-    """To be the `__repr__` of a dataclass or NamedTuple: fields by name, arrays and long lists by their size."""
+    """Use as the `__repr__` of a dataclass or NamedTuple: fields by name, arrays and long lists by their size."""
     names = [f.name for f in fields(self) if f.repr] if is_dataclass(self) else self._fields
     return f"{type(self).__name__}({', '.join(f'{name}={_brief(getattr(self, name))}' for name in names)})"
 

@@ -18,8 +18,8 @@ from sim.mechanism.shapes import Primitive, Solid, Stance, rotation_matrix
 from sim.mechanism.short_repr import short_repr
 from sim.model import shape_kinds
 from sim.model.shape_kinds import Size
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
 Field = Callable[[Floats], ArrayLike]
 
 _LEAST = 4  # values along each axis
@@ -27,7 +27,7 @@ _MARGIN = 3  # cells around a mesh
 _MOST = 1e8  # points of a grid: .8 GB
 _FINEST, _COARSEST = 1e-9, 1e6  # spacings [m]: beyond, squares of lengths lose their digits
 _STAND = 32  # points on which it stands
-_APART = 0.05  # of a cell, within which the balls around two of them are one
+_APART = 0.05  # of a cell: balls whose centres are nearer than this become one
 
 
 @few_positional

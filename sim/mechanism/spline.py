@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 def spline_coefficients(heights: ArrayLike) -> Floats:

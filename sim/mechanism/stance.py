@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.joint import WORLD
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import HalfSpace, rotation_matrix
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _CLEAR = 1e-9  # [m] above the ground: a gap of zero, or below by rounding, has no interior to start the solver in
 

@@ -15,7 +15,7 @@ from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
 from sim.mechanism.ball_surface import raised
@@ -23,8 +23,7 @@ from sim.mechanism.memory_limit import check_room
 from sim.mechanism.positional import few_positional
 from sim.mechanism.short_repr import short_repr
 from sim.mechanism.spline import spline, spline_coefficients, spline_gradient, spline_shares
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _EDGE = 16  # grid lines across an edge of a step
 _MARGIN = 8  # level grid lines around kinks: the waves of a spline fade by .27 per line
@@ -33,7 +32,7 @@ _MARGIN = 8  # level grid lines around kinks: the waves of a spline fade by .27 
 @few_positional
 @dataclass(frozen=True, eq=False)
 class Terrain:
-    """Ground for contacts: `mechanism.on(terrain)` for all, or Contact(..., terrain=...) for one.
+    """Ground for contacts: `mechanism.with_terrain(terrain)` for all, or Contact(..., terrain=...) for one.
 
     Derivatives by parameters of the heights follow by the chain rule. For a loss L and the rises of stairs:
 

@@ -19,7 +19,7 @@ _ALONG = 1e-9  # sine of the angle, and distance [m], below which two axes are o
 def check_loops(
     call: str, loops: Sequence[Joint], bodies: Sequence[Body], joints: Sequence[Joint]
 ) -> tuple[Joint, ...]:
-    """Joints that close a loop, after a look at their bodies and names."""
+    """The joints that close a loop; their bodies and names are checked."""
     names = dict.fromkeys(b.name for b in bodies)
     ends = {WORLD: None, **names}
     for j in loops:

@@ -46,7 +46,7 @@ class Visual:
     __repr__ = short_repr
 
     def _has_mesh(self) -> bool:
-        """Whether a mesh is given, by the path of its file."""
+        """Whether a mesh is given as the path of its file."""
         if isinstance(self.mesh, str) and not self.mesh:
             return False
         checks.path("Visual(mesh=...)", self.mesh)

@@ -7,7 +7,7 @@ from math import prod
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.integrators.feedback import FeedbackLaw
 from sim.integrators.rollout import UNIT
@@ -17,8 +17,7 @@ from sim.mechanism.memory_limit import check_room
 from sim.model.state_columns import BodyState
 from sim.simulator.engines.engine import CONTACT, REPORT, Engine
 from solvers.status import MESSAGES, Status
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _FLOAT = np.dtype(np.float64)
 _MANY = 10_000  # rows whose memory is looked at
@@ -77,7 +76,7 @@ class Arguments:
                 f"Simulator.{method}: leading axes {a.shape[:-1]} of {first[0]} and {b.shape[:-1]} of {second[0]} "
                 "do not broadcast"
             ) from None
-        # by rows: kernels would be compiled once more for read-only arrays, and for columns
+        # C order, writable: kernels would be compiled again for any other layout
         rows = [np.array(np.broadcast_to(m, (*lead, m.shape[-1])), order="C").reshape(-1, m.shape[-1]) for m in (a, b)]
         return rows[0], rows[1], lead
 
@@ -180,7 +179,7 @@ class Arguments:
             turn = np.linalg.norm(zs[..., BodyState.SPIN], axis=-1) * self.time_step
         for bad, why in (
             (np.abs(length - 1.0) > UNIT, "expected a unit quaternion"),
-            (turn >= np.pi, MESSAGES[Status.ANGULAR_STEP]),
+            (turn >= np.pi, MESSAGES[Status.TURN_TOO_LARGE]),
         ):
             if bad.any():
                 raise ValueError(

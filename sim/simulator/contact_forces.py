@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mechanism.short_repr import short_repr
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["GroundForces", "balanced", "least_forces"]
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.model.record_columns import ContactRow
 from sim.simulator.results import Contacts
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["ContactGroups"]
 

@@ -10,14 +10,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.results import Result
 from solvers.status import Status
-from solvers.types import Integers
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats, Integers
 
 __all__ = ["Gradient", "Jacobian", "Linearization"]
 

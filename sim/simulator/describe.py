@@ -145,7 +145,7 @@ def _far_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
 
 
 def _parts(mech: Mechanism, order: int, second_order: str) -> list[tuple[str, str]]:
-    """The parts of a step, and those that it omits."""
+    """The parts of a step, and the omitted ones."""
     nlimit = mechanism_sizes(mech).nlimit
     points: list[Contact | ContactCandidate] = [*mech.contacts, *mech.contact_candidates]
     cones = sum(c.friction > 0 and c.law == "nonlinear" for c in points)

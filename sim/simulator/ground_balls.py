@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.contact import Contact
 from sim.model.state_columns import BodyState
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["GroundBalls"]
 

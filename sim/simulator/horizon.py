@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.integrators.feedback import FeedbackLaw
 from sim.model.record_columns import StepReport
@@ -18,8 +18,7 @@ from sim.simulator.derivative_results import Linearization
 from sim.simulator.engines.engine import Engine
 from sim.simulator.results import STATUSES
 from solvers.status import Status
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["Horizon", "Known", "Rollout", "Steps"]
 

@@ -14,8 +14,7 @@ from sim.mechanism.shapes import rotation_matrix
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 COM = "center of mass"  # a target of this name
 _ACCEPT, _LEAST, _MOST = 1e-12, 1e-12, 1e6  # damping where it begins, and its range

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
 from sim.mechanism.joint import WORLD
@@ -18,8 +18,7 @@ from sim.simulator.contact_forces import GroundForces, balanced, least_forces
 from sim.simulator.ground_balls import GroundBalls
 from sim.simulator.simulator import Simulator
 from sim.simulator.task_space.compiled_kinematics import CompiledKinematics, KinematicQuantity
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _TOUCHING = 1e-3  # [m] contacts that are nearer to the ground may carry
 _STEP = 4e-3  # of the differences along a motion, in units of the time in which it turns by one radian

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.dynamics.loops.closest_root import jacobian, nearest, newton
 from sim.dynamics.loops.loop_rank import LoopRank
@@ -17,8 +16,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import rotation_matrices, rotation_matrix
 from sim.model.state_columns import BodyState
 from sim.simulator.engines.mean_states import MeanStates
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _APART = 0.1  # [m, rad] parts of a cut body that are farther apart are first brought together
 _DISPLACEMENT = 0.03  # [m, rad]
@@ -63,7 +61,7 @@ class Closure:
         return {name: gap[0] for name, gap in self._gaps(x[None]).items()}
 
     def _gaps(self, xs: Floats, only: str = "") -> dict[str, Floats]:
-        """`gaps` of every row, or one of them."""
+        """All gaps of `gaps`, or the one of a row."""
         mech = self._mechanism
         z = self._states.maximal(xs)
         out = {joint.name: self._gap(joint, z) for joint in mech.loops if only in ("", joint.name)}

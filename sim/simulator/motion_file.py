@@ -9,13 +9,11 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.archive import VERSION, Arrays, packed_part, part_of
 from sim.simulator.npz_file import check_head, check_shapes, read_npz, reading
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["archived", "contact_rows", "export", "joint_trajectory", "opened", "restored", "with_new_names"]
 

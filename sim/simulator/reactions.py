@@ -20,7 +20,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.joint import WORLD, Joint
@@ -34,8 +33,7 @@ from sim.model.record_columns import StepReport
 from sim.simulator.engines.engine import DividedStep, Engine
 from sim.simulator.results import Result
 from solvers.status import MESSAGES, Status
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 FRAMES = ("world", "joint", "body")
 

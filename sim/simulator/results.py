@@ -14,7 +14,6 @@ from os import PathLike
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.contact.collision.witness import ABSENT
 from sim.contact.pairs.limited_reach import BEYOND
@@ -28,9 +27,7 @@ from sim.model.state_columns import BodyState
 from sim.simulator.motion_file import archived, contact_rows, export, opened, restored, with_new_names
 from sim.simulator.npz_file import reading, write_npz
 from solvers.status import MESSAGES, Status
-from solvers.types import Integers
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats, Integers
 
 STATUSES = tuple(Status)  # by number: twice as fast as Status(number)
 # columns of a contact; NumPy takes three times as long with the members of an enum
@@ -126,7 +123,7 @@ class Contacts:
         time_step: time step [s].
         impulse: (..., ncontact, 3) impulse on the body [N s].
         point: (..., ncontact, 3) its point of action at the end of the step [m].
-        gap: (..., ncontact) distance from the ground at the end of the step [m]; 1e9 for a contact beyond its reach
+        gap: (..., ncontact) distance from the ground at the end of the step [m]; infinite beyond the reach of a contact
             (see Collision), or one that does not exist in this configuration.
         slip: (..., ncontact) sliding speed [m/s].
     """
@@ -148,7 +145,7 @@ class Contacts:
         ground, gap = vars(self)["rows"]
         seen = np.asarray(self.normals.any(axis=-1))
         told = seen[..., ground, None] | (gap[..., ground, None] == BEYOND)
-        object.__setattr__(self, "gap", np.where(told & ~seen, ABSENT, gap))
+        object.__setattr__(self, "gap", np.where((told & ~seen) | (gap >= ABSENT), np.inf, gap))
         return self.gap
 
     def __repr__(self) -> str:

@@ -58,7 +58,7 @@ class StepBatch(Result):
 
     @property
     def unsolved(self) -> Integers:
-        """Numbers of the rows that were not solved."""
+        """Indices of the unsolved rows."""
         return np.flatnonzero(self.status)
 
     __repr__ = short_repr

@@ -12,8 +12,7 @@ from sim.mechanism.short_repr import short_repr
 from sim.model.model import Model
 from sim.model.record_columns import Dry
 from sim.simulator.engines.engine import BOUND, CONE
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 __all__ = ["RowImpulses"]
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.derivatives.parameters.directions import At, Effect
 from sim.derivatives.parameters.height_columns import height_jacobian
@@ -22,9 +21,8 @@ from sim.simulator.engines.division import DIVISIBLE, Division
 from sim.simulator.engines.engine import CONTACT, REPORT, DividedStep, Engine, Rolled, refuse
 from sim.simulator.link_kernels import link_heights, link_parameters
 from solvers.status import Status
-from solvers.types import Vector
+from solvers.types import Floats, Vector
 
-Floats = NDArray[np.float64]
 _TWISTS = 12  # rows of scratch for twists at three configurations
 _PIECE = 64  # steps whose (A, B) are kept at once
 

@@ -7,7 +7,7 @@ from dataclasses import replace as changed
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.integrators.rollout import REFUSED
 from sim.mechanism import checks
@@ -40,8 +40,8 @@ from sim.simulator.rollout_duration import simulator_for_duration
 from sim.simulator.row_batch import RowStepping
 from sim.simulator.settings import Settings, default_kappa, with_accuracy
 from solvers.status import Status
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
 Wrenches = ArrayLike | Mapping[str, ArrayLike]
 
 _SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order", "divide", "accuracy")

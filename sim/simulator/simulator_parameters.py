@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.derivatives.parameters.damper_inertia_effects import with_damper_inertia
 from sim.derivatives.parameters.parameters import KINDS, ParameterPlan, Parameters, all_parameters
@@ -19,9 +19,8 @@ from sim.model.model import Model
 from sim.simulator.engines.engine import Engine, Rolled
 from sim.simulator.engines.intervals import Intervals
 from sim.simulator.sensitivity import Request, adjoint_sweep, roll_parameters
-from solvers.types import Vector
+from solvers.types import Floats, Vector
 
-Floats = NDArray[np.float64]
 _VARIABLES = ("state", "input")
 _NUDGE, _LEAST = 1e-5, 1e-2  # relative size of the differences of parameters, of values of at least that size
 _LINKED = ("dof_damper", "dof_spring", "contact_restitution")  # arrays whose kernels are linked where they are not zero

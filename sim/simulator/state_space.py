@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.dynamics.loops.loop_rank import LoopRank
 from sim.mechanism import checks
@@ -23,12 +23,11 @@ from sim.simulator.results import fastest_body, status_message
 from sim.simulator.settings import Settings
 from sim.simulator.task_space.task_space import TaskSpace
 from solvers.status import Status
+from solvers.types import Floats
 
 if TYPE_CHECKING:
     from sim.derivatives.parameters.parameters import Parameters
     from sim.simulator.simulator_parameters import SimulatorParameters
-
-Floats = NDArray[np.float64]
 
 
 class StateSpace:
@@ -89,7 +88,7 @@ class StateSpace:
         names = [f"Loop joint {j.name!r}" for j in mech.loops] + [f"Gear {g.name!r}" for g in mech.gears]
         gaps = zip(self._engine.open_loops(), names, strict=True) if names else ()
         text = status_message(mech, where, report, self.tolerance, max(gaps, default=None))
-        if report[StepReport.STATUS] == Status.ANGULAR_STEP and x is not None:  # in so short a step no turn is too far
+        if report[StepReport.STATUS] == Status.TURN_TOO_LARGE and x is not None:  # short steps turn little
             short = StateSpace(mech, self._engine.settings._replace(time_step=1e-6, order=2, accuracy=0.0))
             text += f" {fastest_body(mech, short.maximal(x))}"
         return text

@@ -127,7 +127,7 @@ def resume_inequalities(model: Model, data: Data, h: float, kappa: float, predic
 
 @kernel
 def return_inequalities(model: Model, data: Data, h: float, kappa: float) -> None:
-    """Every pair that the last move took out of its cone put back onto the central path of kappa."""
+    """Put every pair that the last move took out of its cone back onto the central path of kappa."""
     return_contacts(model, data, h, kappa)
     return_limits(model, data, h / _LIMIT_INERTIA, kappa)
     return_dry(model, data, kappa)

@@ -187,7 +187,7 @@ def solve_active(
 ) -> Outcome:
     """The step with the present active contacts: strategies in order, until one finds a valid solution.
 
-    out: the outcome before, whose iterations count.
+    out: the previous outcome, whose iterations are added.
     """
     data.feature_choice[0] = FeatureChoice.ONCE
     data.overlap_allowed[0] = 0
@@ -195,7 +195,7 @@ def solve_active(
     gained = False
     for k in range(0 if known.found else 1, ATTEMPTS):
         s = strategy(k)
-        if gained and s.start != Start.FRACTION:  # beyond folds there are more solutions that gain energy
+        if gained and s.start != Start.FRACTION:  # other solutions beyond folds gain energy as well
             continue
         data.overlap_allowed[0] = 1 if s.overlap else 0
         out, verdict = attempt(model, data, options, inputs, s, out.iterations, known)
@@ -204,13 +204,13 @@ def solve_active(
                 data.strategy_solves[k] += 1
             break
         refused = verdict == Verdict.OVERLAPPING or verdict == Verdict.TUNNELED
-        why = Status.COLLISION_STEP.value if refused else Status.NO_PROGRESS.value
+        why = Status.SHAPES_CROSSED.value if refused else Status.NO_PROGRESS.value
         out = Outcome(why, out.iterations, out.residual, out.violation)
         gained = gained or verdict == Verdict.ENERGY_GAIN
         # those of the next strategy in the list, also where it is skipped
         data.feature_choice[0] = strategy(min(k + 1, ATTEMPTS - 1)).features
     if gained and out.status != Status.SOLVED:
-        return Outcome(Status.ENERGY_STEP.value, out.iterations, out.residual, out.violation)
+        return Outcome(Status.ENERGY_GAIN.value, out.iterations, out.residual, out.violation)
     return out
 
 

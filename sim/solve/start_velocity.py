@@ -104,7 +104,7 @@ def _meet_momentum(model: Model, data: Data, h: float, scale: float, x: Vector) 
     for _ in range(50):
         _turn_back(data)
         if not turns_below_half(model, data, h, v):
-            return Status.ANGULAR_STEP.value
+            return Status.TURN_TOO_LARGE.value
         if not error < 1e300:
             return Status.NOT_FINITE.value
         if error <= 1e-14 * scale:

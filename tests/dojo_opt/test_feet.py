@@ -114,7 +114,7 @@ def test_no_equilibrium_is_said(sim):
     lifted[0, :2, 2] += 0.05  # both front feet off the ground
     with pytest.raises(ValueError, match="vertical forces at 'FR_foot'.* cannot balance the weight"):
         equilibrium(sim, feet.place(x, lifted)[0])
-    steep = Simulator(models.quadruped(friction=0.1).on(Terrain.slope(0.2)), time_step=0.02)
+    steep = Simulator(models.quadruped(friction=0.1).with_terrain(Terrain.slope(0.2)), time_step=0.02)
     x = steep.neutral()
     with pytest.raises(ValueError, match="stands on ground of slope 0.203 with friction 0.1, and would slide"):
         equilibrium(steep, on_its_feet(steep, x))
@@ -165,7 +165,7 @@ def test_an_arm_stays_in_equilibrium_with_and_without_contacts():
 @pytest.mark.parametrize("ground", [Terrain.slope(0.1, (1.0, 0.5)), WAVES])
 def test_equilibrium_on_terrain(ground):
     """Contact forces carry the whole weight on a slope, upwards; the remaining motion creeps with kappa."""
-    robot = Simulator(models.quadruped(damper=0.5).on(ground), time_step=0.02, kappa=1e-8)
+    robot = Simulator(models.quadruped(damper=0.5).with_terrain(ground), time_step=0.02, kappa=1e-8)
     x, u = equilibrium(robot, on_its_feet(robot, robot.neutral()))
     step = robot.step(x, u)
     assert np.abs(step.x[robot.nq :]).max() < 1e-7
@@ -190,7 +190,7 @@ def test_round_hulls_stand_on_the_corners_that_are_lowest():
         corners *= 0.03 / np.linalg.norm(corners, axis=1)[:, None]
         bodies.append(dojo.Body(f"foot{k}", 0.2, shape=dojo.Polytope(np.vstack([corners, -corners]))))
         joints.append(dojo.Joint("prismatic", "trunk", f"foot{k}", parent_point=(x, y, -0.3), axis=(0.0, 0.0, 1.0)))
-    mech = dojo.Mechanism(bodies, joints).on(dojo.Terrain(), bodies=[f"foot{k}" for k in range(4)])
+    mech = dojo.Mechanism(bodies, joints).with_terrain(dojo.Terrain(), bodies=[f"foot{k}" for k in range(4)])
     sim = dojo.Simulator(mech, time_step=0.01)
     state, u = dojo.equilibrium(sim)
     after = sim.rollout(state, np.tile(u, (5, 1)), throw=True).x[-1]
@@ -215,7 +215,7 @@ def test_a_robot_whose_trunk_has_corners_too_stands_on_its_feet():
         joints.append(
             dojo.Joint("revolute", "trunk", f"foot{k}", parent_point=hip, child_point=knee, axis=(0.0, 1.0, 0.0))
         )
-    mech = dojo.Mechanism(bodies, joints).on(dojo.Terrain(), bodies=[body.name for body in bodies])
+    mech = dojo.Mechanism(bodies, joints).with_terrain(dojo.Terrain(), bodies=[body.name for body in bodies])
     sim = dojo.Simulator(mech, time_step=0.01)
     state, u = dojo.equilibrium(sim)
     after = sim.rollout(state, np.tile(u, (5, 1)), throw=True)

@@ -292,7 +292,7 @@ def test_feet_that_stand_on_a_terrain_tell_its_heights():
     def robot(values):
         mech = dojo.models.quadruped(damper=0.5)
         servos = [dojo.Input(j.name, servo="position", stiffness=60.0, damping=2.0) for j in mech.joints[1:]]
-        return dojo.Simulator(replace(mech, inputs=servos).on(terrain(values)), time_step=0.01, kappa=1e-5)
+        return dojo.Simulator(replace(mech, inputs=servos).with_terrain(terrain(values)), time_step=0.01, kappa=1e-5)
 
     truth, rng = robot(heights), np.random.default_rng(0)
     x = truth.neutral()

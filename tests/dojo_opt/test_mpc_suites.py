@@ -235,7 +235,7 @@ def test_mujoco_has_the_same_hills():
     assert plant.x[2] == pytest.approx(0.15, abs=5e-3)
     assert -5e-3 < result.contacts.gap[0] < 0.0
     with pytest.raises(ValueError, match="rises from level ground"):
-        MujocoPlant(dojo.Simulator(falling.on(dojo.Terrain.steps([0.1], 0.3)), time_step=1e-3), start)
+        MujocoPlant(dojo.Simulator(falling.with_terrain(dojo.Terrain.steps([0.1], 0.3)), time_step=1e-3), start)
 
 
 def turned(quaternion, vector):

@@ -16,7 +16,7 @@ from dojo_opt.plant.perturbation import Perturbation
 from support.hills import GRID, WAVES
 from support.scenes import ball
 
-SIM = dojo.Simulator(ball(radius=0.1).on(WAVES), time_step=0.02)
+SIM = dojo.Simulator(ball(radius=0.1).with_terrain(WAVES), time_step=0.02)
 
 
 def test_figure_and_viewer_show_the_ground(tmp_path):
@@ -81,7 +81,7 @@ def test_other_engines_refuse_scenes_that_they_would_get_wrong():
 def test_a_plan_can_be_made_on_terrain():
     """A ball is pushed up a hill to a place of rest on its side, which needs the slope to be known."""
     hill = dojo.Terrain.from_function(lambda X, Y: 0.1 * (1.0 - np.cos(np.pi * X)) + 0.0 * Y, GRID, [0.0])
-    sim = dojo.Simulator(ball(radius=0.1, friction=0.0).on(hill), time_step=0.05)
+    sim = dojo.Simulator(ball(radius=0.1, friction=0.0).with_terrain(hill), time_step=0.05)
     start = sim.neutral()
     goal = start.copy()
     goal[0] = 0.5

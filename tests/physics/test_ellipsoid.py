@@ -119,7 +119,7 @@ def test_on_terrain_it_is_refused_and_a_plane_is_not() -> None:
     with pytest.raises(
         ValueError, match="body 'e' has the shape Ellipsoid; expected a Sphere, Capsule, Box or Polytope"
     ):
-        mech.on(hills, bodies=["e"])
+        mech.with_terrain(hills, bodies=["e"])
     tied = dojo.Mechanism(mech.bodies, mech.joints, collisions=[dojo.Collision("e", shape_b=dojo.String(1.0))])
     with pytest.raises(ValueError, match="there is no collision of Ellipsoid and String"):
         dojo.Simulator(tied, time_step=0.01)

@@ -31,7 +31,7 @@ def test_every_model_comes_back_as_it_was(name):
 
 def test_terrain_and_collisions_come_back():
     points = np.random.default_rng(1).random((8, 3))
-    given = dojo.models.block().on(HILL)
+    given = dojo.models.block().with_terrain(HILL)
     given = given.with_collisions(dojo.Collision(given.body_names[0], None, None, dojo.Polytope(points), friction=0.3))
     found = again(given)
     np.testing.assert_array_equal(found.contacts[0].terrain.heights, HILL.heights)

@@ -170,7 +170,7 @@ def test_terrain_and_parameters_know_every_shape() -> None:
     mech = sled()
     stone = replace(mech.bodies[0].shapes[0], restitution=0.3)
     body = replace(mech.bodies[0], shape=[stone, mech.bodies[0].shapes[1]])
-    alone = dojo.Mechanism([body], mech.joints).on(dojo.Terrain.slope(0.2), bodies=["sled"])
+    alone = dojo.Mechanism([body], mech.joints).with_terrain(dojo.Terrain.slope(0.2), bodies=["sled"])
     settings = {(c.name.split("_")[0], c.friction, c.restitution) for c in alone.contacts}
     assert settings == {("sled.left", 0.1, 0.3), ("sled.1", 0.4, 0.0)} and len(alone.contacts) == 10
     sim = dojo.Simulator(mech, time_step=0.01)

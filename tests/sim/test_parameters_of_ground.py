@@ -42,7 +42,7 @@ def test_each_height_of_stairs() -> None:
     """One number per line across the stairs, under two balls of one radius and a point."""
     box = dojo.Body("box", 1.0, shape=dojo.Box(0.3, 0.2, 0.1))
     contacts = [dojo.Contact("box", (s, 0.0, -0.05), r, friction=0.4) for s, r in ((-0.1, 0.04), (0.1, 0.04), (0, 0))]
-    mech = dojo.Mechanism([box], [dojo.Joint("floating", None, "box")], contacts).on(STAIRS)
+    mech = dojo.Mechanism([box], [dojo.Joint("floating", None, "box")], contacts).with_terrain(STAIRS)
     sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-3, tolerance=1e-13)
     x = sim.neutral()
     x[0], x[2] = 0.05, x[2] + 0.02
@@ -73,7 +73,7 @@ def test_rises_of_stairs_by_the_chain_rule() -> None:
     plain = dojo.Mechanism([ball], [dojo.Joint("floating", None, "ball")], [dojo.Contact("ball", radius=0.1)])
 
     def simulator(r: np.ndarray) -> dojo.Simulator:
-        return dojo.Simulator(plain.on(stairs(r)), time_step=0.01, kappa=1e-3, tolerance=1e-12)
+        return dojo.Simulator(plain.with_terrain(stairs(r)), time_step=0.01, kappa=1e-3, tolerance=1e-12)
 
     def stairs(r: np.ndarray) -> dojo.Terrain:
         return dojo.Terrain.steps(r, depth=0.4, edge=0.3)
@@ -157,7 +157,7 @@ def test_a_shape_on_a_plane_is_its_collision_with_a_half_space(name: str) -> Non
     sims = [
         dojo.Simulator(mech, time_step=0.01, kappa=1e-8, tolerance=1e-12)
         for mech in (
-            alone(SOLIDS[name]).on(level, bodies=["it"], friction=0.4),
+            alone(SOLIDS[name]).with_terrain(level, bodies=["it"], friction=0.4),
             alone(SOLIDS[name], collisions=[wall]),
         )
     ]
@@ -171,7 +171,7 @@ def test_a_shape_on_a_plane_is_its_collision_with_a_half_space(name: str) -> Non
 @pytest.mark.parametrize("name", SOLIDS)
 def test_a_shape_tumbles_on_hills(name: str, rng: np.random.Generator) -> None:
     """Let fall from a random pose; no corner goes below the ground, and it never has more energy than at first."""
-    mech = alone(SOLIDS[name]).on(WAVES, bodies=["it"], friction=0.5)
+    mech = alone(SOLIDS[name]).with_terrain(WAVES, bodies=["it"], friction=0.5)
     sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-9)
     x = sim.neutral()
     x[2] += 0.2
@@ -185,8 +185,8 @@ def test_bodies_that_cannot_stand_are_refused() -> None:
     with pytest.raises(
         ValueError, match=r"body 'it' has the shape Cylinder; expected a Sphere, Capsule, Box or Polytope"
     ):
-        mech.on(WAVES, bodies=["it"])
-    with pytest.raises(ValueError, match=r"Mechanism.on\(bodies=...\): 'leg' is not one of: it"):
-        mech.on(WAVES, bodies=["leg"])
-    with pytest.raises(ValueError, match=r"Mechanism.on\(friction=...\).*bodies=\[...\]"):
-        mech.on(WAVES, friction=0.3)
+        mech.with_terrain(WAVES, bodies=["it"])
+    with pytest.raises(ValueError, match=r"Mechanism.with_terrain\(bodies=...\): 'leg' is not one of: it"):
+        mech.with_terrain(WAVES, bodies=["leg"])
+    with pytest.raises(ValueError, match=r"Mechanism.with_terrain\(friction=...\).*bodies=\[...\]"):
+        mech.with_terrain(WAVES, friction=0.3)

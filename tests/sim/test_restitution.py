@@ -17,7 +17,7 @@ LEVEL = dojo.Terrain.slope(0.0)
 def bouncing(mech, e):
     """The mechanism with contacts that give back e; it stands on the ground."""
     mech = dataclasses.replace(mech, contacts=[dataclasses.replace(c, restitution=e) for c in mech.contacts])
-    return mech if mech.contacts[0].terrain else mech.on(LEVEL)
+    return mech if mech.contacts[0].terrain else mech.with_terrain(LEVEL)
 
 
 def apex(mech, h, height=0.5):
@@ -107,7 +107,7 @@ def test_kane_s_double_pendulum_does_not_gain():
 @pytest.mark.parametrize("law", ["impact", "linear", "nonlinear"])
 def test_derivatives_through_an_impact(law, kappa):
     """Of the branch that is taken, on level ground and on waves, of a ball and of several contacts at once."""
-    for mech in (ball(radius=0.1, law=law), block(0.3, law=law), ball(radius=0.2, law=law).on(WAVES)):
+    for mech in (ball(radius=0.1, law=law), block(0.3, law=law), ball(radius=0.2, law=law).with_terrain(WAVES)):
         sim = dojo.Simulator(bouncing(mech, 0.7), time_step=0.01)
         x = sim.neutral()
         x[2] += 0.005

@@ -99,15 +99,15 @@ def test_files_can_be_put_together(tmp_path):
         '<collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>'
     )
     pod = dojo.load_urdf(str(path))
-    scene = pod.add(pod.on(dojo.Terrain.slope(0.2)), (1.0, 0.0, 0.0), prefix="other ")
-    assert isinstance(pod.on(dojo.Terrain.slope(0.2)), dojo.UrdfMechanism)
+    scene = pod.add(pod.with_terrain(dojo.Terrain.slope(0.2)), (1.0, 0.0, 0.0), prefix="other ")
+    assert isinstance(pod.with_terrain(dojo.Terrain.slope(0.2)), dojo.UrdfMechanism)
     sim = dojo.Simulator(scene, time_step=0.01)
     assert "other base" in sim.describe()
     assert sim.rollout(sim.neutral(), np.zeros((5, sim.nu))).success
 
 
 def test_it_stands_on_other_ground():
-    mech = dojo.models.quadruped().on(dojo.Terrain.slope(np.radians(10.0), (1.0, 1.0), 0.5))
+    mech = dojo.models.quadruped().with_terrain(dojo.Terrain.slope(np.radians(10.0), (1.0, 1.0), 0.5))
     sim = dojo.Simulator(mech, time_step=0.01)
     gaps = [c.gap(sim.step(sim.neutral()).contacts.point[k]) + c.radius for k, c in enumerate(mech.contacts)]
     assert min(gaps) == pytest.approx(0.0, abs=5e-3)

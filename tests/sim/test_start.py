@@ -48,7 +48,7 @@ def test_too_fast_a_spin_is_refused() -> None:
     v[3] = 40.0
     with pytest.raises(SimulationError, match=r"Simulator.state_from_velocity: .*half a turn") as error:
         sim.state_from_velocity(sim.neutral()[: sim.nq], v)
-    assert error.value.status == Status.ANGULAR_STEP
+    assert error.value.status == Status.TURN_TOO_LARGE
 
 
 def test_stiff_springs_and_tonnes_are_started_to_their_rounding() -> None:

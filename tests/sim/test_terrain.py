@@ -76,8 +76,8 @@ def test_a_slope_is_a_half_space():
         (lambda: dojo.Contact("b", terrain=0.3), r"terrain=...\): expected a Terrain"),
         (lambda: dojo.Contact("b", terrain=WAVES, normal=(1, 0, 0)), "no normal of its own"),
         (lambda: dojo.Contact("b", restitution=1.5), "from 0 to 1"),
-        (lambda: ball().on("hill"), r"Mechanism.on\(terrain\)"),
-        (lambda: ball().on(WAVES, contacts=["foot"]), "'foot' is not one of: ball"),
+        (lambda: ball().with_terrain("hill"), r"Mechanism.with_terrain\(terrain\)"),
+        (lambda: ball().with_terrain(WAVES, contacts=["foot"]), "'foot' is not one of: ball"),
     ],
 )
 def test_bad_terrain_is_refused(make, message):
@@ -93,7 +93,7 @@ def test_an_inclined_plane_on_a_grid_is_the_half_space(rng):
     slope = dojo.Terrain.slope(0.3, (1.0, 0.5))
     grid = dojo.Terrain.from_function(slope.height, 2.0 * GRID, 2.0 * GRID)
     for mech in (ball(friction=0.2), block(0.3)):
-        sims = [dojo.Simulator(mech.on(t), time_step=H, kappa=1e-8, tolerance=1e-10) for t in (slope, grid)]
+        sims = [dojo.Simulator(mech.with_terrain(t), time_step=H, kappa=1e-8, tolerance=1e-10) for t in (slope, grid)]
         x = sims[0].neutral()
         x[2] += 0.02
         x[sims[0].nq :] = 0.3 * rng.normal(size=6)
@@ -108,7 +108,7 @@ def test_an_inclined_plane_on_a_grid_is_the_half_space(rng):
 def test_derivatives_on_waves(law, height, kappa, rng):
     """Pressed, touching and flying; a ball with a radius not small against the waves, and points of a block."""
     for mech in (ball(radius=0.25, law=law), block(0.4, law=law)):
-        sim = dojo.Simulator(mech.on(WAVES), time_step=H, kappa=kappa)
+        sim = dojo.Simulator(mech.with_terrain(WAVES), time_step=H, kappa=kappa)
         x = sim.neutral()
         x[:2] = rng.uniform(-0.8, 0.8, 2)
         x[sim.nq :] = rng.normal(size=6)
@@ -130,7 +130,7 @@ def test_derivatives_of_a_chain_on_waves(rng):
     """Contacts of several bodies, far from the first of them, with a height of their own."""
     mech = chain("revolute", 2, gravity=(0.0, 0.0, -9.81), damper=0.1)
     contacts = [dojo.Contact(f"body{k}", (0.1, 0.05, -0.1), 0.08, height=-0.02 * k) for k in range(3)]
-    mech = dataclasses.replace(mech, contacts=contacts).on(WAVES)
+    mech = dataclasses.replace(mech, contacts=contacts).with_terrain(WAVES)
     x = dojo.Simulator(mech, time_step=H).neutral()
     x[0] = 0.4
     x[-8:] = 0.5 * rng.normal(size=8)
@@ -140,7 +140,7 @@ def test_derivatives_of_a_chain_on_waves(rng):
 
 def test_far_contacts_are_left_out_and_change_nothing():
     """High above the ground, and in a long fall onto it; against the same without the list of far contacts."""
-    mech = ball(radius=0.1).on(WAVES)
+    mech = ball(radius=0.1).with_terrain(WAVES)
     sim = dojo.Simulator(mech, time_step=H, kappa=1e-8, tolerance=1e-8)
     x = sim.neutral()
     x[2] += 1.0
@@ -165,7 +165,7 @@ def test_a_ball_on_an_incline(friction):
     for heading in np.linspace(0.0, 2.0 * np.pi, 5)[:-1] + 0.2:
         down = np.array([-np.cos(heading), -np.sin(heading)])
         slope = dojo.Terrain.slope(angle, -down)
-        mech = ball(friction=friction).on(dojo.Terrain.from_function(slope.height, 2 * GRID, 2 * GRID))
+        mech = ball(friction=friction).with_terrain(dojo.Terrain.from_function(slope.height, 2 * GRID, 2 * GRID))
         sim = dojo.Simulator(mech, time_step=H, kappa=1e-9, tolerance=1e-10)
         x = run(sim, sim.neutral(), steps)[-1]
         expected = a * H * steps * np.array([*(np.cos(angle) * down), -np.sin(angle)])
@@ -175,7 +175,7 @@ def test_a_ball_on_an_incline(friction):
 def test_without_friction_energy_stays_in_a_bowl():
     """A block on its points slides through a bowl; its loss of energy is of first order in the time step."""
     bowl = dojo.Terrain.from_function(lambda X, Y: 0.2 * (X**2 + Y**2), GRID, GRID)
-    mech = block(0.2, friction=0.0).on(bowl)
+    mech = block(0.2, friction=0.0).with_terrain(bowl)
     drift = []
     for h in (0.004, 0.002, 0.001):
         sim = dojo.Simulator(mech, time_step=h, kappa=1e-9, tolerance=1e-10)
@@ -194,7 +194,7 @@ def test_boxes_land_on_curved_ground(friction, rng):
     """Four corners hold a box in four directions, one of them hardly: landings with a negative determinant."""
     ground = dojo.Terrain.from_function(lambda X, Y: 0.3 * X + 0.1 * Y**2, GRID, GRID)
     box = dojo.Mechanism([dojo.Body("box", 1.0, shape=dojo.Box(0.3, 0.2, 0.1))], [dojo.Joint("floating", None, "box")])
-    sim = dojo.Simulator(box.on(ground, bodies=["box"], friction=friction), time_step=H, kappa=1e-9)
+    sim = dojo.Simulator(box.with_terrain(ground, bodies=["box"], friction=friction), time_step=H, kappa=1e-9)
     x = sim.neutral()
     for height in (0.0, *rng.uniform(0.1, 0.4, 10)):
         t = sim.rollout(x + np.r_[0.0, 0.0, height, np.zeros(10)], np.zeros((60, sim.nu)), throw=True)
@@ -215,7 +215,7 @@ def test_boxes_land_on_curved_ground(friction, rng):
 )
 def test_a_quadruped_stands(terrain):
     """Springs in its joints hold it; it neither creeps nor sinks in."""
-    mech = dojo.models.quadruped(spring=200.0, damper=20.0, stance=(0.9, -1.425)).on(terrain)
+    mech = dojo.models.quadruped(spring=200.0, damper=20.0, stance=(0.9, -1.425)).with_terrain(terrain)
     sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-9)
     t = sim.rollout(sim.neutral(), np.zeros((300, sim.nu)), throw=True)
     assert t.contacts.gap.min() > -1e-8

@@ -5,14 +5,13 @@ from __future__ import annotations
 from math import cos, nan, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.engines import PhysicsEngine, Run
 from benchmarks.studies.contact import contact_scenes as scenes
 from benchmarks.studies.contact.contact_scenes import Scene
 from dojo_opt.report.run_measures import complete, gaps, penetration
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
 Numbers = dict[str, float]
 
 DIRECTIONS = np.deg2rad([0.0, 11.3, 30.0, 45.0, 90.0, 135.0, 200.0, 300.0])

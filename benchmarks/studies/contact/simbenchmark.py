@@ -12,7 +12,6 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.report.result import Cell, Row, Table
@@ -24,8 +23,7 @@ from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Box, Sphere
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 G, FORCE = 9.81, 150.0  # [m/s^2], [N]
 BOX, BALL, RADIUS, COUNT = 10.0, 1.0, 0.1, 25  # masses [kg], radius of the balls [m], their number

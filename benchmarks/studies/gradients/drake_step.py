@@ -6,15 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.engines.drake import write
 from benchmarks.engines.drake_scene import load, scalar_joints
 from dojo_opt.report.gradients.differences import Reference, extrapolated
 from sim.model.model import InputKind, Model
-from solvers.types import Vector
-
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix, Vector
 
 APPROXIMATIONS = ("Lagged", "Sap", "Tamsi")  # its default, its convex one, and its oldest
 

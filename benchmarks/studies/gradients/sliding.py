@@ -19,14 +19,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from benchmarks.engines import PhysicsEngine, mujoco_scene
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 MASS, GRAVITY = 1.0, 9.81
 STICK, SLIDE = 0.5, 0.3  # friction

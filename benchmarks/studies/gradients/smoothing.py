@@ -18,14 +18,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from dojo_opt.report.gradients.resting import GRAVITY
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix, Vector
 
 H, MASS, FRICTION = 0.02, 1.0, 0.5
 FLIGHT = 0.01  # [m] gap after the step of the flying point

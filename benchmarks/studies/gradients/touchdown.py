@@ -14,13 +14,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 H, SPEED, RADIUS, GRAVITY = 0.02, 1.0, 0.1, 9.81
 TOUCH = H * (SPEED + GRAVITY * H)  # [m] height from which the step just reaches the ground

@@ -15,15 +15,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.body import Body
 from sim.mechanism.input import Input
 from sim.mechanism.joint import KINDS, Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 BARS = {
     "momentum": 1e-9,

@@ -6,14 +6,12 @@ import time
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from benchmarks.engines.mujoco_ilqr import MujocoIlqr, MujocoSettings
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
-
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix
 
 HARD = 1e-8  # kappa of the contact on which a plan is replayed
 REFINE = 5  # steps of the plant per step of the plan

@@ -7,14 +7,12 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.report.accuracy.smooth_scene import SAMPLES, SmoothScene
 from dojo_opt.report.dojo_engine import Ours
 from dojo_opt.report.engine import PhysicsEngine, Run, observe
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 STEPS = (0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.0025, 0.002, 0.001, 5e-4, 2.5e-4, 2e-4, 1e-4)  # [s] whole parts of .1
 BETWEEN = (0.2, 0.1 / 3)  # [s] for ours of higher order besides: points at the times of a peer's largest steps

@@ -9,13 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import solveh_banded
 
 from sim.model.model import InputKind, Model
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _TOLERANCE = 1e-12
 

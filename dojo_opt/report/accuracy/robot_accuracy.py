@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.plots.axes import plain_ticks
 from dojo_opt.report.accuracy import error_curves as curves
@@ -23,8 +22,7 @@ from dojo_opt.report.study import Progress
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
 from solvers.compiler import threads
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _TARGET = 1e-3  # [m] target of the error after a piece
 _CONVERGED = 1e-2  # [m] beyond which there is no motion to compare with

@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.report.accuracy.reference import TreeReference
 from dojo_opt.report.engine import Run, observe
 from sim.dynamics.maximal_energy import rotated
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 SAMPLES = 10  # equal parts of a duration: whole steps for every time step of the study
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.dynamics.maximal_energy import rotated
 from sim.mechanism.mechanism import Mechanism
 from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _ABOVE = 0.02  # [m] above the ground
 _SHIFT = 1e-3  # [m] trial displacement of a base

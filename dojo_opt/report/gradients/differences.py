@@ -6,11 +6,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.simulator.simulator import Simulator
-
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix
 
 _FIRST, _LEVELS, _ORDERS = 1e-3, 14, 3  # step sizes 1e-3 2^-k; errors of order 2, 4, 6 and 8
 

@@ -10,14 +10,12 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.report.gradients.differences import Stepper, extrapolated, relative_error
 from dojo_opt.report.interleaved_rounds import interleave
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 KAPPAS = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
 EPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.planning.plan import Plan
 from sim.mechanism.body import Body
@@ -15,8 +15,8 @@ from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.model.state_columns import BaseState
+from solvers.types import Vector
 
-Vector = NDArray[np.float64]
 Point = tuple[float, float]
 
 __all__ = ["Face", "Placed", "flat_pose", "slider"]

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.mpc.settings import OPTIONS
@@ -22,8 +21,7 @@ from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Box, Sphere, rotation_matrix
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 __all__ = ["allegro"]
 

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.mechanism.body import Body
 from sim.mechanism.joint import Joint
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 __all__ = ["FileLink", "assembled", "from_com"]
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
 from sim.mechanism.body import Body
@@ -16,8 +15,7 @@ from sim.mechanism.contact import Contact
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.shapes import Solid, Sphere
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 __all__ = ["JOINTS", "KP", "Arms", "arms"]
 

@@ -8,7 +8,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.cost import Clearance
 from dojo_opt.mpc.controller import MPC
@@ -24,8 +23,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Box
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 __all__ = ["Turning", "mechanism", "turning"]
 

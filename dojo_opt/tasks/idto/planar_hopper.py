@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.cost import Slip
 from dojo_opt.gaits.equilibrium import equilibrium
@@ -20,9 +20,7 @@ from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix, Vector
 
 __all__ = ["hopper"]
 

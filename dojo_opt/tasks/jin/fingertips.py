@@ -7,7 +7,6 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.cost import Effort
 from dojo_opt.tasks.jin.grasp import grasp, place_of_ball
@@ -23,8 +22,7 @@ from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Box, Capsule, Sphere
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 __all__ = ["fingertips"]
 

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.tasks.suite import held
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 __all__ = ["Placing"]
 

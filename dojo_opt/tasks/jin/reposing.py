@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.cost import Spec
 from dojo_opt.mpc.controller import MPC
@@ -18,8 +17,7 @@ from dojo_opt.tasks.suite import SuiteTask, quadratic
 from sim.mechanism.mechanism import Mechanism
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 __all__ = ["HORIZON", "Aim", "reposing"]
 

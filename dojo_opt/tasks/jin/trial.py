@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
 from solvers.rotation import quat_exp, quat_mul
-
-Vector = NDArray[np.float64]
+from solvers.types import Vector
 
 __all__ = ["TRIALS", "Trial", "draws", "followed", "pose", "turn", "within"]
 

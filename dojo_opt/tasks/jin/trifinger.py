@@ -7,7 +7,6 @@ from math import cos, pi, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dojo_opt.cost import Effort
 from dojo_opt.planning.residual import jit
@@ -25,8 +24,6 @@ from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Box, Capsule, Sphere
-
-Vector = NDArray[np.float64]
 
 __all__ = ["trifinger"]
 

@@ -30,7 +30,7 @@ def separation_of_cylinder(
 def choose_on_cylinder(
     kind: int, sizes: Vector, hull: Matrix, pose: Pose, turned: Vector, codes: Integers, first: int, out: Vector
 ) -> None:
-    """codes[first:] = which elements of the shapes make all the contact points of the two; uses up `out`."""
+    """codes[first:] = the elements of the shapes that make all contact points; `out` is scratch."""
     R, r = pose
     if kind % SWAPPED == Pair.POLYTOPE_CYLINDER:
         polytope_cylinder.choose_elements(sizes, hull, R, r, codes, first, out)

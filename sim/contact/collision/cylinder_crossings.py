@@ -60,7 +60,7 @@ def rim_of(top: float, sizes: Vector, R: Vector, r: Vector) -> Frame:
 
 @inner_kernel
 def within_cone(n: Vec3, e: Vec3, u: Vec3) -> bool:
-    """Whether n points out of a rim: out along e, and up along u, or LEANING less."""
+    """Whether n points out of a rim, along e and u, within the tolerance LEANING."""
     return dot(n, e) > -LEANING and dot(n, u) > -LEANING
 
 

@@ -100,7 +100,7 @@ def end_plane(end: float, sizes: tuple[float, float], R: Vector, r: Vector) -> t
 def choose_elements(
     sizes: Vector, R: Vector, r: Vector, turned: Vector, codes: Integers, first: int, out: Vector
 ) -> None:
-    """codes[first:] = the elements of all contact points at this pose; uses up `out`, and `turned`."""
+    """codes[first:] = the elements of all contact points at this pose; `out` and `turned` are scratch."""
     turn_around(R, r, turned)
     begin = first + 2 * RIM_POINTS
     for k in range(CROSSINGS):

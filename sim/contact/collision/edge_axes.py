@@ -49,7 +49,7 @@ def edge_must_exceed(s: float, h: Vec3) -> float:
 
 @inner_kernel
 def deepest(s: float, h: Vec3) -> float:
-    """Distance below which a point is not a contact, at separation s: deep inside, but beside a way out."""
+    """Distance below which a point is no contact, at separation s: deep inside, with a shorter way out elsewhere."""
     return (_DEEPER * s if s < 0.0 else s / _DEEPER) - _SLACK * min(h[0], h[1], h[2])
 
 

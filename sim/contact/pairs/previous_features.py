@@ -101,8 +101,8 @@ def left_behind(data: Data, kind: int, out: Vector, pose: Vector, before: Vector
     """Whether the two points of a contact at `pose` were closer than `least` at the pose `before`, along the normal at
     `pose`: they have moved apart since then, whatever the normal was on the way.
 
-    Where nothing else was found, the normal of shapes that were apart may have turned by the angle of the two poses:
-    the points seem to have been closer than they were by that angle times their motion.
+    Otherwise the normal of separated shapes may have turned by the angle between the two poses, which makes the
+    points appear closer than they were, by that angle times their motion.
     """
     moved = moved_since(kind, out, pose, before)
     if data.overlap_allowed[0] == 1:

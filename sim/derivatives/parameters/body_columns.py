@@ -170,7 +170,7 @@ def add_seen(model: Model, data: Data, at: At, d: int, w: float, col: int) -> No
 
 @kernel
 def add_rest(model: Model, data: Data, at: At, d: int, k: int, w: float, col: int) -> None:
-    """-h k; of a quaternion joint a left rotation of all turns by -J(rest)^T e_k"""
+    """-h k; for a quaternion joint, a left rotation of all its rotations by -J(rest)^T e_k"""
     X = data.columns
     if not is_quaternion(model, d):
         X[d, col] += w * at.h * model.dof_spring[d]

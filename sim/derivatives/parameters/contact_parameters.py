@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.derivatives.parameters.directions import SIDE, Effect
 from sim.derivatives.parameters.parameter import Parameter, Term, vector
@@ -18,8 +18,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import HalfSpace, Solid, String
 from sim.model.shape_kinds import Size
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 def normal_turns(normal: ArrayLike) -> Floats:

@@ -19,8 +19,8 @@ from sim.derivatives.parameters.directions import Effect
 from sim.derivatives.parameters.parameter import Parameter, Term
 from sim.mechanism.damper_inertia import BEND, Bent, bent, damper_motions, joint_columns
 from sim.model.model import Model
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
 Rates = dict[tuple[int, int, int], Floats]  # by effect, index and component: (number of damped dofs,)
 
 _INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))

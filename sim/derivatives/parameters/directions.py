@@ -40,7 +40,7 @@ class Effect(Code):
     INPUT = 26  # force and torque per unit of an input on a body [input, which of the six]
     SHAPE_SIZE = 27  # of the shapes of a collision [pair of the first point; SIDE side + shape_kinds.Size]
     SEEN = 29  # inertia that a damper sees [degree of freedom]
-    TERRAIN = 28  # a height of the ground, of all in a row [height]: not in a list of terms, see terrain_parameters.py
+    TERRAIN = 28  # a height of the grid of a terrain, by number; it has no list of terms, see terrain_parameters.py
 
 
 SIDE = 16  # stride of the two shapes in the component of a SHAPE_SIZE

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.derivatives.parameters.contact_parameters import shape_of
 from sim.derivatives.parameters.terrain_parameters import terrains
@@ -15,8 +14,8 @@ from sim.mechanism.loop_joints import parts_of
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import String
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
 Entries = Mapping[str, float]  # by component, "" of a single number
 
 

@@ -8,10 +8,10 @@ parameter that adds the same to all parts: the height of the ground is `contact_
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.derivatives.parameters.contact_parameters import collision_parameters, contact_parameters
 from sim.derivatives.parameters.directions import Effect
@@ -28,14 +28,13 @@ from sim.derivatives.parameters.tree_parameters import (
 from sim.mechanism.loop_joints import is_weld
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.short_repr import short_repr
-from solvers.types import IntegerMatrix, Vector
+from solvers.types import Floats, IntegerMatrix, Vector
 
 __all__ = ["KINDS", "Parameter", "Parameters", "ParameterPlan", "all_parameters"]
 
-Floats = NDArray[np.float64]
 
-
-class Parameters(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class Parameters:
     """The parameters of a selection, in order; `parameters[name]` has the values of one name.
 
         kind:part[component]    mass:trunk   com:trunk[0]   spring:knee   friction:foot   gravity[2]   time_step
@@ -70,10 +69,9 @@ class Parameters(NamedTuple):
     values: Floats  # (n,)
     rows: dict[str, slice]
 
-    def __repr__(self) -> str:
-        return short_repr(self)
+    __repr__ = short_repr
 
-    def __getitem__(self, name: str) -> Floats:  # type: ignore[override]
+    def __getitem__(self, name: str) -> Floats:
         """Values of one name of the selection."""
         return self.values[self.rows[name]]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.derivatives.parameters.directions import Effect
 from sim.derivatives.parameters.mechanism_editor import Draft
@@ -13,7 +13,6 @@ from sim.derivatives.parameters.parameters import KINDS, Parameter, ParameterPla
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 
-Floats = NDArray[np.float64]
 Table = Mapping[str, list[Parameter]]  # by every name that stands for some
 COMMON = "*"
 

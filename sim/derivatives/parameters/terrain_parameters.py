@@ -10,15 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.derivatives.parameters.directions import Effect
 from sim.derivatives.parameters.parameter import Parameter
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import height_fields
 from sim.mechanism.terrain import Terrain
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 def terrains(mech: Mechanism) -> dict[str, Terrain]:

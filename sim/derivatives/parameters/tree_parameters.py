@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Set
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.derivatives.parameters.directions import Effect
 from sim.derivatives.parameters.parameter import Parameter, Term, vector
@@ -14,8 +14,7 @@ from sim.mechanism.body import Body
 from sim.mechanism.joint import Joint
 from sim.mechanism.loop_joints import parts_of
 from sim.mechanism.mechanism import Mechanism
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 

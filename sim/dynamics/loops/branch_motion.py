@@ -130,6 +130,6 @@ def is_farther(model: Model, data: Data, status: int) -> bool:
 
 @kernel
 def _no_step(data: Data) -> None:
-    """The forces of loops are those that a solve begins with."""
+    """Set the forces of loops to zero, with which a solve begins."""
     for row in range(data.couple_step.shape[0]):
         data.couple_step[row] = 0.0

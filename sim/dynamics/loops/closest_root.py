@@ -11,9 +11,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from solvers.types import Floats
+
 Error = Callable[[Floats], Floats]  # (m, k) of m places (m, n)
 
 CLOSED = 1e-11  # [m, rad]
@@ -72,7 +72,7 @@ def newton(error: Error, d: Floats) -> Zero:
 
 
 def nearest(error: Error, n: int, starts: int = STARTS) -> Zero:
-    """The zero nearest to d = 0 (n,) of those that are found; the least error that was met where there is none.
+    """The nearest zero to d = 0 (n,) among those found; without one, the smallest error.
 
     starts: how many of each distance.
     """

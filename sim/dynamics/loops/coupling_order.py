@@ -49,7 +49,7 @@ def moved_tree(model: Model, k: int, side: int) -> Tree:
 
 @kernel
 def order_couplings(model: Model, data: Data) -> int:
-    """couple_order, their number, and couple_linked: as they were, unless other couplings are active now."""
+    """Update couple_order, the number of couplings and couple_linked, if other couplings are active now."""
     pairs = model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
     changed = False
     n = 0

@@ -13,7 +13,7 @@ from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross
 from solvers.types import Vector
 
-_SHARE = 0.03  # of the kinetic energies before and after: forces of loops that give more in a step belong to no motion
+_SHARE = 0.03  # of the kinetic energies before and after; loop forces that give more in a step are no motion's
 
 
 @kernel

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.io.meshes.triangles import EXTRA, TriangleMesh
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 CONCAVITY = 0.05  # of a piece, relative to the mesh, that CoACD leaves
 

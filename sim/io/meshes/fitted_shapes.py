@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.io.meshes.reduced_hull import reduced_hull
 from sim.mechanism.pose import Pose
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 class Fitted(NamedTuple):

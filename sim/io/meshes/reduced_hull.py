@@ -6,9 +6,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 CORNERS = 32  # of a hull at most
 THIN = 1e-3  # [m] half thickness that a flat mesh gets

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.io.meshes.triangles import TriangleMesh
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 CREASE = np.cos(np.radians(40.0))  # between triangles that are shaded as one surface
 

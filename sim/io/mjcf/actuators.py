@@ -6,15 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.io.mjcf.joints import BALL, FREE
 from sim.io.mjcf.welded_bodies import Where, name_of, pose_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 _JOINT, _JOINT_IN_PARENT, _SITE = 0, 1, 4  # mjtTrn
 _FIXED_GAIN, _NO_BIAS, _NO_DYNAMICS = 0, 0, 0  # mjtGain, mjtBias, mjtDyn

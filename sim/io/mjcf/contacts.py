@@ -17,7 +17,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.io.loader_choices import LoaderChoices
 from sim.io.mjcf.welded_bodies import (
@@ -37,8 +36,8 @@ from sim.io.mjcf.welded_bodies import (
 from sim.io.urdf.report import Notes
 from sim.mechanism.contact import Contact
 from sim.mechanism.pose import Pose
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
 STANDING = (SPHERE, CAPSULE, BOX, CYLINDER, MESH)  # on balls and points
 _UNLESS = "are no obstacles (collisions=True makes them)"
 
@@ -92,7 +91,7 @@ def label_on(model: Any, g: int, p: int, touched: list[int]) -> str:
 
 
 def plane_pose(model: Any, p: int) -> Pose:
-    """Where a plane is, which may be on a body that is welded to the world."""
+    """Pose of a plane, which may be on a body that is welded to the world."""
     plane = pose_of(model.geom_pos[p], model.geom_quat[p])
     body = int(model.geom_bodyid[p])
     while body:

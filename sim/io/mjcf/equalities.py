@@ -13,15 +13,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.io.mjcf.welded_bodies import GeomGroup, Where, name_of, pose_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.gear import Gear
 from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.pose import HERE, Pose
-
-Floats = NDArray[np.float64]
 
 CONNECT, WELD, JOINT = 0, 1, 2  # mjtEq
 _OTHERS = {3: "tendon", 4: "flex", 5: "flexvert", 6: "flexstrain"}

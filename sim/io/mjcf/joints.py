@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.io.mjcf.welded_bodies import GeomGroup, name_of
 from sim.io.urdf.report import Notes
@@ -19,8 +18,7 @@ from sim.mechanism.axes import translation_axes
 from sim.mechanism.body import Body
 from sim.mechanism.joint import KINDS, WORLD, Joint
 from sim.mechanism.pose import HERE, Pose, turn
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
 _CLOSE = 1e-9

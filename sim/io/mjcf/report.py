@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sim.io.urdf.report import LinkFrame, Note
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.short_repr import short_repr
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 class MjcfWarning(UserWarning):

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.io.meshes.reduced_hull import reduced_hull
 from sim.io.urdf.inertia import RigidInertia, combined
@@ -14,8 +13,7 @@ from sim.io.urdf.solids import named
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.pose import HERE, Pose
 from sim.mechanism.shapes import Box, Capsule, Cylinder, Ellipsoid, Solid, Sphere, rotation_matrix
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = 0, 2, 3, 4, 5, 6, 7  # mjtGeom
 NO_SHAPE = {1: "height field", 8: "signed distance field"}

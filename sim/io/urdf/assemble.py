@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.io.loader_choices import LoaderChoices
 from sim.io.urdf.contacts import find_contacts
@@ -28,8 +28,7 @@ from sim.mechanism.joint import KINDS, WORLD, Joint
 from sim.mechanism.pose import HERE, Pose
 from sim.mechanism.stance import gaps, lifted, resting
 from sim.mechanism.visual import Visual
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 ROOT_JOINT = {
     False: "floating_base",

@@ -15,7 +15,6 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.io.loader_choices import LoaderChoices
 from sim.io.urdf.report import Notes
@@ -25,8 +24,8 @@ from sim.io.urdf.xml import UrdfError
 from sim.mechanism import checks
 from sim.mechanism.contact import Contact
 from sim.mechanism.pose import HERE, Pose
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
 Balls = list[tuple[Floats, float]]  # centre (3,) and radius [m]
 
 SHAPES = ("sphere", "box", "cylinder", "capsule", "hull")

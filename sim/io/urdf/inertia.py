@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism.pose import Pose
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 BALL_MASS = 1e-3  # [kg] of a repaired body that has no mass
 BALL_RADIUS = 0.01  # [m] of the ball whose extent is the least that a repaired body gets

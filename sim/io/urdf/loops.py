@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sim.io.urdf.report import Notes
 from sim.io.urdf.robot import Robot, UrdfJoint, read_joint
@@ -27,8 +27,7 @@ from sim.io.urdf.tree import Place
 from sim.io.urdf.xml import Element
 from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.pose import HERE, Pose, quaternion, roll_pitch_yaw
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 @dataclass(frozen=True)

@@ -5,14 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.short_repr import short_repr
-
-Floats = NDArray[np.float64]
-
+from solvers.types import Floats
 
 OVERLAPPING = "shapes that overlap in the neutral state, and do not collide"
 

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.io.urdf.report import Notes
 from sim.io.urdf.xml import Element
 from sim.mechanism.joint import KINDS as JOINT_KINDS
 from sim.mechanism.pose import HERE, Pose, roll_pitch_yaw
 from sim.mechanism.short_repr import short_repr
+from solvers.types import Floats
 
-Floats = NDArray[np.float64]
 T = TypeVar("T", "UrdfLink", "UrdfJoint")
 Palette = dict[str, tuple[float, ...]]  # red, green, blue, alpha of materials by name
 

@@ -6,17 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sim.io.urdf.robot import Geometry, UrdfLink
 from sim.io.urdf.tree import MergedLinks
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.pose import Pose
 from sim.mechanism.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from sim.mechanism.visual import Visual
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 def body_shapes(body: MergedLinks, com: Floats) -> tuple[Solid, ...]:

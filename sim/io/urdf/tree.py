@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.io.urdf.inertia import RigidInertia
 from sim.io.urdf.robot import Robot, UrdfJoint, UrdfLink
@@ -14,17 +13,15 @@ from sim.io.urdf.xml import UrdfError
 from sim.mechanism.joint import WORLD
 from sim.mechanism.pose import HERE, Pose, turn
 
-Floats = NDArray[np.float64]
-
 
 @dataclass
 class MergedLinks:
     """Links that move as one body; its frame is that of its first link, whose name it has."""
 
-    joint: UrdfJoint | None  # that it hangs on; None for the root
+    joint: UrdfJoint | None  # to its parent; None for the root
     parent: MergedLinks | None
     links: list[tuple[UrdfLink, Pose]] = field(default_factory=list)
-    fixed: bool = False  # whether it stays on its joint as if that was a fixed one
+    fixed: bool = False  # whether its joint is treated as a fixed one
     empty: bool = True  # whether all its links are without mass and inertia
 
     @property

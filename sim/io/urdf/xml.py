@@ -8,10 +8,8 @@ from pathlib import Path
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-
+from solvers.types import Floats
 
 _HUGE = 1e30  # no quantity of a robot; cubes of smaller numbers are finite
 

@@ -44,7 +44,7 @@ from solvers.status import Status
 from solvers.types import Cube, Integers, Vector
 
 SHORTEST = 1e-7  # [s]
-_IMPACT = 1e-6  # [kg s] mass times the shortest step with an impact; kappa is smallest there, its effect below rounding
+_IMPACT = 1e-6  # [kg s] mass times the shortest step with an impact: kappa is smallest there, its effect below rounding
 # (h w)^2 of the shortest step h, where w^2 = m g^2 h/kappa is the stiffness over m of a contact that carries m g
 _SETTLED = 10.0
 _LEAST_PRESSING = 1e-6  # [m/s, rad/s] accuracy: shorter impacts would round velocities

@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solvers.status import Status
-from solvers.types import Integers
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats, Integers
 
 # reasons that shorter steps may remove; they remove neither NaN nor contacts below the ground
 DIVISIBLE = frozenset(
@@ -19,10 +16,10 @@ DIVISIBLE = frozenset(
         Status.MAX_ITERATIONS,
         Status.NO_PROGRESS,
         Status.SINGULAR,
-        Status.ANGULAR_STEP,
-        Status.LOOP_STEP,
-        Status.COLLISION_STEP,
-        Status.ENERGY_STEP,
+        Status.TURN_TOO_LARGE,
+        Status.LOOP_SINGULAR,
+        Status.SHAPES_CROSSED,
+        Status.ENERGY_GAIN,
     )
 )
 

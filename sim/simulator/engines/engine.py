@@ -29,9 +29,7 @@ from sim.simulator.results import IMPULSE, NORMAL, POINT, Interrupted
 from sim.simulator.settings import Settings, of_call
 from solvers.compiler import Table
 from solvers.status import Status
-from solvers.types import Cube, Integers, Vector
-
-Floats = NDArray[np.float64]
+from solvers.types import Cube, Floats, Integers, Vector
 
 # numbers of a step, in loops that follow a law one more; and of one of its contacts or limits
 REPORT, CONTACT, CONE, BOUND = 6, 11, 12, 2

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.model.state_columns import BodyState
 from sim.simulator.engines.intervals import Intervals
@@ -14,9 +13,7 @@ from sim.simulator.engines.linked_model import LinkedModel
 from sim.simulator.engines.mean_states import MeanStates
 from sim.solve.start_velocity import SHORTEST
 from solvers.status import Status
-from solvers.types import Vector
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats, Vector
 
 
 class IntervalStates(MeanStates):

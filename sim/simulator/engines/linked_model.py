@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.model.layout import sizes_of, table
 from sim.model.model import Model
@@ -14,8 +13,7 @@ from sim.model.scratch import Scratch
 from sim.simulator.link_kernels import link_gradient, link_planner, link_poses, link_step
 from sim.simulator.settings import Settings
 from solvers.compiler import Table, link
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats
 
 
 class LinkedModel:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.dynamics import coordinates, coordinates_jacobian, energy, state_manifold, velocity
 from sim.model.interruptible_loops import rows
@@ -12,9 +11,7 @@ from sim.simulator.link_kernels import link_nodes
 from sim.simulator.results import SimulationError
 from sim.solve import start_velocity
 from solvers.status import MESSAGES, Status
-from solvers.types import Vector
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats, Vector
 
 
 class MeanStates:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.dynamics import coordinates, maximal_energy
 from sim.model.state_columns import BodyState
@@ -13,9 +12,7 @@ from sim.simulator.engines.linear_systems import solved
 from sim.simulator.engines.linked_model import LinkedModel
 from sim.simulator.engines.mean_states import MeanStates
 from solvers.status import Status
-from solvers.types import Vector
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats, Vector
 
 _BRIEF = 1e-3  # time steps, an interval in which dampers have next to no inertia
 

@@ -14,7 +14,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.dynamics.coordinates import node_poses
 from sim.dynamics.kinematics import velocity_columns
@@ -31,9 +30,7 @@ from solvers.codes import Code
 from solvers.compiler import kernel, link, optional, users_kernel
 from solvers.dense import clear
 from solvers.rotation import quat_mul
-from solvers.types import Matrix, Vector
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats, Matrix, Vector
 
 __all__ = ["CompiledKinematics", "KinematicQuantity"]
 
@@ -194,7 +191,7 @@ class CompiledKinematics:
         return self._kernel._numba_type_
 
     def __reduce__(self) -> Any:
-        """By its simulator: the addresses among the constants are those of this process."""
+        """By its simulator, since its constants hold addresses of this process."""
         return CompiledKinematics, self._arguments
 
     def __repr__(self) -> str:

@@ -19,9 +19,7 @@ from sim.model.data import Carry, Data
 from sim.model.layout import sizes_of
 from sim.model.model import Model
 from solvers.compiler import Table, users_callee
-from solvers.types import IntegerMatrix
-
-Floats = NDArray[np.float64]
+from solvers.types import Floats, IntegerMatrix
 
 __all__ = ["Frozen", "freeze", "put_table"]
 

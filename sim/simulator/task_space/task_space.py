@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.contact.group_wrenches import group_wrenches
 from sim.model.interruptible_loops import rows as parts_of
@@ -12,9 +11,7 @@ from sim.simulator.link_kernels import link_gradient, link_pairs, link_step
 from sim.simulator.task_space import contact_rows, distances, frames, momenta
 from sim.simulator.task_space.knot_rows import Rows
 from solvers.compiler import Table
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Floats, Integers
 
 __all__ = ["Buffers", "TaskSpace"]
 
