@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
-from dojo_opt.learn.gymnasium_tasks import BALANCE, DISTURBED, TRANSFER
+from dojo_opt.learn.gymnasium_tasks import BALANCE, COARSE, DISTURBED, TRANSFER
 from dojo_opt.learn.registration import task_of
 from dojo_opt.report.result import Report, Row, Table
 from solvers.types import Floats
@@ -43,14 +43,17 @@ SETTINGS: dict[str, dict[str, dict[str, Any]]] = {  # of shac, beside those of t
     "Hopper": {
         "shac": {},
         "ars": {"epochs": 100, "rate": 0.01, "noise": 0.025, "shift": 1.0, "randomization": BALANCE} | _RARELY,
+        "gradient_search": {"epochs": 1200, "horizon": 100, "randomization": BALANCE} | _RARELY,
     },
     "Walker2d": {
         "shac": {},
         "ars": {"epochs": 100, "rate": 0.03, "noise": 0.025, "shift": 1.0, "randomization": BALANCE} | _RARELY,
+        "gradient_search": {"epochs": 1200, "horizon": 100, "randomization": BALANCE} | _RARELY,
     },
     "Ant": {
         "shac": {},
-        "ars": {"epochs": 30, "rate": 0.015, "noise": 0.025, "shift": 1.0} | _RARELY,
+        "ars": {"epochs": 30, "rate": 0.015, "noise": 0.025, "shift": 1.0, "randomization": COARSE} | _RARELY,
+        "gradient_search": {"epochs": 1200, "horizon": 80, "randomization": COARSE} | _RARELY,
     },
     "Quadruped": {"shac": {}},
     "Pendulum": {"shac": {"epochs": 100}, "ars": {"epochs": 30}, "gradient_search": {"epochs": 100}},
@@ -71,8 +74,9 @@ BARS: dict[str, list[tuple[str, float]]] = {  # quantity of the seeds of shac or
 }  # fmt: skip
 _HEADER = (
     "algorithm", "seed", "return", "after 60 s", "unseen step and smoothing", "MuJoCo", "MuJoCo, time step / 5",
-    "MuJoCo, elliptic cones", "time [s]", "control steps", "unsolved", "gradients not finite",
+    "MuJoCo, elliptic cones", "MuJoCo, stiff", "time [s]", "control steps", "unsolved", "gradients not finite",
 )  # fmt: skip
+_PLANTS = sum(column.startswith("MuJoCo") for column in _HEADER)
 _COUNTS = {"unsolved steps": -2, "gradients not finite": -1}  # columns
 
 
@@ -142,11 +146,11 @@ def figure(folder: Path, names: list[str]) -> None:
 
 
 def in_mujoco(name: str, policies: list[Path]) -> list[list[float]]:
-    """Returns of policies in Gymnasium's environment, at a fifth of its time step, and with elliptic friction cones,
-    where Gymnasium has the task.
+    """Returns of policies in Gymnasium's environment, at a fifth of its time step, with elliptic friction cones, and
+    with stiff contacts at a fifth of its time step, where Gymnasium has the task.
     """
     if name not in JUDGED:
-        return [[float("nan")] * 3] * len(policies)
+        return [[float("nan")] * _PLANTS] * len(policies)
     judge = Path(__file__).with_name("evaluate_policy.py")
     with tempfile.TemporaryDirectory() as folder:
         there = Path(folder) / "returns.json"
@@ -162,7 +166,8 @@ def cells(folder: Path, name: str, algorithm: str) -> list[list[Any]]:
         for path in saved(folder, name, algorithm):
             with np.load(path, allow_pickle=False) as data:
                 here = float(data["returns"][-1]) if algorithm.endswith("_dojo") else None
-                there, ended = [float(v) for v in data["mujoco"]], [float(data["seconds"][-1]), int(data["steps"][-1])]
+                there = [*map(float, data["mujoco"]), *[None] * _PLANTS][:_PLANTS]  # old runs have fewer
+                ended = [float(data["seconds"][-1]), int(data["steps"][-1])]
             seed = int(path.stem.split("_")[-1])
             out.append([algorithm, seed, here, None, None, *there, *ended, None, None])
         return out
