@@ -54,7 +54,7 @@ COUNTS = {
     "pendulums": (lambda: dojo.models.npendulum(N), "npendulum(n)"),
     "sliders": (lambda: dojo.models.nslider(N), "nslider(n)"),
     "links": (lambda: dojo.models.orbital(N), "orbital(n)"),
-    "fits": (lambda: dojo.identify(SIM, [MOTION], ["mass"], starts=N), "identify(starts=...)"),
+    "fits": (lambda: dojo.identify(SIM, [MOTION], ["mass"], fits=N), "identify(fits=...)"),
     "environments": (lambda: dojo.learn.shac(task(), environments=N), "shac(environments=..., horizon=...)"),
     "directions": (lambda: dojo.learn.ars(task(), directions=N), "ars(directions=..., horizon=...)"),
     "models": (lambda: dojo.learn.Randomization(models=N), "Randomization(models=...)"),

@@ -12,11 +12,17 @@ import dojo_opt as dojo
 
 SIM = dojo.Simulator(dojo.models.npendulum(2), time_step=0.02)
 X, US = SIM.neutral(), np.zeros((3, SIM.nu))
+MOTION = SIM.rollout(X + 0.1, US)
 Q, V = X[: SIM.nq], X[SIM.nq :]
 
 
 def swingup() -> dojo.Problem:
     return dojo.Problem(SIM, X, 3, cost=dojo.cost.Effort(1.0))
+
+
+def fitted(**fits: int) -> dojo.Identified:
+    """A fit of dampers to a motion of two links."""
+    return dojo.identify(SIM, [MOTION], ["damper:*"], noise=1e-3, seed=2, max_iterations=3, **fits)
 
 
 OLD: dict[str, tuple[Callable[[], Any], Callable[[], Any], str]] = {
@@ -34,6 +40,13 @@ OLD: dict[str, tuple[Callable[[], Any], Callable[[], Any], str]] = {
         lambda: dojo.models.sphere().on(dojo.Terrain.slope(0.2)).contacts[0].normal,
         lambda: dojo.models.sphere().with_terrain(dojo.Terrain.slope(0.2)).contacts[0].normal,
         "Mechanism.with_terrain",
+    ),
+    "keyword of identify": (lambda: fitted(starts=2).values, lambda: fitted(fits=2).values, "fits="),
+    "identified.starts": (lambda: fitted().starts, lambda: fitted().window_starts, "Identified.window_starts"),
+    "identified.seconds": (
+        lambda: fitted().seconds > 0.0,
+        lambda: fitted().cpu_seconds > 0.0,
+        "Identified.cpu_seconds",
     ),
     "keyword of ilqr": (
         lambda: dojo.ilqr(swingup(), violation=1e-4, shooting=0.0).x,

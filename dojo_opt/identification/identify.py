@@ -32,6 +32,7 @@ from dojo_opt.identification.windows import Predictor, Window, WindowErrors, cut
 from dojo_opt.planning.executors import check_executor, results_in_order
 from sim.mechanism import checks
 from sim.mechanism.memory_limit import room_for
+from sim.mechanism.renamed import renamed, renamed_keywords
 from sim.mechanism.short_repr import short_table
 from sim.simulator.results import Trajectory
 from sim.simulator.simulator import Simulator
@@ -69,12 +70,12 @@ class Identified:
         unseen: combinations, by label, that change no prediction and have no prior.
         outliers: share of states with reduced weight.
         cost: cost of the data and the prior, see the module.
-        starts: (nx,) fitted first state of every window.
+        window_starts: (nx,) fitted first state of every window.
         windows: the measured windows, with the inputs that act under the delay.
         noise: (ndx,) standard deviations of the measurement.
         solved: whether each window could be predicted at the end.
         history: one record per iteration.
-        seconds: processor time [s].
+        cpu_seconds: processor time [s].
     """
 
     success: bool
@@ -89,12 +90,15 @@ class Identified:
     unseen: list[dict[str, float]]
     outliers: float
     cost: float = float("nan")
-    starts: list[Floats] = field(default_factory=list)
+    window_starts: list[Floats] = field(default_factory=list)
     windows: list[Window] = field(default_factory=list)
     noise: Floats = field(default_factory=lambda: np.zeros(0))
     solved: list[bool] = field(default_factory=list)
     history: list[dict[str, Any]] = field(default_factory=list)
-    seconds: float = 0.0
+    cpu_seconds: float = 0.0
+
+    starts = renamed("window_starts")
+    seconds = renamed("cpu_seconds")
 
     @property
     def unsolved(self) -> int:
@@ -125,7 +129,7 @@ class Identified:
     @cached_property
     def _predictions(self) -> list[tuple[Window, Trajectory, Floats]]:
         out, sim = [], self.simulator
-        for window, start, solved in zip(self.windows, self.starts, self.solved, strict=True):
+        for window, start, solved in zip(self.windows, self.window_starts, self.solved, strict=True):
             path = sim.rollout(start, window.u) if solved else None
             if path is not None and path.success:
                 out.append((window, path, sim.difference(path.x, window.x) / self.noise))
@@ -148,7 +152,7 @@ class Identified:
         """
         return (
             f"{self.status.name}: {self.message} rms {self.rms:.3f} of the noise, {100 * self.outliers:.1f} % "
-            f"outliers, {self.unsolved} windows unsolved, {self.seconds:.1f} s"
+            f"outliers, {self.unsolved} windows unsolved, {self.cpu_seconds:.1f} s"
         )
 
     def summary(self) -> str:
@@ -270,7 +274,7 @@ class IdentifyOptions:
         delay: time from an input to the moment when it acts [s]: a number if it is known, or the range (low, high) of a
             delay to fit, as the parameter "delay" (default 0). An input that acts within a step counts with its share
             of the step; before a motion, inputs are those of its first step. Delays have local minima, a time step
-            apart: give `starts`, which are spread over the range evenly.
+            apart: give `fits`, which are spread over the range evenly.
         kappas: smoothing of contacts, one after the other [N s m]: smooth contacts act at a distance (default None:
             that of the simulator).
         outlier: number of deviations; states whose errors have a larger root mean square count linearly (default 3).
@@ -306,7 +310,7 @@ def identify(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     prior: Mapping[str, Any] | None = None,
     noise: ArrayLike = 1.0,
-    starts: int = 1,
+    fits: int = 1,
     seed: int = 0,
     executor: Executor | None = None,
     **options: Any,
@@ -324,7 +328,7 @@ def identify(
             one for each component. A few motions determine a few parameters; the others stay at their priors.
         noise: standard deviation of the measured state, a number or (ndx,); infinite for components without a
             measurement.
-        starts: number of fits; the first begins with the values of `sim`, further ones with values drawn from the
+        fits: number of fits; the first begins with the values of `sim`, further ones with values drawn from the
             prior, or around those of `sim` with a deviation of three tenths (default 1). The best one is returned.
         seed: of these values (default 0).
         executor: whose workers fit, as for `dojo.monte_carlo`; the result does not depend on it (default None).
@@ -340,6 +344,9 @@ def identify(
     call = "identify"
     if not isinstance(sim, Simulator):
         raise TypeError(f"{call}(sim): expected a Simulator, got {sim!r}")
+    if "starts" in options:  # its name until version 0.2
+        renamed_keywords(call, options, {"starts": "fits"})
+        fits = options.pop("fits")
     checks.keywords(f"{call}(...)", options, [f.name for f in fields(IdentifyOptions)])
     o = IdentifyOptions(**options)
     parameters, bodies = checks.names(f"{call}(parameters)", parameters), checks.names(f"{call}(bodies=...)", bodies)
@@ -352,12 +359,12 @@ def identify(
     check_executor(call, executor)
     known = Prior(space, checks.mapping(f"{call}(prior=...)", prior))
     windows = cut_windows(sim, trajectories, o.window, space.past)
-    count = room_for(f"{call}(starts=...)", starts, 8.0 * sum(w.x.size for w in windows))
+    count = room_for(f"{call}(fits=...)", fits, 8.0 * sum(w.x.size for w in windows))
     first = _first_values(space, known, count, checks.whole_number(f"{call}(seed=...)", seed, 0))
     calls = [(space, windows, deviations, o, known, values) for values in first]
     found = list(results_in_order(_fitted, calls, executor))
     best = min(found, key=lambda each: (each.unsolved, each.cost))
-    return replace(best, seconds=sum(each.seconds for each in found))
+    return replace(best, cpu_seconds=sum(each.cpu_seconds for each in found))
 
 
 def _first_values(space: DelayedSpace, known: Prior, count: int, seed: int) -> list[Floats]:

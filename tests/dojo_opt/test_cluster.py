@@ -41,7 +41,7 @@ def _starts(executor=None):
     first = truth.neutral()
     first[truth.nq] = 2.0
     motions = [truth.rollout(first, steps=30)]
-    found = dojo.identify(block(0.6), motions, ("friction:*",), noise=1e-3, starts=4, seed=1, executor=executor)
+    found = dojo.identify(block(0.6), motions, ("friction:*",), noise=1e-3, fits=4, seed=1, executor=executor)
     assert abs(found.values[0] - 0.3) < 0.02
     return [found.values, found.covariance]
 

@@ -106,10 +106,10 @@ def test_several_starts_leave_a_local_minimum_and_need_not_be_fitted_here():
     known = {"prior": {name: (0.1, 0.1)}, "noise": 0.05, "bounds": {"armature:hinge": (1e-3, 1.0)}}
     alone = dojo.identify(wrong, motions, (name,), **known)
     assert abs(alone.values[0] - 0.02) > 0.05
-    several = dojo.identify(wrong, motions, (name,), starts=6, seed=1, **known)
+    several = dojo.identify(wrong, motions, (name,), fits=6, seed=1, **known)
     assert several.success and abs(several.values[0] - 0.02) < 1e-3 and several.cost < 0.01 * alone.cost
     with ThreadPoolExecutor(2) as pool:
-        elsewhere = dojo.identify(wrong, motions, (name,), starts=6, seed=1, executor=pool, **known)
+        elsewhere = dojo.identify(wrong, motions, (name,), fits=6, seed=1, executor=pool, **known)
     np.testing.assert_array_equal(elsewhere.values, several.values)
     with pytest.raises(TypeError, match=r"identify\(executor=\.\.\.\)"):
         dojo.identify(wrong, motions, (name,), executor=3, **known)
@@ -160,7 +160,7 @@ def test_a_quadruped_finds_payload_friction_and_damping_in_its_own_log():
     measured = sim.integrate(motion.x, noise * rng.standard_normal((len(motion.x), sim.ndx)))
     late = 1  # [steps] from what the log says to what acts
     log, limits = (measured[:-late], motion.u[late:]), (0.0, 4.0 * sim.time_step)
-    found = dojo.identify(sim, [log], tuple(truth), noise=noise, window=10, delay=limits, starts=4)
+    found = dojo.identify(sim, [log], tuple(truth), noise=noise, window=10, delay=limits, fits=4)
     assert found.success and found.labels == (*truth, "delay")
     values = np.array([*truth.values(), late * sim.time_step])
     assert np.all(np.abs(found.start - values) > 0.1 * values)

@@ -57,12 +57,20 @@ def test_plans_once_per_period_and_one_iteration_each():
 
 @pytest.mark.parametrize(("patience", "begun"), [(None, [0, 0, 0, 0, 0]), (2, [0, 0, 3, 3, 3])])
 def test_stalled_ticks_begin_with_rollouts_after_the_patience(monkeypatch, patience, begun):
-    """The first plan counts as a new one; rollouts under the gains, half of them, and none are compared."""
+    """From the measured state, without gaps: the states of an old plan are far from it by then. The first plan counts
+    as a new one; rollouts under the gains, half of them, and none are compared.
+    """
     mpc = dojo.MPC(standing_problem(), patience=patience)
     x = HOPPER.neutral()
     mpc(0.0, x)
-    rollouts = []
-    roll = mpc._solver.rollout
+    rollouts, closed = [], []
+    roll, iterate = mpc._solver.rollout, mpc._solver.iterate
+
+    def watched(guess, K, **given):
+        closed.append(guess.gaps is None and guess.kappa is not None)
+        return iterate(guess, K, **given)
+
+    monkeypatch.setattr(mpc._solver, "iterate", watched)
     monkeypatch.setattr(mpc._solver, "rollout", lambda *given: (rollouts.append(1), roll(*given))[1])
     monkeypatch.setattr(mpc, "_usable", lambda result, guess: False)
     monkeypatch.setattr(mpc, "_rolled", lambda guess, K: None)
@@ -73,6 +81,7 @@ def test_stalled_ticks_begin_with_rollouts_after_the_patience(monkeypatch, patie
         counts.append(len(rollouts))
         assert mpc.log[-1].fallback
     assert counts == begun
+    assert closed == [count > 0 for count in begun]
 
 
 def test_runs_are_the_same_again_and_after_pickling():

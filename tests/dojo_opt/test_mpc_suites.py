@@ -193,24 +193,6 @@ def test_a_rejected_step_does_not_make_a_plan_that_has_fallen(monkeypatch):
         assert mpc.log[-1].fallback != taken
 
 
-def test_a_tick_begins_with_rollouts_when_no_plan_came_for_a_while(monkeypatch):
-    """From the measured state, without gaps: the states of an old plan are far from it by then."""
-    sim = dojo.Simulator(arm(), time_step=0.05, kappa=1e-4)
-    mpc = reaching(sim, patience=3)
-    mpc(0.0, [0.0, 0.0])
-    solver, begun = mpc._solver, []
-
-    def iterate(guess, K, **_):
-        begun.append(guess.gaps is None and guess.kappa is not None)
-        return Iteration(Status.SIMULATION_FAILED, "", guess, K, np.zeros((20, 1)), [])
-
-    monkeypatch.setattr(solver, "iterate", iterate)
-    for tick in range(1, 6):
-        mpc(0.05 * tick, mpc.policy.state(0.05 * tick) + 0.1)
-    assert [tick.fallback for tick in mpc.log] == [False] + 5 * [True]
-    assert begun == [False, False, False, True, True]
-
-
 def test_mujoco_has_the_same_hills():
     """A ray from above meets MuJoCo's height field where the terrain is; a foot that falls on a hill rests there."""
     mujoco = pytest.importorskip("mujoco")
