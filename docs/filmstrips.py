@@ -94,7 +94,7 @@ def main(argv: list[str] | None = None) -> int:
     from matplotlib.image import imsave
 
     walking = "humanoids" in (sys.argv[1:] if argv is None else argv)
-    strips = [pushed(name) for name in ("atlas", "g1")] if walking else [suite(*task) for task in SECONDS.items()]
+    strips = [pushed(name) for name in ("atlas", "talos")] if walking else [suite(*task) for task in SECONDS.items()]
     out = HERE / ("humanoids.png" if walking else "filmstrips.png")
     imsave(out, np.concatenate(strips))
     print(f"wrote {out}, {out.stat().st_size / 1e6:.1f} MB")

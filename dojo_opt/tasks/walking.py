@@ -32,7 +32,10 @@ _SPEED, _SPIN, _RATE = 31.0, 0.33, 0.011  # of their rates
 _END = 10.0  # times the weights, at the end
 _EFFORT, _SLIP, _NEAR = 2e-3, 100.0, 0.01
 _DAMPER = 0.12  # share of the usual damper of a gait
-_BEND, _LEAD = 0.7, 0.032  # [rad], [m]
+# [rad] with .7 a Talos at .6 m/s slides one foot instead of lifting it, and is too slow, and a G1 that stands seldom
+# steps when it is pushed; with 1.6 it falls more often
+_BEND = 1.3
+_LEAD = 0.04  # [m] with .05, or with .032 and a G1 at .6 m/s, robots fall more often
 _HARD = 0.1  # of the kappa of plans: the equilibrium whose torques are the reference
 _UPRIGHT, _ABOUT = np.eye(4)[[0, 3]]  # quaternions: no turn, half a turn about z
 _CAREFUL = 0.75  # share of the friction that plans assume
