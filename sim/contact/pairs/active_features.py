@@ -46,7 +46,7 @@ _OVERLAP = 1e-4  # part of the smallest size by which shapes may overlap at the 
 _LAST_RESORT = 1e-2  # the same, where elements are chosen at every pose, and where other attempts found no less
 
 
-@optional(Slot.OPEN_PAIRS)
+@optional(Slot.OPEN_PAIRS, seldom=True)
 def open_pairs(model: Model, data: Data, j: int) -> float:
     """Where a collision begins: pair_before, the pose at configuration 2 now in pair_relative, and pair_sides, the axes
     that separate the shapes; returns their distance.

@@ -65,7 +65,7 @@ def enlist_pairs(model: Model, data: Data) -> None:
     data.active_count[0] = n
 
 
-@optional(Slot.BEGIN_PAIRS)
+@optional(Slot.BEGIN_PAIRS, seldom=True)
 def begin_pairs(model: Model, data: Data, options: StepOptions) -> None:
     """Which collisions are active, and the poses of their shapes at configuration 2, where the step begins."""
     change = 0.0
@@ -212,7 +212,7 @@ def add_inactive_pairs(data: Data) -> None:
             data.wrench[i, k] += data.inactive_wrench[i, k]
 
 
-@optional(Slot.PAIRS_CAME_NEAR, default=False)
+@optional(Slot.PAIRS_CAME_NEAR, default=False, seldom=True)
 def pairs_came_near(model: Model, data: Data) -> bool:
     """Whether an inactive collision has become active at configuration 3; it is active from now on."""
     found = False

@@ -84,7 +84,7 @@ def pair_slack(model: Model, data: Data) -> float:
     return total
 
 
-@optional(Slot.PAIRS_GAINED, default=False)
+@optional(Slot.PAIRS_GAINED, default=False, seldom=True)
 def pairs_gained(model: Model, data: Data, options: StepOptions, v: Vector) -> bool:
     """Whether the impulses of collisions gave energy in the solved step, of shapes that were apart where it began."""
     h = options.h
