@@ -19,6 +19,7 @@ from numba.core.sigutils import normalize_signature
 from numba.core.types.misc import unliteral
 
 from solvers.compiler.cache import CALLEE, INNER, STORE, KernelCache, cache_folder, prepare, shipped
+from solvers.compiler.frame_stack import with_room
 from solvers.compiler.function_digest import CompiledFunction
 from solvers.compiler.pipeline import FAST, EntryCompiler, InnerCompiler, OptionalCompiler
 from solvers.compiler.signals import signals_outside_locks
@@ -95,7 +96,7 @@ class _Form(CPUDispatcher):
                 return code.entry_point
             self._cache_misses[sig] += 1
             with trigger_event("numba:compile", data={"dispatcher": self, "args": args, "return_type": result}):
-                code = self._compiler.compile(args, result)
+                code = with_room(self._compiler.compile, args, result)
                 self.add_overload(code)
             self._cache.save_overload(sig, code)
             return code.entry_point

@@ -80,7 +80,7 @@ def distance(model: Model, data: Data, first: int) -> float:
     return least
 
 
-@optional(Slot.CHOOSE_SHAPES)
+@optional(Slot.CHOOSE_SHAPES, seldom=True)
 def choose_shapes(model: Model, data: Data, first: int) -> None:
     """pair_code, pair_out: the elements of all points of a collision, chosen at pair_relative."""
     kind = model.pair_kind[first]

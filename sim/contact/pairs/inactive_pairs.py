@@ -146,7 +146,7 @@ def _change(model: Model, data: Data, options: StepOptions, j: int, a: float) ->
     return 2.0 * lever * push * (1.0 + (1.0 + mu + 2.0 * mu * mu / options.h) / a + STEEPEST / f[PairBound.REACH])
 
 
-@optional(Slot.FAR_PAIR_IMPULSES)
+@optional(Slot.FAR_PAIR_IMPULSES, seldom=True)
 def far_pair_impulses(model: Model, data: Data, h: float, kappa: float) -> None:
     """Wrenches of the inactive collisions at configuration 3, evaluated again where they may have changed."""
     if data.pair_change[0] == 0.0 or not _moved(model, data):
