@@ -75,8 +75,9 @@ measure parameter_derivatives "$python" "$here/benchmarks/parameter_derivatives.
 if "$python" -c 'import importlib.metadata as m; m.version("example-robot-data")' 2>/dev/null; then
     measure urdf_zoo "$python" "$here/benchmarks/urdf_zoo.py" $quick --out "$out"
     measure robots "$python" "$here/benchmarks/robots.py" $quick --out "$out"
+    measure shapes "$python" "$here/benchmarks/shapes.py" $quick --out "$out"
 else
-    echo "== urdf_zoo, robots: left out, example-robot-data is not installed"
+    echo "== urdf_zoo, robots, shapes: left out, example-robot-data is not installed"
 fi
 measure hopper "$python" "$here/examples/hopper.py" $quick
 

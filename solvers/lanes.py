@@ -30,13 +30,16 @@ __all__ = [
     "SIDE",
     "Lanes",
     "Six",
+    "at_least",
     "dot_lanes",
     "keep",
+    "least",
     "load",
     "minus_outer",
     "plus",
     "plus_outer",
     "put",
+    "root",
     "six",
     "spread",
     "store",
@@ -132,6 +135,39 @@ def _total(typing: Any, x: Any) -> Any:
     return types.float64(_LANES), lower
 
 
+def _smaller(builder: Any, x: Any, y: Any) -> Any:
+    return builder.select(builder.fcmp_ordered("<", x, y), x, y)
+
+
+@intrinsic
+def _least(typing: Any, x: Any) -> Any:
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        lanes = [builder.extract_element(args[0], ir.Constant(ir.IntType(32), k)) for k in range(LANES)]
+        while len(lanes) > 1:
+            lanes = [_smaller(builder, a, b) for a, b in zip(lanes[::2], lanes[1::2], strict=True)]
+        return lanes[0]
+
+    return types.float64(_LANES), lower
+
+
+@intrinsic
+def _at_least(typing: Any, x: Any, number: Any) -> Any:
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        bound = _spread(builder, args[1])
+        return builder.select(builder.fcmp_ordered(">", args[0], bound), args[0], bound)
+
+    return _LANES(_LANES, types.float64), lower
+
+
+@intrinsic
+def _root(typing: Any, x: Any) -> Any:
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        kind = ir.FunctionType(_Vector, [_Vector])
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.sqrt.v{LANES}f64"), args)
+
+    return _LANES(_LANES), lower
+
+
 @intrinsic
 def _spread_number(typing: Any, number: Any) -> Any:
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -171,6 +207,24 @@ def total(x: Lanes) -> float:
     return float(x.reshape(-1, 2).sum(axis=1).reshape(-1, 2).sum(axis=1).sum())
 
 
+@compiled_as(_least)
+def least(x: Lanes) -> float:
+    """The smallest lane; not defined where one is NaN."""
+    return float(x.min())
+
+
+@compiled_as(_at_least)
+def at_least(x: Lanes, number: float) -> Lanes:
+    """The larger of each lane and the number; the number where a lane is NaN."""
+    return np.where(x > number, x, number)
+
+
+@compiled_as(_root)
+def root(x: Lanes) -> Lanes:
+    """Square roots."""
+    return np.sqrt(x)
+
+
 def _operator(op: Any, instruction: str) -> None:
     """An operator on lanes, and on a number and lanes."""
 
@@ -184,7 +238,12 @@ def _operator(op: Any, instruction: str) -> None:
     kernel_operator(op, types.float64, _LANES, _LANES, number_first)
 
 
-for _op, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
+for _op, _instruction in (
+    (operator.add, "fadd"),
+    (operator.sub, "fsub"),
+    (operator.mul, "fmul"),
+    (operator.truediv, "fdiv"),
+):
     _operator(_op, _instruction)
 
 

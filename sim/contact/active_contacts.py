@@ -25,6 +25,7 @@ from sim.contact.contact_law import (
     slip_violation,
     start_contact,
 )
+from sim.contact.corners import add_corner_laws, add_corner_slips
 from sim.contact.ground_contact import (
     add_contact_law,
     add_contact_turn,
@@ -98,6 +99,7 @@ def condense_contacts(
         add_contact_turn(model, data, c, indefinite * fn, indefinite * f1, indefinite * f2, out)
         if model.contact_terrain[c] > 0:
             add_frame_matrix(model, data, c, indefinite * fn, indefinite * f1, indefinite * f2, out)
+    add_corner_laws(model, data, h, indefinite, form == LawForm.SOFT, out)
 
 
 @optional(Slot.ADD_SLIP_JACOBIANS)
@@ -107,6 +109,7 @@ def add_slip_jacobians(model: Model, data: Data, h: float) -> None:
         c = data.active[m]
         if data.bounce[c, Bounce.RESTITUTION] == 0.0:
             add_slip_jacobian(model, data, h, c)
+    add_corner_slips(model, data, h)
 
 
 @optional(Slot.CONTACTS_OVERLAP, default=(0.0, 0.0))

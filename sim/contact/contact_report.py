@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from sim.contact.contact_law import contact_error, report_contact, slip_violation
+from sim.contact.corners import report_corners
 from sim.contact.ground_contact import contact_kinematics
 from sim.contact.inactive import sunk_contact
 from sim.contact.pairs.pair_report import report_pairs
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import Bound
+from sim.model.record_columns import Bound, Cluster
 from sim.model.slots import Slot
 from solvers.compiler import inlined, optional
 from solvers.types import Matrix
@@ -51,9 +52,15 @@ def report_ground(model: Model, data: Data, h: float, out: Matrix) -> None:
     for m in range(data.inactive_count[0]):
         first = data.inactive_first[m]
         for c in range(first, model.cluster_end[first]):
-            if data.contact_out[c] == 1:
+            if data.contact_out[c] == 1 and model.cluster[first, Cluster.CORNERS] == 0.0:
                 contact_kinematics(model, data, h, c)
+    first = 0
     for c in range(model.contact_height.shape[0]):
+        if model.cluster_end[c] > 0:
+            first = c
+            report_corners(model, data, h, c, out)
         if model.contact_hold[c] != 0:
             contact_kinematics(model, data, h, c)
+        elif data.contact_out[c] == 1 and model.cluster[first, Cluster.CORNERS] > 0.0:
+            continue
         report_contact(model, data, c, data.contact_frame[c], out[c])

@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.contact_law import contact_impulse, start_contact
+from sim.contact.corners import evaluate_corners, gather_corners
 from sim.contact.inactive_bounds import ANGLE, NEARER, bound_changes, keep_motion
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.dynamics.displacements import third_quaternion
@@ -59,7 +60,10 @@ def update_inactive(model: Model, data: Data, h: float) -> None:
             if not law + arms <= fraction:
                 evaluate_on_terrain(model, data, h, c)
         elif not law <= fraction:
-            _evaluate(model, data, h, c)
+            if model.cluster[c, Cluster.CORNERS] > 0.0:
+                _evaluate_corners(model, data, h, c)
+            else:
+                _evaluate(model, data, h, c)
         elif data.inactive[c, Inactive.TURNED] > 0.0 or law + arms > fraction:
             data.inactive[c, Inactive.TURNED] = 1.0
             turn_arms(model, data, c)
@@ -101,14 +105,21 @@ def _slip_coefficients(row: Vector, R: Vector, f: Vector, k: int) -> tuple[float
 
 
 @kernel
-def _keep_arms(row: Vector, n: Vec3, x: Vec3, y: Vec3) -> None:
-    """Inactive.ARMS = sums of p times the impulses along n, t1 and t2; they turn with the body: Inactive.BY_TURN."""
-    turning = abs(n[0]) + abs(n[1]) + abs(n[2]) + abs(x[0]) + abs(x[1]) + abs(x[2])
-    turning = turning + abs(y[0]) + abs(y[1]) + abs(y[2])
+def _bound_turn(row: Vector) -> None:
+    """Inactive.BY_TURN, by which the moments of Inactive.ARMS turn with the body."""
+    turning = 0.0
+    for k in range(9):
+        turning += abs(row[Inactive.ARMS + k])
     row[Inactive.BY_TURN] = turning / (1.0 - NEARER)
+
+
+@kernel
+def _keep_arms(row: Vector, n: Vec3, x: Vec3, y: Vec3) -> None:
+    """Inactive.ARMS = sums of p times the impulses along n, t1 and t2."""
     put_three(n, Inactive.ARMS, row)
     put_three(x, Inactive.ARMS + 3, row)
     put_three(y, Inactive.ARMS + 6, row)
+    _bound_turn(row)
 
 
 @kernel
@@ -159,6 +170,21 @@ def _evaluate(model: Model, data: Data, h: float, c: int) -> None:
     for k in range(3):
         row[Inactive.FORCE + k] = N * f[k] + X * f[3 + k] + Y * f[6 + k]
     row[Inactive.RADIUS_ARMS], row[Inactive.RADIUS_ARMS + 1], row[Inactive.TURNED] = rX, rY, 0.0
+    turn_arms(model, data, c)
+
+
+@kernel
+def _evaluate_corners(model: Model, data: Data, h: float, c: int) -> None:
+    """`_evaluate` of a cluster of corners, of which all are inactive if it is so as a whole."""
+    row = data.inactive[c]
+    keep_motion(data, h, model.contact_body[c], row)
+    if row[Inactive.CORNERS] == 0.0:
+        gather_corners(model, data, c, -1e300)
+    evaluate_corners(model, data, h, c)
+    row[Inactive.SHARE] = -1.0
+    bound_changes(model, data, c, (1.0 - NEARER) * row[Inactive.LEAST_GAP])
+    _bound_turn(row)
+    row[Inactive.RADIUS_ARMS] = row[Inactive.RADIUS_ARMS + 1] = row[Inactive.TURNED] = 0.0
     turn_arms(model, data, c)
 
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.model.model import Model
+from sim.model.model import Law, Model
 from solvers.types import Floats
 
+_LINEAR = int(Law.LINEAR)
+
+MANY = 8  # contacts of a cluster, as of a box: more are a mesh
 STIFFNESS = 1000.0  # largest e (inactive.py) of an omitted contact, in units of the tolerance
 
 
@@ -33,7 +36,9 @@ def pack_clusters(model: Model) -> None:
         model.cluster_end[first] = end
         turn = _swing(inertia, points.mean(axis=0)) * easy
         several = np.count_nonzero(model.contact_body[:count] == body)
-        model.cluster[first] = *center, around, arm, mobility, friction, turn, several
+        others = radii.any() or model.contact_terrain[first] or np.any(model.contact_law[first:end] == _LINEAR)
+        corners = end - first > MANY and not others
+        model.cluster[first] = *center, around, arm, mobility, friction, turn, several, corners
 
 
 def _swing(inertia: Floats, p: Floats) -> float:

@@ -103,7 +103,7 @@ class Model(NamedTuple):
     terrain_place: Matrix  # (nterrain, 8) Grid, see contact/height_field.py
     terrain_heights: Vector  # (nheight,) coefficients of all terrains [m]
     terrain_rates: Vector  # (nheight,) their derivatives by the radius of the contacts
-    cluster: Matrix  # (nground, 9) in the row of the first contact of a cluster: Cluster
+    cluster: Matrix  # (nground, 10) in the row of the first contact of a cluster: Cluster
     pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
     pair_far: Matrix  # (npair, 8) at the first pair of a collision, whether it is active: PairBound
     hull: Matrix  # (nhull, 4) tables of the polytopes that collide (collision/polytope_table.py)

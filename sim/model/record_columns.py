@@ -124,7 +124,22 @@ class Inactive(Code):
     ARMS = 25  # (3, 3) sums of p times the impulses along n, t1 and t2
     RADIUS_ARMS = 34  # (2,) sums of radius times impulse along t1 and t2
     TURNED = 36  # 1 where only the arms have been turned since the impulses were evaluated
-    STIFF = 37  # 1 where derivatives take it as active
+    STIFF = 37  # 1 where derivatives do not omit it
+    CORNERS = 38  # 1 where its law is in the matrix (contact/corners.py)
+    SHARE = 39  # `indefinite` of the law in corner_law; -1 where that has not been evaluated
+
+
+class Corner(Code):
+    """corners: rows of numbers by contact with the ground, for clusters of corners (contact/corners.py)."""
+
+    POINT = 0  # (3,) in the body
+    FRICTION = 3
+    OFFSET = 4  # height of the plane
+    OUT = 5  # 1 for an inactive contact, 0 for an active one
+    GAP = 6  # of the last evaluation, with
+    IMPULSE = 7
+    FRICTION1 = 8  # beta
+    FRICTION2 = 9
 
 
 class Apart(Code):
@@ -144,6 +159,7 @@ class Cluster(Code):
     FRICTION = 6  # largest
     TURNING = 7  # T
     CONTACTS = 8  # those of its body
+    CORNERS = 9  # 1 for many points on a plane, as of a mesh (contact/corners.py)
 
 
 class Bounce(Code):

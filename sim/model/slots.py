@@ -221,3 +221,9 @@ class Slot(Code):
     ADD_LOOP_SIZES = 178
     # kinematics that functions of the user call
     KINEMATIC_QUANTITY = 179
+    # corners of meshes whose law is evaluated, and in the matrix
+    EVALUATE_CORNERS = 180
+    ADD_CORNER_LAWS = 181
+    ADD_CORNER_SLIPS = 182
+    TAKE_CORNERS = 183
+    REPORT_CORNERS = 184

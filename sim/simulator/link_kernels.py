@@ -30,7 +30,8 @@ from sim.contact.active_contacts import (
 from sim.contact.collision.pair_kernels import KERNELS
 from sim.contact.contact_law import slip_noise
 from sim.contact.contact_report import report_ground, worst_contact
-from sim.contact.inactive import all_stiff, choose_active, has_activated, sunk_contact
+from sim.contact.corners import add_corner_laws, add_corner_slips, evaluate_corners, report_corners
+from sim.contact.inactive import all_stiff, choose_active, has_activated, sunk_contact, take_corners
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.contact.pairs.active_features import choose_pairs, choose_shapes, open_pairs, overlapping
 from sim.contact.pairs.clearance import measure_pairs, omitted_pairs, pairs_reached
@@ -110,6 +111,7 @@ from sim.dynamics.loops.loop_velocity import close_velocity
 from sim.dynamics.loops.loop_work import loop_slack, loops_gained
 from sim.integrators.mean_velocity import close_interval
 from sim.model.model import Law, Model
+from sim.model.record_columns import Cluster
 from sim.model.shape_kinds import CHOSEN, SWAPPED, Pair
 from sim.solve.delassus import contact_answers, contact_rates, delassus
 from sim.solve.energy_balance import energies_gained
@@ -318,6 +320,8 @@ def link_terms(model: Model) -> None:
         link(model.optional, *_CONTACTS)
     if len(model.contact_height):
         link(model.optional, *_GROUND, *_PREDICTION_OF_CONTACTS)
+    if np.any(model.cluster[:, Cluster.CORNERS]):
+        link(model.optional, evaluate_corners, add_corner_laws, report_corners)
     if _is_predicted(model):
         link(model.optional, *_PREDICTION)
     if np.any(model.limit_cone):
@@ -359,6 +363,8 @@ def link_gradient(model: Model) -> None:
         link(model.optional, add_stiffness)
     if len(model.contact_height):
         link(model.optional, add_slip_jacobians, all_stiff)
+    if np.any(model.cluster[:, Cluster.CORNERS]):
+        link(model.optional, add_corner_slips, take_corners)
     if len(model.limit_dof):
         link(model.optional, add_limit_derivatives)
     if np.any(model.dry_input >= 0):

@@ -20,7 +20,7 @@ def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDA
     """
     out = np.zeros(len(model.contact_body))
     for first in np.flatnonzero(model.cluster_end):
-        _, _, _, _, _, mobility, mu, turn, _ = model.cluster[first]
+        _, _, _, _, _, mobility, mu, turn, _, _ = model.cluster[first]
         scale = len(out) * kappa / (STIFFNESS * tolerance)
         b, c = scale * time_step * (1.0 + mu) * turn, scale * (mu * mu + time_step * (1.0 + mu)) * mobility
         out[first : model.cluster_end[first]] = b + np.sqrt(b * b + 4.0 * c)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sim.contact.corners import add_corner_laws
 from sim.dynamics.elimination import factor
 from sim.dynamics.joints.joint_forces import joint_blocks
 from sim.dynamics.kinematics import velocity_columns
@@ -22,6 +23,7 @@ def free_matrix(model: Model, data: Data, h: float, q: Vector, v: Vector) -> Non
 
 @kernel
 def factor_free(model: Model, data: Data, h: float, q: Vector, v: Vector) -> bool:
-    """Free matrix, eliminated; False if it is singular."""
+    """Free matrix with the laws of inactive corners, eliminated; False if it is singular."""
     free_matrix(model, data, h, q, v)
+    add_corner_laws(model, data, h, 1.0, False, data.A)
     return factor(model, data) != 0

@@ -16,6 +16,8 @@ import dojo_opt as dojo
 from sim.model.record_columns import Inactive
 from sim.simulator.omitted_contacts import reach
 from support.jacobians import check_jacobian
+from support.parameter_case import Case
+from support.parameter_errors import error
 from support.scenes import LAWS, ball, block, chain, gaps, pendulum
 
 TOLERANCE = 1e-8
@@ -211,26 +213,63 @@ def test_corners_of_a_body_that_touches_are_inactive_one_by_one(rng):
     )
 
 
-def test_corners_of_a_mesh_count_with_their_own_gaps(rng):
-    """The stiffness of the inactive ones, relative to the inertia, adds up to a tenth at most, and nearly to that."""
-    points = rng.normal(size=(96, 3))
+def mesh(rng, radius=0.0, friction=0.6, law="nonlinear", count=96):
+    """A ball of corners."""
+    points = rng.normal(size=(count, 3))
     points *= 0.05 / np.linalg.norm(points, axis=1)[:, None]
-    contacts = [dojo.Contact("body0", p, friction=0.6) for p in points]
-    mech = dataclasses.replace(chain("floating", 0, gravity=(0.0, 0.0, -9.81)), contacts=contacts)
-    h, kappa = 0.01, 1e-7
-    sim = dojo.Simulator(mech, time_step=h, kappa=kappa, tolerance=1e-11)
+    contacts = [
+        dojo.Contact("body0", p, radius, friction=friction, law=law, name=f"c{k}") for k, p in enumerate(points)
+    ]
+    mech = chain("floating", 0, gravity=(0.0, 0.0, -9.81))
+    return dataclasses.replace(mech, contacts=contacts), points
+
+
+def moving(sim, points, gap=1e-4):
+    """On the ground, turning and sliding."""
     x = sim.neutral()
-    x[2] = 1e-4 - points[:, 2].min()
-    sim.step(x, throw=True)
-    data = sim._engine.last()
-    active = data.active[: int(data.active_ground_count[0])]
-    inactive = np.setdiff1d(np.arange(96), active)
-    _, _, _, _, _, mobility, mu, turning, _ = sim.model.cluster[0]
-    a = 0.5 * (x[2] + points[inactive, 2])
-    e = kappa * ((mu**2 + h * (1.0 + mu)) * mobility / a**2 + h * (1.0 + mu) * turning / a)
-    assert 0.03 < e.sum() < 0.1
-    assert (x[2] + points[active, 2]).max() < (x[2] + points[inactive, 2]).min()
-    assert 0 < len(active) < 48
+    x[2], x[7:] = gap + 0.01 - points[:, 2].min(), [0.3, -0.2, -1.0, 1.0, 2.0, -1.5]
+    return x
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.6])
+@pytest.mark.parametrize("kappa", [1e-9, 1e-7])
+def test_corners_of_a_mesh_move_as_if_all_were_solved_for(rng, kappa, friction):
+    """Corners with a radius, even of a picometre, are no corners: all are active."""
+    state = rng.bit_generator.state
+    mech, points = mesh(rng, friction=friction)
+    rng.bit_generator.state = state
+    balls, _ = mesh(rng, 1e-12, friction)
+    settings = dict(time_step=0.01, kappa=kappa, tolerance=1e-12)
+    sim, exact = dojo.Simulator(mech, **settings), dojo.Simulator(balls, **settings)
+    x = moving(sim, points)
+    for _ in range(4):
+        result, expected = sim.step(x, throw=True), exact.step(x, throw=True)
+        active = [int(s._engine.last().active_ground_count[0]) for s in (sim, exact)]
+        assert active[0] <= active[1] and active[0] < 48
+        np.testing.assert_allclose(result.x, expected.x, rtol=0, atol=1e-9)
+        for name, atol in (("gap", 1e-9), ("impulse", 1e-9), ("point", 1e-9), ("slip", 1e-7), ("normals", 0.0)):
+            mine, theirs = (getattr(r.contacts, name) for r in (result, expected))
+            np.testing.assert_allclose(mine, theirs, rtol=0, atol=atol, err_msg=name)
+        A, B = sim.linearize(x).A, exact.linearize(x).A
+        np.testing.assert_allclose(A, B, rtol=0, atol=1e-6 * np.abs(B).max())
+        x = result.x
+
+
+def test_derivatives_of_corners_are_those_of_the_step(rng):
+    """By state, friction and places, among them those of inactive corners."""
+    mech, points = mesh(rng, count=40)
+    sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-6, tolerance=1e-12)
+    x = moving(sim, points)
+    result = sim.step(x, throw=True)
+    inactive = np.setdiff1d(np.arange(40), sim._engine.last().active[: sim._engine.last().active_ground_count[0]])
+    assert len(inactive) > 10 and result.contacts.impulse[inactive, 2].sum() > 1e-4
+    across = rng.normal(size=(12, 3))
+    A = sim.linearize(x).A @ across
+    check_jacobian(
+        lambda x: sim.difference(sim.step(x, throw=True).x, result.x), A, x, lambda x, s: sim.integrate(x, across @ s)
+    )
+    for kind in ("friction", "contact_point", "contact_height"):
+        assert error(Case(sim, x, np.zeros(0)), kind) < 1e-6, kind
 
 
 def test_names_and_distances_of_omitted_contacts():

@@ -18,6 +18,9 @@ SHAPES = {
     "stone": STONE,
     "plane": dojo.HalfSpace(),
     "string": dojo.String(0.5),
+    "field": dojo.SignedDistance.from_function(
+        lambda x: 2.0 * (np.linalg.norm(x / (0.3, 0.2, 0.25), axis=1) - 1.0), [[-0.5] * 3, [0.5] * 3], 0.05, offset=0.02
+    ),
 }
 PAIRS = [
     "sphere sphere",
@@ -44,6 +47,8 @@ PAIRS = [
     "box ellipsoid",
     "cylinder ellipsoid",
     "stone ellipsoid",
+    "field sphere",
+    "capsule field",
 ]
 # gap [m], kappa, restitution, and the least impulse of a situation with this name [N s]
 WHERE = {

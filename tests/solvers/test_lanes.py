@@ -3,7 +3,23 @@
 import numpy as np
 
 from solvers.compiler import local_kernel
-from solvers.lanes import LANES, dot_lanes, keep, load, minus_outer, plus, plus_outer, put, six, spread, store, whole
+from solvers.lanes import (
+    LANES,
+    at_least,
+    dot_lanes,
+    keep,
+    least,
+    load,
+    minus_outer,
+    plus,
+    plus_outer,
+    put,
+    root,
+    six,
+    spread,
+    store,
+    whole,
+)
 
 
 @local_kernel
@@ -21,6 +37,13 @@ def _rows(S, P):
     put(P, 12, 0, minus_outer(plus(w, w), S[1], x))
 
 
+@local_kernel
+def _roots(A, bound):
+    x, y = load(A, 0, 0), load(A, 1, 0)
+    store(A, 2, 0, root(at_least(x, bound)) / y)
+    A[3, 0] = least(x)
+
+
 def both(kernel, *arguments):
     """The arguments after the compiled kernel; the Python function has to leave the same values."""
     copies = [[a.copy() if isinstance(a, np.ndarray) else a for a in arguments] for _ in range(2)]
@@ -29,6 +52,13 @@ def both(kernel, *arguments):
     for a, b in zip(*copies, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-14, atol=1e-14)
     return copies[0]
+
+
+def test_roots_quotients_and_bounds(rng):
+    A = rng.normal(size=(4, LANES))
+    out, bound = both(_roots, A, 0.1)
+    np.testing.assert_allclose(out[2], np.sqrt(np.maximum(A[0], 0.1)) / A[1], rtol=1e-14)
+    assert out[3, 0] == A[0].min()
 
 
 def test_arithmetic(rng):

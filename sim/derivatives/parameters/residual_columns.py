@@ -6,6 +6,7 @@ weights   (n,) how much of the elementary change a unit of the parameter makes
 
 from __future__ import annotations
 
+from sim.contact.inactive import take_corners
 from sim.derivatives.parameters.body_columns import (
     add_bound,
     add_damper,
@@ -127,6 +128,7 @@ def fill_columns(
 ) -> int:
     """columns = -dR/d(parameters from `first` on), as many as fit; returns the term after, `start` the term before."""
     clear_columns(data)
+    take_corners(model, data, at.h)
     other_quaternions(data)
     end = first + column_count(model, data)
     t = start

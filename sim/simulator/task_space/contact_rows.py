@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from sim.contact.contact_law import contact_impulse
 from sim.contact.ground_contact import contact_jacobian, contact_kinematics
+from sim.contact.inactive import take_corners
 from sim.derivatives.parameters.contact_columns import is_active
 from sim.derivatives.step_gradient import gradient
 from sim.dynamics.displacements import tree_moves, turn_bodies
@@ -199,6 +200,7 @@ def contact_forces(
         if status == _SOLVED and rows.jacobians.shape[0] > 0:
             if not gradient(model, data, h, options.kappa, x[:nq], x[nq:], data.step_A, data.step_B):
                 status = _SINGULAR
+            take_corners(model, data, h)
         for m in range(contacts.shape[0]):
             f = contact_impulse(model, data, contacts[m])
             for k in range(3):
