@@ -25,7 +25,7 @@ from sim.contact.contact_law import (
     slip_violation,
     start_contact,
 )
-from sim.contact.corners import add_corner_laws, add_corner_slips
+from sim.contact.corner_laws import add_corner_laws, add_corner_slips
 from sim.contact.ground_contact import (
     add_contact_law,
     add_contact_turn,

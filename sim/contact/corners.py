@@ -1,21 +1,15 @@
-"""Inactive corners of a mesh: their impulses, and the matrix of their laws, eight corners at a time.
+"""Inactive corners of a mesh: their impulses, eight corners at a time.
 
 Of a cluster of many corners only those that press, or may within the step, are active. The others follow their law
-explicitly, as all inactive contacts do (inactive.py), and their stiffness is added to the matrix of the body:
-
-    wrench = sum of (f, P x f),     d(wrench)/d(twist) = sum of (1, P x) W C + turning of the arms
-
-P is the arm of a corner, f its impulse, C = d(gap, slip)/d(twist) and W = df/d(gap, slip) on the central path of kappa,
-all in the frame (n, t1, t2) of the contacts, about the centre of mass. A corner costs a tenth of an active contact: it
-has no variables, and no line search. Newton's method converges as if all were active, and derivatives are exact.
+explicitly, as all inactive contacts do (inactive.py), and their stiffness is added to the matrix of the body
+(corner_laws.py). Newton's method converges as if all were active, and derivatives are exact. Such a corner has no
+variables and no line search, and costs a fraction of an active contact.
 
 With g the gap, (x, y) the slip, R^2 = g^2 + (2 mu)^2 (x^2 + y^2), S = g + R and q = kappa/(g S):
 
     impulse    q S,   beta = -2 mu^2 q (x, y)
-    W          d(impulse)/dg = -q S/g,     dbeta/dg = 2 mu^2 q/g (1 + g/R) (x, y)
-               dbeta/d(x, y) = -2 mu^2 q (1 - (2 mu)^2 (x, y) (x, y)^T/(S R))
 
-which are those of cone.py after elimination of gamma.
+which is cone.py after elimination of gamma.
 
 Rows of data.corners: Corner of sim/model/record_columns.py; where a cluster ends, lanes go on into the next one, which
 the weights OUT leave out.
@@ -26,7 +20,6 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple
 
-from sim.dynamics.pose_jacobians import columns_to_origin, rows_to_origin
 from sim.model.data import Data
 from sim.model.model import Law, Model
 from sim.model.record_columns import Cluster, Cone, ContactRow, Corner, Inactive
@@ -34,7 +27,7 @@ from sim.model.slots import Slot
 from solvers.compiler import inlined, kernel, optional
 from solvers.lanes import LANES, Lanes, at_least, keep, load, root, spread, store, total
 from solvers.rotation import Vec3, put_three, times, transposed_times
-from solvers.types import Matrix, Vector
+from solvers.types import Matrix
 
 _FAR = 1e9  # [m]
 
@@ -153,150 +146,6 @@ def _write_cones(model: Model, data: Data, c: int) -> float:
             z[Cone.FRICTION1], z[Cone.FRICTION2] = C[Corner.FRICTION1, k], C[Corner.FRICTION2, k]
             near = min(near, z[Cone.SLACK])
     return near
-
-
-@inlined
-def _add(S: Matrix, r: int, x: Lanes) -> None:
-    store(S, r, 0, load(S, r, 0) + x)
-
-
-@inlined
-def _add_column(S: Matrix, j: int, k: Corners, n: Lanes, x: Lanes, y: Lanes) -> None:
-    """Column j of the sums += (f, P x f), f = (n, x, y)."""
-    _add(S, j, n)
-    _add(S, 6 + j, x)
-    _add(S, 12 + j, y)
-    _add(S, 18 + j, k.b * y - k.c * x)
-    _add(S, 24 + j, k.c * n - k.a * y)
-    _add(S, 30 + j, k.a * x - k.b * n)
-
-
-@inlined
-def _clear(S: Matrix) -> None:
-    for r in range(36):
-        store(S, r, 0, spread(0.0))
-
-
-@kernel
-def _sum_laws(model: Model, data: Data, h: float, c: int, indefinite: float) -> None:
-    """corner_sums = sum of (1, P x) W C + turning of the arms, in the frame of the contacts, at configuration 3."""
-    S, end = data.corner_sums, model.cluster_end[c]
-    turn = turn_of(model, data, h, c)
-    w, (s0, s1, s2), i = turn.c, turn.s, 1.0 / h
-    _clear(S)
-    for j in range(c, end, LANES):
-        k = corners_at(data.corners, j, end, turn, data.inactive[c, Inactive.ACTIVATION], data.carry.inactive_kappa[0])
-        a, b, d = k.a, k.b, k.c
-        f, u, z = k.q * k.total, k.m * k.q, (2.0 * k.m) / (k.total * k.root)
-        n = -1.0 * (f / k.gap)
-        t = indefinite * ((u / k.gap) * (spread(1.0) + k.gap / k.root))
-        xn, yn = t * k.x, t * k.y
-        xx, xy, yy = i * (u * (z * (k.x * k.x) - spread(1.0))), i * (u * (z * (k.x * k.y))), k.y * k.y
-        yy = i * (u * (z * yy - spread(1.0)))
-        o = spread(0.0)
-        _add_column(S, 0, k, n, xn, yn)
-        _add_column(S, 1, k, o, xx, xy)
-        _add_column(S, 2, k, o, xy, yy)
-        p, r = s1 * a - w * d - (2.0 * s0) * b, w * b + s2 * a - (2.0 * s0) * d
-        _add_column(S, 3, k, o, xx * p + xy * r, xy * p + yy * r)
-        p, r = s2 * d + s0 * a, s2 * b - w * a - (2.0 * s1) * d
-        _add_column(S, 4, k, n * d, xn * d + xx * p + xy * r, yn * d + xy * p + yy * r)
-        p, r = w * a + s1 * d - (2.0 * s2) * b, s0 * a + s1 * b
-        _add_column(S, 5, k, -1.0 * (n * b), xx * p + xy * r - xn * b, xy * p + yy * r - yn * b)
-        _add_turn(S, k, indefinite * f, -indefinite * (u * k.x), -indefinite * (u * k.y))
-
-
-@inlined
-def _add_turn(S: Matrix, k: Corners, n: Lanes, x: Lanes, y: Lanes) -> None:
-    """Torques by rotations += P f^T - (P.f) I, the turning of the arms under the impulses f = (n, x, y)."""
-    dot = k.a * n + k.b * x + k.c * y
-    _add(S, 21, k.a * n - dot)
-    _add(S, 22, k.a * x)
-    _add(S, 23, k.a * y)
-    _add(S, 27, k.b * n)
-    _add(S, 28, k.b * x - dot)
-    _add(S, 29, k.b * y)
-    _add(S, 33, k.c * n)
-    _add(S, 34, k.c * x)
-    _add(S, 35, k.c * y - dot)
-
-
-@kernel
-def _sum_slips(model: Model, data: Data, h: float, c: int) -> None:
-    """corner_sums = sum of (1, P x) W C2, C2 = d(slip)/d(twist of configuration 2) of `add_slip_jacobian`."""
-    S, end = data.corner_sums, model.cluster_end[c]
-    turn = turn_of(model, data, h, c)
-    w, (s0, s1, s2), i = turn.c, turn.s, 1.0 / h
-    _clear(S)
-    for j in range(c, end, LANES):
-        k = corners_at(data.corners, j, end, turn, data.inactive[c, Inactive.ACTIVATION], data.carry.inactive_kappa[0])
-        a, b, d, o = k.a, k.b, k.c, spread(0.0)
-        u, z = i * (k.m * k.q), (2.0 * k.m) / (k.total * k.root)
-        xx, xy, yy = z * (k.x * k.x) - spread(1.0), u * (z * (k.x * k.y)), z * (k.y * k.y) - spread(1.0)
-        xx, yy = u * xx, u * yy
-        _add_column(S, 1, k, o, -1.0 * xx, -1.0 * xy)
-        _add_column(S, 2, k, o, -1.0 * xy, -1.0 * yy)
-        p, r = s1 * a + w * d, s2 * a - w * b
-        _add_column(S, 3, k, o, xx * p + xy * r, xy * p + yy * r)
-        p, r = -s2 * d - s0 * a, s2 * b + w * a
-        _add_column(S, 4, k, o, xx * p + xy * r, xy * p + yy * r)
-        p, r = s1 * d - w * a, -s0 * a - s1 * b
-        _add_column(S, 5, k, o, xx * p + xy * r, xy * p + yy * r)
-
-
-@kernel
-def _to_world(F: Vector, S: Matrix, out: Vector) -> None:
-    """out = the sums in world axes: F^T X F of each of the four blocks X."""
-    for r in range(2):
-        for e in range(2):
-            first = 18 * r + 3 * e
-            for p in range(3):
-                at = first + 6 * p
-                x, y, z = total(load(S, at, 0)), total(load(S, at + 1, 0)), total(load(S, at + 2, 0))
-                out[at], out[at + 1], out[at + 2] = transposed_times(F, x, y, z)
-            for q in range(3):
-                at = first + q
-                out[at], out[at + 6], out[at + 12] = transposed_times(F, out[at], out[at + 6], out[at + 12])
-
-
-@optional(Slot.ADD_CORNER_LAWS)
-def add_corner_laws(model: Model, data: Data, h: float, indefinite: float, fresh: bool, out: Matrix) -> None:
-    """out[body] -= laws of the inactive corners, about O.  (nbody, 36)   fresh: of configuration 3, as derivatives have
-    to be; otherwise of a near one.
-    """
-    B, o = data.corner_block, data.origin
-    for m in range(data.inactive_count[0]):
-        c = data.inactive_first[m]
-        row = data.inactive[c]
-        if row[Inactive.CORNERS] == 0.0:
-            continue
-        if fresh or row[Inactive.SHARE] != indefinite:
-            _sum_laws(model, data, h, c, indefinite)
-            _to_world(model.contact_frame[c], data.corner_sums, data.corner_law[c])
-            row[Inactive.SHARE] = indefinite
-        i = model.contact_body[c]
-        for k in range(36):
-            B[k] = data.corner_law[c, k]
-        p = data.pos2[i]
-        rows_to_origin(B, p[0] - o[0], p[1] - o[1], p[2] - o[2])
-        p = data.pos3[i]
-        columns_to_origin(B, p[0] - o[0], p[1] - o[1], p[2] - o[2])
-        for k in range(36):
-            out[i, k] -= B[k]
-
-
-@optional(Slot.ADD_CORNER_SLIPS)
-def add_corner_slips(model: Model, data: Data, h: float) -> None:
-    """A2[body] -= laws of the inactive corners by pose 2, on which slips depend (at the centre of mass)."""
-    B = data.corner_block
-    for m in range(data.inactive_count[0]):
-        c = data.inactive_first[m]
-        if data.inactive[c, Inactive.CORNERS] > 0.0:
-            _sum_slips(model, data, h, c)
-            _to_world(model.contact_frame[c], data.corner_sums, B)
-            i = model.contact_body[c]
-            for k in range(36):
-                data.A2[i, k] -= B[k]
 
 
 @optional(Slot.REPORT_CORNERS)

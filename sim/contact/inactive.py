@@ -7,9 +7,9 @@ one direction are a cluster, tested as one ball.
 
 Of a cluster that is near, as the corners of a foot, those contacts are inactive whose e, for the n contacts of their
 body, is at most 1e-2: the matrix may omit it, as Newton's method converges all the same. Derivatives may not omit them;
-they take these contacts as active (`all_stiff`). Of a cluster of many points, as the corners of a mesh, e may be 10:
-their stiffness is in the matrix and in the derivatives, as a sum (corners.py). A Go2 that trots on feet of 32 corners
-takes 3.0 iterations a step at 30, and 2.6 where all corners are active.
+they take these contacts as active (stiff_contacts.py). Of a cluster of many points, as the corners of a mesh, e may be
+10 each: their stiffness is in the matrix and in the derivatives, as a sum (corner_laws.py). A Go2 that trots on feet of
+32 corners takes 3.0 iterations a step, with 9 to 13 active corners, and 2.6 where all 128 are active.
 
 As a whole, a cluster is inactive when its stiffness, relative to the inertia behind it, is below the tolerance of the
 step:
@@ -35,16 +35,14 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.contact.contact_law import condense_contact
 from sim.contact.corners import gather_corners, least_corner_gap
-from sim.contact.ground_contact import contact_jacobian, contact_kinematics
-from sim.contact.pairs.inactive_pairs import COUPLED, enlist_pairs
+from sim.contact.pairs.inactive_pairs import COUPLED
 from sim.contact.terrain_contact import terrain_gap
 from sim.mechanism.immovable_contacts import SUNK
 from sim.mechanism.pack_clusters import STIFFNESS
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import LawForm, StepOptions
+from sim.model.options import StepOptions
 from sim.model.record_columns import Cluster, Corner, Inactive, Kin
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
@@ -229,7 +227,7 @@ def has_activated(model: Model, data: Data) -> bool:
         if _came_near(model, data, data.inactive_first[m]):
             found = True
     if found:
-        _enlist_all(model, data)
+        enlist_all(model, data)
     return found
 
 
@@ -259,7 +257,7 @@ def _came_near(model: Model, data: Data, c: int) -> bool:
 
 
 @kernel
-def _enlist_all(model: Model, data: Data) -> None:
+def enlist_all(model: Model, data: Data) -> None:
     """Rebuild `active` and inactive_first."""
     data.active_ground_count[0] = 0
     data.inactive_count[0] = 0
@@ -267,43 +265,3 @@ def _enlist_all(model: Model, data: Data) -> None:
         if model.cluster_end[c] > 0:
             _enlist(model, data, c)
     data.active_count[0] = data.active_ground_count[0]
-
-
-@optional(Slot.ALL_STIFF)
-def all_stiff(model: Model, data: Data, h: float) -> None:
-    """All contacts with the ground whose stiffness counts taken as active, for the derivatives of a step that has been
-    solved.
-    """
-    found = False
-    for m in range(data.inactive_count[0]):
-        c = data.inactive_first[m]
-        if data.inactive[c, Inactive.STIFF] > 0.0 and data.inactive[c, Inactive.CORNERS] == 0.0:
-            found = True
-            data.inactive[c, Inactive.ACTIVATION] = 0.0
-            for k in range(c, model.cluster_end[c]):
-                if data.contact_out[k] == 1:
-                    data.contact_out[k] = 0
-                    contact_kinematics(model, data, h, k)
-    if found:
-        _enlist_all(model, data)
-        enlist_pairs(model, data)
-
-
-@optional(Slot.TAKE_CORNERS)
-def take_corners(model: Model, data: Data, h: float) -> None:
-    """All corners whose laws the derivatives have in sum taken as active: parameters of contacts need each law."""
-    found = False
-    for m in range(data.inactive_count[0]):
-        c = data.inactive_first[m]
-        if data.inactive[c, Inactive.CORNERS] > 0.0:
-            found = True
-            data.inactive[c, Inactive.ACTIVATION] = data.inactive[c, Inactive.CORNERS] = 0.0
-            for k in range(c, model.cluster_end[c]):
-                if data.contact_out[k] == 1:
-                    data.contact_out[k] = 0
-                    contact_kinematics(model, data, h, k)
-                    contact_jacobian(model, data, h, k)
-                    condense_contact(model, data, h, k, data.carry.inactive_kappa[0], 1.0, LawForm.SOFT)
-    if found:
-        _enlist_all(model, data)
-        enlist_pairs(model, data)

@@ -6,8 +6,8 @@ central path the condensed contact matrices W are the exact derivatives of the i
 
 from __future__ import annotations
 
-from sim.contact.inactive import all_stiff
 from sim.contact.pairs.inactive_pairs import all_near
+from sim.contact.stiff_contacts import all_stiff
 from sim.derivatives.coupling_gradient import add_coupling_composites, add_coupling_derivatives
 from sim.derivatives.residual_gradient import residual_derivatives
 from sim.derivatives.restitution_gradient import add_bounce_composites, add_bounce_derivatives

@@ -30,8 +30,9 @@ from sim.contact.active_contacts import (
 from sim.contact.collision.pair_kernels import KERNELS
 from sim.contact.contact_law import slip_noise
 from sim.contact.contact_report import report_ground, worst_contact
-from sim.contact.corners import add_corner_laws, add_corner_slips, evaluate_corners, report_corners
-from sim.contact.inactive import all_stiff, choose_active, has_activated, sunk_contact, take_corners
+from sim.contact.corner_laws import add_corner_laws, add_corner_slips
+from sim.contact.corners import evaluate_corners, report_corners
+from sim.contact.inactive import choose_active, has_activated, sunk_contact
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.contact.pairs.active_features import choose_pairs, choose_shapes, open_pairs, overlapping
 from sim.contact.pairs.clearance import measure_pairs, omitted_pairs, pairs_reached
@@ -56,6 +57,7 @@ from sim.contact.pyramid import (
     start_pyramid,
 )
 from sim.contact.restitution import find_impacts, impacts_gained, subtract_floors
+from sim.contact.stiff_contacts import all_stiff, take_corners
 from sim.contact.terrain_contact import add_frame_matrix, place_on_terrain, terrain_gap, turn_on_terrain
 from sim.derivatives.coupling_gradient import add_coupling_composites, add_coupling_derivatives
 from sim.derivatives.loop_stiffness import loop_stiffness

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.contact.corners import add_corner_laws
+from sim.contact.corner_laws import add_corner_laws
 from sim.dynamics.elimination import factor
 from sim.dynamics.joints.joint_forces import joint_blocks
 from sim.dynamics.kinematics import velocity_columns

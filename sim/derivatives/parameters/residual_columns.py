@@ -6,7 +6,7 @@ weights   (n,) how much of the elementary change a unit of the parameter makes
 
 from __future__ import annotations
 
-from sim.contact.inactive import take_corners
+from sim.contact.stiff_contacts import take_corners
 from sim.derivatives.parameters.body_columns import (
     add_bound,
     add_damper,

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from sim.contact.contact_law import contact_impulse
 from sim.contact.ground_contact import contact_jacobian, contact_kinematics
-from sim.contact.inactive import take_corners
+from sim.contact.stiff_contacts import take_corners
 from sim.derivatives.parameters.contact_columns import is_active
 from sim.derivatives.step_gradient import gradient
 from sim.dynamics.displacements import tree_moves, turn_bodies
