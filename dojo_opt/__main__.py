@@ -114,7 +114,7 @@ def _print_json(value: Any) -> None:
 
 
 def _refuse(kind: str, name: str, owner: str, there: Sequence[str]) -> NoReturn:
-    """Refuse a name with those that exist."""
+    """Refuse an unknown name; the message lists the known ones."""
     from sim.mechanism.checks import nearest
 
     raise ValueError(f"no {kind} {name!r}; {owner} {', '.join(there)}{nearest(name, there)}")

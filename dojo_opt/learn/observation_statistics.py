@@ -27,7 +27,7 @@ class ObservationStatistics:
         self._merge(rows.mean(axis=0), rows.var(axis=0), float(len(rows)))
 
     def join(self, other: ObservationStatistics) -> None:
-        """Add the counts of others."""
+        """Add the counts of other statistics."""
         self._merge(other.sums[0], other.sums[1], float(other.sums[2, 0]))
 
     def _merge(self, mean: Floats, variance: Floats, n: float) -> None:

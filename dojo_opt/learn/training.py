@@ -88,7 +88,7 @@ class Training:
         return {"weights": self.policy.weights}
 
     def state(self) -> dict[str, Any]:
-        """All that `resume` needs."""
+        """The numbers, arrays and random state that `resume` needs."""
         numbers = {name: getattr(self, name) for name in self.NUMBERS}
         arrays = {name: array.copy() for name, array in self.arrays().items()}
         return {**numbers, **arrays, "rng": self.rng.bit_generator.state}

@@ -185,9 +185,9 @@ class MPC:
         return u if self._actuator is None else self._actuator(u, measured)
 
     def _command(self, now: float, x: Vector, sample: Vector) -> Vector:
-        """The planned input, with feedback unless it is switched off.
+        """The planned input, with feedback unless that is switched off.
 
-        x: (nx,) measured state as the model means it, sample: as it was measured.
+        x: (nx,) measured state in the model's convention; sample: as measured.
         """
         policy, settings = self.policy, self.settings
         assert policy is not None

@@ -29,7 +29,7 @@ class Ground:
     """The ground under the contacts of a simulator, as that simulator believes it to be.
 
     `learn` moves it: to the height of every contact that is planned to stand and does not move, or, with `slope`, to
-    the plane through the places where contacts stood last, nearly so where they leave it open:
+    the plane through the last places of standing contacts, held near the plane before where they do not determine it:
 
         min  sum_i w_i (z_i - z(p_i))^2 + s |slope - slope before|^2,   w_i = exp(-age/.5 s)
 

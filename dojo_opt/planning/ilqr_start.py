@@ -29,7 +29,7 @@ _TRUST = 1e-2  # share of the regularisation that holds the start, relative to t
 
 
 def fitting_stage(horizon: Horizon, now: Iterate, stages: tuple[Stage, ...]) -> tuple[int, Any]:
-    """The stage that a guess of states fits best, and the derivatives there, None where no stage can be linearised.
+    """The stage that a guess of states fits best, and its derivatives; None if no stage can be linearised.
 
     It is the smoothest down to which the guess fits nearly as well as at harder ones. A good reference leaves small
     gaps at a hard contact and large ones at a smooth one, where contact begins above the ground; smoothing it first

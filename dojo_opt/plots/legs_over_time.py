@@ -119,7 +119,7 @@ def dof_limits(mech: Mechanism) -> list[tuple[float, float]]:
 def draw_limits(ax: Axes, limits: Any) -> None:
     """Dashed lines at the limits, a pair per curve, that are no further from the curves than half their range.
 
-    They have the colours of their curves, those of several curves are grey.
+    They have the colours of their curves; a limit of several curves is grey.
     """
     low, high = ax.get_ylim()
     room = 0.5 * (high - low)

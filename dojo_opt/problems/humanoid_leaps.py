@@ -89,7 +89,7 @@ def humanoid_leap(
 
 
 def _moved(x: Floats, ahead: float, up: float) -> Floats:
-    """The state (nx,) with the base so far [m] ahead and up."""
+    """The state (nx,) with the base moved forward and up [m]."""
     out = x.copy()
     out[[0, 2]] += ahead, up
     return out

@@ -40,7 +40,7 @@ class PhysicsEngine(Protocol):
 
     @property
     def name(self) -> str:
-        """As it stands in a table."""
+        """Its name in tables."""
         ...
 
     def simulate(

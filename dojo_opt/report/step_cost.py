@@ -44,7 +44,7 @@ class Cost(NamedTuple):
 
     @property
     def total(self) -> NDArray[np.float64]:
-        """(rounds,) [s] of a step and of derivatives, as a planner takes both."""
+        """(rounds,) time [s] of a step with its derivatives, as in a planner."""
         return self.step + self.gradient
 
 

@@ -173,7 +173,7 @@ def free_gait_mpc(
 
 
 def _alike(sim: Simulator, weight: float) -> ResidualCost:
-    """sum_t w |u_a - u_b|^2 over thighs and calves of diagonal legs a and b."""
+    """sum_t w |u_a - u_b|^2 over the thighs and calves of diagonal legs a and b."""
     rows = np.zeros((2 * len(_DIAGONAL), sim.nu))
     for i, (a, b) in enumerate(_DIAGONAL):
         for k in (1, 2):

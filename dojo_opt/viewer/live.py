@@ -139,7 +139,7 @@ class Live:
         return [packb(SetTransform(place, node).lower()) for node, place in places]
 
     def _send(self, commands: list[bytes]) -> None:
-        """To all pages that are open; in the thread of the server."""
+        """Send to all open pages; runs in the thread of the server."""
         for listener in list(self._listeners):
             for command in commands:
                 listener.write_message(command, binary=True)

@@ -132,7 +132,7 @@ def save_picture(
 
 
 def _apart(record: Callable[[], None]) -> None:
-    """Call in a thread of its own: playwright refuses one with an event loop, as that of a notebook."""
+    """Call in a separate thread: playwright refuses a thread with an event loop, such as that of a notebook."""
     with ThreadPoolExecutor(1) as pool:
         pool.submit(record).result()
 

@@ -103,7 +103,7 @@ class ColdScene(NamedTuple):
 
 
 class ColdStart(NamedTuple):
-    """Processor time [s] and number of functions compiled."""
+    """Processor time [s] and number of compiled functions."""
 
     without: float  # of the base
     functions_without: int
