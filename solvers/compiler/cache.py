@@ -308,7 +308,7 @@ class _Named:
 
 
 def magic_of(codegen: Any) -> tuple[str, str, str]:
-    """Those of a code generator, in keys."""
+    """System, processor and features of a code generator, in keys."""
     return _Named(*codegen.magic_tuple()).magic_tuple()
 
 

@@ -100,7 +100,7 @@ def _text_of(flags: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _flags_of(func: Any) -> list[tuple[str, str]]:
-    """Those of a compiled function; none of a plain one."""
+    """The flags of a compiled function; none of a plain one."""
     if isinstance(func, CompiledFunction):
         return _text_of(func.flags)
     return _text_of(func.targetoptions) if isinstance(func, CPUDispatcher) else []
@@ -121,7 +121,7 @@ def _is_extended() -> bool:
 
 
 def _owner(template: Any) -> str:
-    """The package that has registered a template: that of its code, or else of what it makes callable."""
+    """The package that has registered a template: that of its code, or else of its key."""
     code = getattr(template, "_overload_func", None) or getattr(template, "_definition_func", None)
     if isinstance(code, FunctionType):
         return str(code.__globals__.get("__name__", "")).partition(".")[0]
@@ -197,7 +197,7 @@ def _outside(text: FunctionType) -> Iterator[tuple[str, Any]]:
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
-    """That of a function, and of those inside it."""
+    """The code of a function, and of the functions inside it."""
     yield code
     for value in code.co_consts:
         if isinstance(value, CodeType):
@@ -209,7 +209,7 @@ def _globals(code: CodeType) -> set[str]:
 
 
 def _code(code: CodeType) -> tuple[Any, ...]:
-    """What Numba reads of Python's code, not where it stands."""
+    """The parts of Python's code that Numba reads; its place is none of them."""
     names = code.co_name, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
     counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags
     constants = [_code(value) if isinstance(value, CodeType) else _constant(value) for value in code.co_consts]

@@ -25,13 +25,13 @@ class UsersCache(KernelCache):
     """The signatures of a loop around functions of the user, or of such a function."""
 
     def __init__(self, py_func: Callable[..., Any], flags: dict[str, Any]) -> None:
-        self._py_func, self._flags, self._form = py_func, flags, "users"
+        self._py_func, self._flags, self._form, self._stem = py_func, flags, "users", py_func.__qualname__
         self._digest: str | None = None
         self._cache_path = str(STORE.folder)
         self.enable()
 
     def _key(self, sig: Any, codegen: Any) -> tuple[Any, str]:
-        """(what the compiled code depends on, apart from the stamp; name of its file)."""
+        """(dependencies of the compiled code, apart from those of the stamp; name of its file)."""
         key = (self._form, self._digest, repr(sig), magic_of(codegen))
         return key, f"{_USERS}{self._digest}-{self.short(key)}.nbc"
 
