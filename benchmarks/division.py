@@ -1,7 +1,7 @@
 """Motions that a fixed time step cannot follow: refused with whole steps, solved with divided steps.
 
     pip install --no-deps "example-robot-data>=6" && pip install pybullet        for robots from files
-    python benchmarks/division.py            --match chain for some of them
+    python benchmarks/division.py            --match "chain of 5 |spin" for some of them
 
 Every motion runs twice: with divide=False, up to the first refused step, and with the default. The table has the number
 of divided steps, the largest number of parts, the number of steps that passed on only a share of the relative momentum
@@ -15,6 +15,7 @@ The bar of the latter is 1 %.
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import time
 import warnings
@@ -144,10 +145,10 @@ def smooth(sim: dojo.Simulator) -> bool:
 
 
 def run(args: argparse.Namespace) -> Report:
-    """Every motion with `match` in its name."""
+    """Every motion whose name has a match."""
     warnings.simplefilter("ignore")  # warnings about robots' files
     report = Report("Steps that are divided", "")
-    chosen = [(name, (name, build)) for name, build in motions() if args.match in name]
+    chosen = [(name, (name, build)) for name, build in motions() if re.search(args.match, name)]
     lines, kept, refused = [], [], 0
     for name, build in progress()((chosen[6:7] or chosen[:1]) if args.quick else chosen, "motions"):
         sim, x, us = build()
@@ -194,7 +195,7 @@ def run(args: argparse.Namespace) -> Report:
 def main(argv: list[str] | None = None) -> int:
     """Print or write the report."""
     arguments = parser(__doc__)
-    arguments.add_argument("--match", default="", help="only motions with this in their name")
+    arguments.add_argument("--match", default="", help="only motions whose name has a match of this regular expression")
     return deliver("division", run, arguments, argv)
 
 

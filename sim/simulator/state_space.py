@@ -399,5 +399,8 @@ class StateSpace:
 
         Returns:
             States (n, nx).
+
+        Raises:
+            ValueError: the simulator has no accuracy.
         """
         return self._engine.nodes_at(motion, times)

@@ -244,7 +244,7 @@ class Engine(LinkedModel):
 
     def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Vector) -> Floats:
         """(n, nx) states at any times of a motion; only engines with an accuracy have them."""
-        raise NotImplementedError
+        raise ValueError("Simulator.nodes_at: fixed time steps have states at their ends only; use accuracy=...")
 
     def forget_parts(self) -> None:
         """Let `last` be that of a step as a whole; only engines that divide steps have parts."""
