@@ -39,7 +39,6 @@ class Status(Code):
     SHAPES_CROSSED = 7
     ENERGY_GAIN = 8
     CONTACT_SUNK = 9
-    ACCURACY_NOT_REACHED = 17
     # of the planner
     MAX_REGULARIZATION = 10
     LINE_SEARCH = 11
@@ -49,6 +48,8 @@ class Status(Code):
     STOPPED = 15
     # of any call
     INTERRUPTED = 16
+    # of a time step of a given accuracy
+    ACCURACY_NOT_REACHED = 17
 
     ANGULAR_STEP = _Old("TURN_TOO_LARGE")
     LOOP_STEP = _Old("LOOP_SINGULAR")

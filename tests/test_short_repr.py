@@ -73,6 +73,7 @@ FIXED = {  # a few numbers each, however large the robot; or nothing that a user
         "Link",
         "Mount",
         "ContactCandidate",
+        "Footfall",
         "Choices",
         "UrdfJoint",
         "UrdfLink",

@@ -124,7 +124,7 @@ def _sort(model: Model, data: Data, options: StepOptions, c: int, a: float) -> f
     stiff, corners = row[Inactive.STIFF], row[Inactive.CORNERS]
     row[Inactive.STIFF] = row[Inactive.CORNERS] = 0.0
     if a == 0.0 and model.cluster[c, Cluster.CORNERS] > 0.0:
-        a = _radius(model, options, c, model.cluster_end[c] - c, _STIFFEST)
+        a = _radius(model, options, c, float(model.cluster_end[c] - c), _STIFFEST)
         row[Inactive.STIFF] = row[Inactive.CORNERS] = 1.0
         if gather_corners(model, data, c, 2.0 * a + _travel(model, data, c)) or corners == 0.0:
             row[Inactive.LEAST_GAP] = 0.0

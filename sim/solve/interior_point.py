@@ -45,7 +45,7 @@ from sim.solve.globalization import (
     strategy,
 )
 from sim.solve.inequalities import choose_inequalities, inequalities_activated
-from sim.solve.merit import Merit, follow, is_near, judge, residuals, suited_form
+from sim.solve.merit import Merit, follow, is_near, judge, residuals
 from sim.solve.newton_direction import direction, linearize_step
 from sim.solve.residual import absorb_residual, residual_scale, rounding
 from sim.solve.step_length import search
@@ -113,8 +113,9 @@ def solve_from(
     if s.start != Start.KNOWN:
         smoothing = start_on_path(model, data, options, q, v, s)
         balance = residuals(model, data, h, q, v, u)
-    ratio, halvings = 1e-2, 0
+    ratio = 1e-2
     patience = iterations + _PATIENCE
+    halvings = 0
     merit = judge(model, data, kappa, scale, max(smoothing, kappa), balance)
     while smoothing > 0.0 and merit.residual < 1e300:
         before = smoothing
@@ -130,8 +131,7 @@ def solve_from(
         if iterations >= patience or halvings > _FEW:
             break
         iterations += 1
-        undamped = s.undamped or is_near(merit, kappa)
-        if not linearize_step(model, data, h, q, v, smoothing, undamped, suited_form(merit, kappa)):
+        if not linearize_step(model, data, h, q, v, smoothing, is_near(merit, kappa), s.undamped):
             return Outcome(Status.SINGULAR.value, iterations, merit.residual, merit.violation)
         boundary = direction(model, data, h, kappa, merit.mean)
         merit, halvings = search(model, data, options, inputs, (scale, smoothing), boundary, merit, worse)

@@ -8,7 +8,6 @@ from sim.contact.active_contacts import slip_error
 from sim.dynamics.loops.closure import apply_loops
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import LawForm
 from sim.solve.complementarity import products
 from sim.solve.inequalities import apply_inequalities, apply_limits
 from sim.solve.residual import balance_to_wrench, norm, project_wrench
@@ -16,9 +15,6 @@ from solvers.compiler import kernel
 from solvers.types import Vector
 
 _NEWTON_REACH = 100.0  # of kappa: violations that Newton's method takes away in a few steps
-# of kappa, and of its root: violations that it takes away sooner by the form of a law that is linear in the slip, and
-# the residual up to which the search takes its steps
-_STICKING_REACH, _STICKING_BALANCE = 1e8, 1.0
 
 
 class Merit(NamedTuple):
@@ -34,13 +30,6 @@ class Merit(NamedTuple):
 def is_near(merit: Merit, kappa: float) -> bool:
     """Whether Newton's method can be trusted to end here: products all but kappa, the residual within their noise."""
     return merit.violation < _NEWTON_REACH * kappa and merit.residual < 0.1 * kappa**0.5
-
-
-@kernel
-def suited_form(merit: Merit, kappa: float) -> int:
-    """LawForm of the next step: far from the solution, violations may grow along a step of the STICKING form."""
-    near = merit.violation < _STICKING_REACH * kappa and merit.residual < _STICKING_BALANCE * kappa**0.5
-    return LawForm.STICKING.value if near else LawForm.PLAIN.value
 
 
 @kernel

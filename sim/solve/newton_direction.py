@@ -6,7 +6,7 @@ from sim.dynamics.elimination import factor, solve
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import NewtonTarget
+from sim.model.options import LawForm, NewtonTarget
 from sim.solve.complementarity import boundary_step, products_ahead
 from sim.solve.inequalities import condense_inequalities, inequality_rhs, recover_inequalities
 from sim.solve.newton_matrix import free_matrix
@@ -19,24 +19,24 @@ _SHARES = 4  # 1, 1/2, 1/4, 1/8 of the terms that can make the matrix indefinite
 
 @inlined
 def linearize_step(
-    model: Model, data: Data, h: float, q: Vector, v: Vector, smoothing: float, undamped: bool, form: int
+    model: Model, data: Data, h: float, q: Vector, v: Vector, smoothing: float, near: bool, undamped: bool
 ) -> bool:
     """Newton matrix at the present iterate, contacts and limits condensed, eliminated; False if it is singular.
 
     Beyond a fold of the path, where the determinant is negative, Newton's direction leads back into the fold. There the
     growth of the friction with the normal impulse, and the turning of the arms of impulses, count by a half, then less:
     without them the matrix is that of a step whose friction bounds and arms are given, which has no folds of theirs.
-    The direction is Newton's own if no share of them makes the determinant positive, and with `undamped`: near a
-    solution, or if the strategy asks for it. The determinant of a solution may be negative: four corners on curved
-    ground hold a box in more directions than a plane does, one of them weakly, and friction that grows with the
-    impulses outweighs that hold. Every other direction leads away from such a solution.   form: LawForm of contacts.
+    The direction is Newton's own if no share of them makes the determinant positive, if the strategy asks for it
+    (`undamped`), and near a solution. The determinant of a solution may be negative: four corners on curved ground
+    hold a box in more directions than a plane does, one of them weakly, and friction that grows with the impulses
+    outweighs that hold. Every other direction leads away from such a solution.
     """
     sign = 0
-    shares = 0 if undamped else _SHARES
+    shares = 0 if near or undamped else _SHARES
     for halvings in range(shares + 1):
         indefinite = 0.5**halvings if halvings < shares else 1.0
         free_matrix(model, data, h, q, v)
-        condense_inequalities(model, data, h, smoothing, indefinite, form)
+        condense_inequalities(model, data, h, smoothing, indefinite, LawForm.STICKING if near else LawForm.PLAIN)
         sign = factor(model, data)
         if sign >= 0:
             break

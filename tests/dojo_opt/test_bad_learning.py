@@ -55,7 +55,7 @@ CALLS = {
        for name, cases in LEARNING.items() for key, bad in cases},
     **{f"identify {key} {bad}": (lambda key=key, bad=bad: dojo.identify(SIM, [MOTION], ["mass"], **{key: bad}), key)
        for key, bad in (("bounds", 3), ("prior", 3), ("noise", [1, 2, 3, 4]), ("noise", None), ("kappas", 3.5 + 1j),
-                        ("bounds", {"mass": 1}), ("bodies", 3), ("starts", 0), ("window", 0))},
+                        ("bounds", {"mass": 1}), ("bodies", 3), ("fits", 0), ("window", 0))},
     "no motions": (lambda: dojo.identify(SIM, None, ["mass"]), "identify(trajectories)", "None"),
     "one motion": (lambda: dojo.identify(SIM, MOTION, ["mass"]), "identify(trajectories)", "list"),
     "no names": (lambda: dojo.identify(SIM, [MOTION], None), "identify(parameters)", "None"),
