@@ -143,9 +143,6 @@ def _accurate(ground: bool) -> None:
     motions(sim)
     derivatives_of_order(sim)
     sim.rollout(sim.neutral(), steps=2).at([0.005])
-    if ground:  # it rolls, by extrapolated steps
-        rolls = [20.0 * mech.contacts[0].radius, 0.0, 0.0, 0.0, 20.0, 0.0]
-        sim.linearize(sim.state_from_velocity(sim.neutral()[: sim.nq], rolls), np.zeros(sim.nu))
 
 
 def derivatives_of_order(sim: Simulator) -> None:

@@ -1,4 +1,4 @@
-"""Steps whose lengths follow from an error estimate: order 8 in flight, order 2, extrapolated to 6, in contact.
+"""Steps whose lengths follow from an error estimate: long ones of order 8 in flight, short ones of order 2 in contact.
 
 A sub-step of length h from a node is accepted where its estimate e of the error of the joint coordinates has
 
@@ -7,10 +7,8 @@ A sub-step of length h from a node is accepted where its estimate e of the error
 order 8    e from the embedded formulas of order 5 and 3 of Dormand and Prince (Hairer, Norsett, Wanner, II.10)
 order 2    e = |q - q'|/2 of two steps of h/2 and one of h, node_step.py; in contact eight times that, with an impact
            |v - v'| t besides, t the rest of the step, half a second at least
-order 6    e of the last two columns of the extrapolation, extrapolated_step.py, times the same eight in contact
 
-and the next one has the length h (e/allowed)^-1/k times a PI controller's share (Gustafsson, ACM TOMS 17, 1991). In
-contact, an extrapolated step is no longer than one whose error at order 2 is a hundred times the one allowed.
+and the next one has the length h (e/allowed)^-1/k times a PI controller's share (Gustafsson, ACM TOMS 17, 1991).
 
 Where a contact or limit is reached, the length is cut: the step that begins after that has a gap of at most accuracy/8,
 so impacts happen at nodes, at their times. Error that a kink in the forces forces on a step at once, as where a block
@@ -124,12 +122,6 @@ def shorter(h: float, ratio: float, order: float) -> float:
 
 
 @kernel
-def _power(clock: Vector) -> float:
-    """The power of the length with which the error of the step just tried, over its length, grows."""
-    return 2.0 if clock[Clock.ORDER] == 2.0 else 4.0
-
-
-@kernel
 def _allows(clock: Vector, h: float, shortest: float, ratio: float) -> bool:
     """Whether a solved step of order 2 is kept. A step on a kink has a larger allowance, and so has one across lengths
     that have no solution; after a rebound there is no kink, for the velocity stays wrong.
@@ -154,14 +146,13 @@ def take_short(
     shortest = min(goal[AccuracyGoal.SETTLED], goal[AccuracyGoal.IMPACT] if rebounds else NEVER)
     if status == _SOLVED and _allows(clock, h, shortest, ratio):
         beyond, kink = clock[Clock.BEYOND] > 0.0, ratio > 1.0
-        keep(line, h, int(clock[Clock.ORDER]))
-        clock[Clock.WAIT] = max(0.0, clock[Clock.WAIT] - 1.0)
+        keep(line, h, 2)
         clock[Clock.ERROR] += ratio * h
         if kink:
             clock[Clock.KINKS] += ratio * h
             clock[Clock.SHORT] = 5.0 * h if beyond else max(clock[Clock.RECENT], 5.0 * h)
             return _SOLVED
-        length = min(next_length(h, ratio, clock[Clock.SHORT_RATIO], _power(clock)), clock[Clock.REACH])
+        length = next_length(h, ratio, clock[Clock.SHORT_RATIO], 2.0)
         clock[Clock.RECENT], clock[Clock.SHORT_RATIO] = h, max(ratio, 1e-4)
         clock[Clock.SHORT] = max(length, clock[Clock.SHORT] if h < 0.99 * clock[Clock.SHORT] else shortest)
         return _SOLVED
@@ -174,7 +165,7 @@ def take_short(
     if status == _SOLVED and clock[Clock.HIT] > 0.0:  # its error is h times the rest of the accuracy for it
         shorten_impact(clock, h, max(h * min(0.5, max(0.01, 0.8 * _KINK / (ratio * h))), shortest))
     elif status == _SOLVED:
-        clock[Clock.SHORT] = max(min(next_length(h, ratio, 1.0, _power(clock)), 0.9 * h), shortest)
+        clock[Clock.SHORT] = max(min(next_length(h, ratio, 1.0, 2.0), 0.9 * h), shortest)
     elif status == LANDS:
         return _SOLVED if h > _INSTANT else _TOLERANCE_STEP
     elif h <= shortest:

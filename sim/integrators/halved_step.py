@@ -1,24 +1,16 @@
-"""An attempt of order 2: one step of length h, its two halves, which are kept, and their difference.
-
-Where nothing lands, closes or stops, both and the same step in three parts are extrapolated (extrapolated_step.py), and
-that is kept if its error is smaller.
-"""
+"""An attempt of order 2: one step of length h, its two halves, which are kept, and their difference."""
 
 from __future__ import annotations
 
-from math import sqrt
-
 from sim.contact.contact_report import report_contacts
 from sim.dynamics.state_manifold import configuration_difference
-from sim.integrators.contact_events import NEVER, landing
-from sim.integrators.extrapolated_step import combine_impulses, extrapolate
+from sim.integrators.contact_events import landing
 from sim.integrators.node_step import begin_part, mean_of_node, node_of_mean, part_of, step_mean
 from sim.integrators.slip_stop import stopping_error
 from sim.integrators.substeps import AccuracyGoal, Clock, Embedded, SubstepState
 from sim.model.layout import data_view, model_view
 from sim.model.options import StepOptions
 from solvers.compiler import Table, kernel
-from solvers.dense import copy_vector
 from solvers.status import Status
 from solvers.types import Vector
 
@@ -31,10 +23,6 @@ _PRESSED, _HELD = 8.0, 4.0
 # [m, rad] invisible error: the gap of a contact on the central path is no more exact, nor that of a loop
 _NOISE, _CLOSED = 1e-10, 1e-12
 _OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes deeper ones, whatever its length
-# least and largest ratio of a step of order 2 that is extrapolated, in contact and without; in contact, where gaps are
-# about 1e-9 m, others would be combined to an overlap. Steps without a further attempt where that was in vain, and
-# shortest lengths from which on contacts have settled within a third of the step
-_LITTLE, _NEARLY, _FAR, _WAIT, _SETTLING = 0.01, 1e2, 1e9, 4.0, 4.0
 _AHEAD = 1e-3  # [s] least length of the steps behind an impact whose velocities are compared
 
 
@@ -105,46 +93,11 @@ def _difference(
 
 
 @kernel
-def _extrapolated(
-    model_at: Table,
-    data_at: Table,
-    step: tuple[Vector, Vector, float],
-    line: SubstepState,
-    embedded: Embedded,
-    ratio: float,
-) -> float:
-    """Error over allowed of the better of two steps, in line.trial: that of order 2 in two halves, whose ratio is
-    given, and the extrapolated one, if it is tried: not where a velocity jumps.   step: (goal, settings, length).
-    """
-    model, data, clock = model_view(model_at), data_view(data_at), line.clock
-    goal, settings, h = step
-    presses = data.active_count[0] > 0
-    most = _NEARLY if presses else _FAR
-    if clock[Clock.HIT] + clock[Clock.BEYOND] + clock[Clock.WAIT] > 0.0 or not (_LITTLE < ratio <= most):
-        return ratio
-    if presses and h < _SETTLING * goal[AccuracyGoal.SETTLED]:
-        return ratio
-    coupled = model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0
-    share = _PRESSED if presses else (_HELD if coupled else 1.0)
-    noise = _NOISE if model.contact_body.shape[0] + model.limit_dof.shape[0] > 0 else _CLOSED
-    error = max(extrapolate(model_at, data_at, settings, goal, line, embedded, h) - noise, 0.0)
-    better = share * error / (goal[AccuracyGoal.ACCURACY] * h)
-    if better > 0.5 * ratio:
-        clock[Clock.WAIT] = _WAIT
-        return ratio
-    copy_vector(line.ahead, line.trial)
-    combine_impulses(line.parts)
-    clock[Clock.ORDER], clock[Clock.REACH] = 6.0, h * max(1.0, sqrt(0.5 * most / max(ratio, 1e-12)))
-    return better
-
-
-@kernel
 def try_short(
     models: Table, works: Table, settings: Vector, goal: Vector, line: SubstepState, embedded: Embedded, h: float
 ) -> tuple[int, float]:  # fmt: skip
     """line.trial = the node one step of order 2, in two halves, after line.x; (Status or LANDS, error over allowed)."""
     model, data, options = model_view(models[1]), data_view(works[0]), part_of(goal, settings, h, 2)
-    line.clock[Clock.ORDER], line.clock[Clock.REACH] = 2.0, NEVER
     begin_part(data, line.wrench)
     status = mean_of_node(models[1], works[0], h, line.u, line.x, line.mean)
     if status == _SOLVED:
@@ -152,7 +105,6 @@ def try_short(
         status = step_mean(model, data, options, line.u, line.mean, line.whole, line.report)
     if status != _SOLVED:
         return status, FAILED
-    report_contacts(model, data, h, line.parts[2])
     found = landing(model, data, options, goal[AccuracyGoal.ACCURACY], line.mean, line.slips)
     line.clock[Clock.HIT], line.clock[Clock.AHEAD] = 1.0 if found.hits else 0.0, found.ahead
     status = node_of_mean(model, data, h, line.u, line.whole, line.node)
@@ -171,10 +123,7 @@ def try_short(
         return status, FAILED
     if found.depth > _OVERLAP:
         return _SOLVED, 0.0
-    allowed = goal[AccuracyGoal.ACCURACY] * h
-    stop = stopping_error(model, line.parts, line.slips, h) / allowed
+    error = stopping_error(model, line.parts, line.slips, h)
     behind = part_of(goal, settings, max(0.5 * h, _AHEAD), 1)
-    ratio = max(stop, _difference(models[1], works[0], behind, goal, line, embedded) / allowed)
-    if stop <= 1.0:
-        ratio = max(stop, _extrapolated(models[1], works[0], (goal, settings, h), line, embedded, ratio))
-    return _SOLVED, ratio
+    error = max(error, _difference(models[1], works[0], behind, goal, line, embedded))
+    return _SOLVED, error / (goal[AccuracyGoal.ACCURACY] * h)

@@ -32,9 +32,6 @@ class Clock(Code):
     AHEAD = 13  # time until the first contact of that step [s]
     IMPACT = 14  # longest length of a step with an impact
     BEGUN = 15  # 0 before the first sub-step
-    ORDER = 16  # of the step in the trial: 2, or 6 where it is extrapolated
-    WAIT = 17  # steps of order 2 until the next extrapolation is tried
-    REACH = 18  # longest length of the next step after an extrapolated one [s]
 
 
 class AccuracyGoal(Code):
@@ -62,9 +59,9 @@ class SubstepState(NamedTuple):
     half: Vector
     node: Vector  # (nx,) scratch: the node after the undivided step
     ahead: Vector  # (nx,) scratch: mean state of a step from there
-    clock: Vector  # (19,) in place
+    clock: Vector  # (16,) in place
     report: Vector  # (6,)
-    parts: Cube  # (5, ncontact, 11) scratch: contacts of both halves, the whole step, all thirds together, one of them
+    parts: Cube  # (2, ncontact, 11) scratch
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the step
     contacts: Matrix  # (ncontact, 11) in place: impulses so far, the rest of the last step
     starts: Matrix  # (n, nx) nodes where the sub-steps begin, of those since the last pause
@@ -112,7 +109,7 @@ def keep(line: SubstepState, h: float, order: int) -> None:
     line.clock[Clock.BEYOND] = 0.0
     if order == 8 or line.clock[Clock.HIT] > 0.0:
         line.clock[Clock.IMPACT] = NEVER
-    if order != 8:
+    if order == 2:
         line.clock[Clock.READY] = 0.0
         add_contacts(line)
 

@@ -227,5 +227,3 @@ class Slot(Code):
     ADD_CORNER_SLIPS = 182
     TAKE_CORNERS = 183
     REPORT_CORNERS = 184
-    # nodes of extrapolated steps with closed loops and gears
-    CLOSE_NODE = 185
