@@ -59,6 +59,7 @@ measure learning_costs "$python" "$here/benchmarks/learning_costs.py" $quick --o
 measure start_strategies "$python" "$here/benchmarks/start_strategies.py" $quick --out "$out"
 measure falls "$python" "$here/benchmarks/falls.py" $quick --out "$out"
 measure gaits "$python" "$here/benchmarks/gaits.py" $quick --out "$out"
+measure flips "$python" "$here/benchmarks/flips.py" $quick --out "$out"
 measure loops "$python" "$here/benchmarks/loops.py" $quick --out "$out"
 measure collisions "$python" "$here/benchmarks/collisions.py" --motions 120 $quick --out "$out"
 measure mpc "$python" "$here/benchmarks/mpc.py" $quick --out "$out"

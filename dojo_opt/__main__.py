@@ -28,7 +28,10 @@ if TYPE_CHECKING:
     from dojo_opt.tasks.plan_task import PlanTask
 
 # names for `run`; the gaits of the quadruped also have the names of their examples, quadruped_trot and so on
-PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap", "humanoid_leap")
+PROBLEMS = (
+    *("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump"),
+    *("leap", "humanoid_leap", "backflip"),
+)
 GAITS = ("trot", "bound", "pace", "walk", "turn", "jump", "leap")
 LOOPS = ("free_gait_mpc", "hopper_mpc", "humanoid_mpc", "quadruped_mpc")  # run in closed loop with a plant
 SUITES = ("crisp", "idto", "jin")  # of tasks that are run by SUITE.TASK, such as idto.spinner

@@ -1,10 +1,11 @@
-"""Ready-made planning problems: hops, swing-ups, gaits and leaps of legged robots, reaching and pushing with arms."""
+"""Ready-made planning problems: hops, swing-ups, gaits, leaps and flips on legs, reaching and pushing with arms."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 from dojo_opt.problems.classics import block, hop, swingup
+from dojo_opt.problems.flips import backflip
 from dojo_opt.problems.humanoid_leaps import humanoid_leap
 from dojo_opt.problems.leaps import leap
 from dojo_opt.problems.legged import jump, stand_up, trot, walk
@@ -14,6 +15,7 @@ from dojo_opt.problems.reach import reach
 from sim.mechanism.checks import no_attribute
 
 __all__ = [
+    "backflip",
     "block",
     "bound",
     "follow",

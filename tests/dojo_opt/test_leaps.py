@@ -1,4 +1,4 @@
-"""Leaps of the quadruped: found from standing and a goal, as high as asked, and they land."""
+"""Leaps and flips of the quadruped: found from a goal, as high as asked, and they land."""
 
 import numpy as np
 import pytest
@@ -50,3 +50,29 @@ def test_a_leap_that_is_too_high_is_no_success():
     plan = ilqr(problem)
     assert not plan.success
     assert "Largest violation: " in plan.message and "Goal of trunk" in plan.message
+
+
+@pytest.mark.slow
+def test_a_backflip_is_found_and_lands():
+    """Once around, backwards, its legs free; replayed to 1e-5 it ends on its feet, where the plan does."""
+    problem = problems.backflip()
+    legs = problem.states0[1:, 7:19]
+    assert np.ptp(legs, axis=0).max() == 0.0 and np.ptp(problem.controls0, axis=0).max() == 0.0
+    plan = ilqr(problem)
+    assert plan.success, plan.summary()
+    angle = np.unwrap(2.0 * np.arctan2(plan.x[:, 5], plan.x[:, 3]))
+    assert angle[-1] - angle[0] == pytest.approx(-2.0 * np.pi, abs=0.02)
+    assert np.all(np.abs(plan.u) <= 33.5 + 1e-9)
+    assert np.ptp(plan.x[:, 7:19], axis=0).max() > 0.5  # its legs push, and fold
+    shot = plan.replay(accuracy=1e-5)
+    assert shot.status == 0, shot.message
+    assert np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < 5e-3
+    assert 1.0 - 2.0 * (shot.x[-1, 4:6] ** 2).sum() > 0.99
+    assert np.abs(shot.x[-1, 19:]).max() < 0.5  # at rest
+
+
+def test_a_backflip_to_the_moon_is_refused():
+    with pytest.raises(ValueError, match=r"problems.backflip\(height=..., time_step=...\): knots"):
+        problems.backflip(height=1e18)
+    with pytest.raises(ValueError, match=r"problems.backflip\(height=...\)"):
+        problems.backflip(height=0.0)
