@@ -93,6 +93,20 @@ def test_plans_of_the_hand_know_the_friction_of_the_palm():
 
 
 @pytest.mark.slow
+def test_a_hand_turns_a_ball_below_its_palm():
+    """Gravity pulls the ball to the fingertips, and a hand that stays as it starts drops it."""
+    task = dojo.tasks.idto.allegro_upside_down()
+    assert task.model.mechanism.gravity[2] > 0.0
+    loose = dojo.closed_loop(lambda time, x: np.zeros(16), task.plant(), 0.4, fallen=task.lost)
+    assert not loose.survived
+    loop = task.run(seconds=1.0)
+    assert loop.survived
+    outcome = task.outcome(loop)
+    assert outcome.measures["angle off [deg]"] < 70.0  # of 90
+    assert outcome.penetration < 1e-4
+
+
+@pytest.mark.slow
 def test_a_quadruped_finds_its_gait():
     """From a velocity and one pose: it is half a metre on after 2.5 s, and has lifted every foot."""
     task = dojo.tasks.idto.mini_cheetah()

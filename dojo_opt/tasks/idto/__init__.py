@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from dojo_opt.tasks.idto.acrobot import acrobot
 from dojo_opt.tasks.idto.air_hockey import air_hockey
 from dojo_opt.tasks.idto.allegro import allegro
+from dojo_opt.tasks.idto.allegro_upside_down import allegro_upside_down
 from dojo_opt.tasks.idto.dual_jaco import dual_jaco
 from dojo_opt.tasks.idto.jaco import jaco
 from dojo_opt.tasks.idto.jaco_ball import jaco_ball
@@ -28,6 +29,7 @@ __all__ = [
     "acrobot",
     "air_hockey",
     "allegro",
+    "allegro_upside_down",
     "dual_jaco",
     "hopper",
     "jaco",

@@ -1,54 +1,35 @@
-"""A hand of four fingers turns a ball on its palm."""
+"""The Allegro hand, palm up, and a ball."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from dojo_opt.mpc.controller import MPC
-from dojo_opt.mpc.settings import OPTIONS
-from dojo_opt.planning.options import Options, Stage
-from dojo_opt.planning.problem import Problem
-from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
-from dojo_opt.tasks.suite import SuiteTask, quadratic, servo_effort, timed
 from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Box, Sphere, rotation_matrix
-from sim.simulator.simulator import Simulator
 from solvers.types import Vector
 
-__all__ = ["allegro"]
+__all__ = ["JOINTS", "STIFFNESS", "Angles", "mechanism"]
 
-_KNOT, _HORIZON, _RATE = 0.05, 40, 10.0  # [s], knots, [Hz]
-_ANGLE, _LOW = np.radians(15.0), 0.05  # [rad] off the goal at the end, [m] of the ball
-_SERVO = 0.5, 1e-3  # [N m/rad], [N m s/rad]
-_JOINTS, _HEIGHT, _QUATERNION = 16, 18, slice(19, 23)  # of the fingers; of the ball, columns of a state
+Angles = Mapping[str, Sequence[float]]  # of the four joints of each finger [rad]
+
+JOINTS, STIFFNESS = 16, 0.5  # of the fingers; of their servos [N m/rad]
+STOPS = False
+_DAMPER = 1e-3  # of the servos [N m s/rad]
 _EFFORT = 0.7  # [N m]
 _REACH = 0.02  # [m] of contacts in plans, of which those further away would cost most of the time
-_KAPPA = 1e-5  # [N s m]
-_GRIP = 0.7  # friction of the fingers that plans assume, 1 in the plant: plans with all of it squeeze the ball out
-_BACKTRACKING = 0.25  # of the line search, whose rollouts take most of a tick
 _PALM = 0.18  # friction of palm and ball; plans that assume 1, as the publication's do, let the ball slide off
+_NAMES = "outer", "thumb", "middle", "inner"
 _UP = np.array([0.5**0.5, 0.0, -(0.5**0.5), 0.0])  # the palm, whose fingers point along -x
 _BALL = 0.05, 0.06, (-0.06, 0.0, 0.0712)  # [kg], [m], place [m]
-_NOMINAL = {
-    "outer": (-0.1, 1.0, 1.0, 1.0),
-    "thumb": (0.6, 1.9, 1.0, 1.0),
-    "middle": (0.0, 0.7, 1.0, 1.0),
-    "inner": (0.1, 1.0, 1.0, 1.0),
-}  # [rad] of the publication, whose fingers are up to 7.2 mm inside the ball
-_OPEN = {
-    "outer": (-0.1, 0.86, 1.0, 1.0),
-    "thumb": (0.6, 1.9, 0.95, 1.0),
-    "middle": (0.0, 0.57, 1.0, 1.0),
-    "inner": (0.1, 0.86, 1.0, 1.0),
-}  # [rad] of the start, which touches nothing
 _RANGES = ((-0.47, 0.47), (-0.196, 1.61), (-0.174, 1.709), (-0.227, 1.618))
 _THUMB_RANGES = ((0.263, 1.396), (-0.105, 2.163), (-0.189, 1.644), (-0.162, 1.719))
 
@@ -103,34 +84,36 @@ _SPHERES: dict[str, tuple[tuple[int, float, float], ...]] = {  # of a link: numb
 }
 
 
-def mechanism(friction: float, palm: float, servos: bool = False) -> Mechanism:
+def mechanism(
+    friction: float, opened: Angles, gravity: float = -9.81, servos: bool = False, stops: bool = True
+) -> Mechanism:
     """The left hand, its palm up and fixed, and the ball: 20 pairs of the hand and the ball, and no others.
 
         q  (23,) outer finger, thumb, middle and inner finger [rad], ball
 
     Args:
         friction: coefficient of friction of fingers and ball.
-        palm: that of palm and ball.
-        servos: whether it is the model of the controller: joints with servos and without stops (default False).
+        opened: joints about the ball, without contact.
+        gravity: acceleration along z [m/s^2] (default -9.81); with a positive one the hand is upside down.
+        servos: whether it is the model of the controller, whose joints have servos (default False).
+        stops: whether the joints have stops (default True).
 
     Returns:
         The mechanism, its fingers about the ball.
     """
     fingers = {"outer": 1.0, "middle": 0.0, "inner": -1.0}
     links = [
-        link
-        for name in _NOMINAL
-        for link in (_thumb(not servos) if name == "thumb" else _finger(name, fingers[name], not servos))
+        link for part in _NAMES for link in (_thumb(stops) if part == "thumb" else _finger(part, fingers[part], stops))
     ]
     bodies, joints = assembled(links)
     if servos:
-        joints = [replace(joint, spring=_SERVO[0], damper=0.015 + _SERVO[1]) for joint in joints]
+        joints = [replace(joint, spring=STIFFNESS, damper=0.015 + _DAMPER) for joint in joints]
     mass, radius, place = _BALL
     ball = Sphere(radius)
     pairs = [("thumb_0", (-0.0179, 0.009, 0.0145), 0.015)]
-    for name in _NOMINAL:
-        spheres = _SPHERES["thumb" if name == "thumb" else "finger"]
-        pairs += [(f"{name}_{k}", (0.0, 0.0, height), size) for k, height, size in spheres]
+    for part in _NAMES:
+        spheres = _SPHERES["thumb" if part == "thumb" else "finger"]
+        pairs += [(f"{part}_{k}", (0.0, 0.0, height), size) for k, height, size in spheres]
     collisions = [
         Collision(
             "ball",
@@ -144,8 +127,8 @@ def mechanism(friction: float, palm: float, servos: bool = False) -> Mechanism:
         for k, (link, point, size) in enumerate(pairs)
     ]
     box = Box(0.0408, 0.113, 0.095, center=rotation_matrix(_UP) @ np.array([-0.0093, 0.0, 0.0475]), orientation=_UP)
-    collisions.append(Collision("ball", None, ball, box, friction=palm, name="palm"))
-    neutral: dict[str, Any] = {f"{name}_{k}": angle for name in _OPEN for k, angle in enumerate(_OPEN[name])}
+    collisions.append(Collision("ball", None, ball, box, friction=_PALM, name="palm"))
+    neutral: dict[str, Any] = {f"{part}_{k}": angle for part in _NAMES for k, angle in enumerate(opened[part])}
     neutral["ball"] = (*place, 1.0, 0.0, 0.0, 0.0)
     limits: dict[str, Any] = {} if servos else {"limits": (-_EFFORT, _EFFORT)}
     return Mechanism(
@@ -155,67 +138,6 @@ def mechanism(friction: float, palm: float, servos: bool = False) -> Mechanism:
         [Input(link.name, **limits) for link in links],
         collisions=collisions,
         name="allegro",
+        gravity=(0.0, 0.0, gravity),
         neutral=neutral,
     )
-
-
-def allegro(**settings: Any) -> SuiteTask:
-    """Turn a ball in place by 90 degrees about the vertical: 40 knots of 50 ms at 10 Hz.
-
-    A run of 10 s is a success when the ball ends within 15 degrees of its goal and stays above z = 50 mm throughout.
-    The fingers start opened, without contact; those of the publication start up to 7.2 mm inside the ball. The limit of
-    the thumb is moved to fit its start. Plans know the friction of the palm, .18, where those of the publication count
-    on 1, and assume .7 of the fingers' 1: plans that count on all of it squeeze the ball until it slips out. Contacts
-    beyond 20 mm do not act on them.
-
-    Args:
-        **settings: settings of `dojo.MPC`, instead of the ones of the task.
-
-    Returns:
-        The task.
-
-    Raises:
-        TypeError: for an unknown setting.
-        ValueError: for an argument out of range.
-    """
-    sim = Simulator(mechanism(_GRIP, _PALM, servos=True), time_step=_KNOT, kappa=_KAPPA)
-    own = mechanism(1.0, _PALM)
-    start = sim.neutral()
-    goal = start.copy()
-    goal[:_JOINTS] = np.concatenate(list(_NOMINAL.values()))
-    goal[_QUATERNION] = 0.5**0.5 * np.array([1.0, 0.0, 0.0, -1.0])
-    quat = 0.25  # squares of four numbers are a quarter of those of the rotation vector
-    fingers = np.ones(_JOINTS)
-    running = np.concatenate([0.01 * fingers, np.full(3, 10.0), np.full(3, 10.0 * quat)])
-    end = np.concatenate([fingers, np.full(3, 100.0), np.full(3, 100.0 * quat)])
-    rates = np.concatenate([1e-3 * fingers, np.ones(6)]), np.full(22, 10.0)
-    cost = [
-        quadratic(goal, _KNOT, _HORIZON, (running, rates[0]), (end, rates[1])),
-        servo_effort(sim, own, _KNOT * 0.1, _HORIZON),
-    ]
-    problem = Problem(sim, start, _HORIZON, cost=cost, controls0=_SERVO[0] * start[:_JOINTS])
-    given = timed(_RATE) | {"servo": own, "gain_scale": 0.0}
-    given |= {"options": replace(OPTIONS, backtracking=_BACKTRACKING)}
-    given |= {"kappa": _KAPPA, "first": Options(stages=(Stage(1e-4, 1e-4), Stage(_KAPPA, _KAPPA)))}
-    mpc = MPC(problem, **{**given, **settings})
-    model = Simulator(own, time_step=1e-3, kappa=1e-8)
-    spread = np.concatenate([np.full(_JOINTS, 0.03), np.full(3, 1e-3), np.full(3, 0.1), np.full(22, 0.02)])
-    judge = _Turned(goal[_QUATERNION])
-    return SuiteTask("idto.allegro", mpc, model, start, 10.0, spread, judge, _RATE, lost=_dropped)
-
-
-def _dropped(x: Vector) -> bool:
-    """Whether the ball is below the palm: the fingers cannot reach it any more."""
-    return bool(x[_HEIGHT] < _LOW)
-
-
-class _Turned:
-    """Whether the ball ends as `goal` (4,) and is never dropped."""
-
-    def __init__(self, goal: Vector) -> None:
-        self._goal = goal
-
-    def __call__(self, loop: ClosedLoop) -> tuple[bool, dict[str, float]]:
-        off = 2.0 * float(np.arccos(min(1.0, abs(float(loop.x[-1, _QUATERNION] @ self._goal)))))
-        low = float(loop.x[:, _HEIGHT].min())
-        return off < _ANGLE and low > _LOW, {"angle off [deg]": float(np.degrees(off)), "lowest [m]": low}
