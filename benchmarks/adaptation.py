@@ -26,6 +26,7 @@ from dojo_opt.report.result import Cell, Report, Row, Table
 ADAPT = ("mass:trunk", "friction:*")
 NOISE = (2e-4, 2e-3)  # [m, rad], [m/s, rad/s]
 SECONDS, KNOWN, CHECKED = 4.0, 0.1, 1.0  # [s], [1], [s]
+CLOSE = 0.05  # share of the mass
 
 
 def perturbation(run: int) -> dict[str, Any]:
@@ -43,10 +44,11 @@ def perturbation(run: int) -> dict[str, Any]:
 
 
 class Watched:
-    """A controller whose estimates after `CHECKED` s are kept."""
+    """A controller whose estimates are kept: after `CHECKED` s, and as a history (time [s], values, deviations)."""
 
     def __init__(self, mpc: dojo.MPC) -> None:
         self.mpc, self.values, self.deviations = mpc, {}, {}
+        self.history: list[tuple[float, Any, Any]] = []
 
     def reset(self) -> None:
         """As MPC.reset."""
@@ -54,9 +56,21 @@ class Watched:
 
     def __call__(self, now: float, x: Any) -> Any:
         u = self.mpc(now, x)
-        if self.mpc.estimator is not None and abs(now - CHECKED) < 1e-9:
-            self.values, self.deviations = self.mpc.estimator.values, self.mpc.estimator.deviations
+        if self.mpc.estimator is not None:
+            found = self.mpc.estimator.values, self.mpc.estimator.deviations
+            self.history.append((now, *found))
+            if abs(now - CHECKED) < 1e-9:
+                self.values, self.deviations = found
         return u
+
+    def found(self, total: float) -> float:
+        """Time from which on the mass of the loaded trunk, `total` [kg], is estimated to within `CLOSE` [s]."""
+        off = [now for now, values, _ in self.history if abs(values["mass:trunk"] - total) > CLOSE * total]
+        return max(off, default=0.0)
+
+    def knows(self) -> float:
+        """Time at which friction is known first [s]; infinite if never."""
+        return next((now for now, _, deviations in self.history if deviations["friction:*"] < KNOWN), float("inf"))
 
 
 def trial(run: int, adapt: dojo.Adaptation | None) -> tuple[dojo.ClosedLoop, Watched, float]:
@@ -73,6 +87,7 @@ def run(args: argparse.Namespace) -> Report:
     report = Report("Adaptive control", "")
     lines: list[list[Cell]] = []
     payload, friction, costs, survivors = [], [], [], np.zeros(2, dtype=int)
+    times: list[tuple[float, float]] = []
     count = 2 if args.quick else args.runs
     for k in progress()([(f"run {k}", partial(int, k)) for k in range(count)], "runs"):
         number_of_run = k()
@@ -82,6 +97,7 @@ def run(args: argparse.Namespace) -> Report:
         loop, watched, adaptive = trial(number_of_run, dojo.Adaptation(ADAPT, noise=noise))
         survivors += (fixed.survived, loop.survived)
         costs.append(adaptive / cost)
+        times.append((watched.found(drawn["payload"] + 6.0), watched.knows()))
         line: list[Cell] = [drawn["payload"], drawn["friction"], fixed.duration, loop.duration]
         if watched.values:
             total = drawn["payload"] + 6.0
@@ -96,6 +112,16 @@ def run(args: argparse.Namespace) -> Report:
         Row("runs that the adaptive model survives", float(survivors[1]), "", None),
         number("error of the loaded trunk's mass after 1 s, median", 100.0 * float(np.median(payload)), 5.0, unit="%"),
         number("error of the loaded trunk's mass after 1 s, largest", 100.0 * max(payload), unit="%"),
+        number(
+            "time until the loaded trunk's mass stays within 5 %, median", float(np.median(times, axis=0)[0]), unit="s"
+        ),
+        number(
+            "time until the loaded trunk's mass stays within 5 %, longest",
+            float(np.max(times, axis=0)[0]),
+            1.0,
+            unit="s",
+        ),
+        number("runs in which friction is known after 4 s", float(np.sum(np.isfinite(times), axis=0)[1])),
         number("runs in which friction is known after 1 s", float(len(friction))),
         number("error of a known friction, median", float(np.median(friction)) if friction else float("nan"), 0.1),
         number("processor time over that of the fixed model, median", float(np.median(costs))),
