@@ -17,6 +17,7 @@ from dojo_opt.problems.locomotion import EFFORT, TORQUE_LIMIT, standing, weights
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.memory_limit import check_room
+from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 from solvers.types import Floats
 
@@ -78,7 +79,7 @@ def backflip(
     check_room(f"{call}(height=..., time_step=...): knots", horizon, 8.0 * sim.nx, "flip lower, or with longer knots")
     poses = _poses(start, np.linspace(0.0, step * horizon, horizon + 1), distance, height, crouch)
     states = np.tile(still, (horizon + 1, 1))
-    states[:, :7] = poses[:, :7]
+    states[:, BaseState.POSE] = poses[:, BaseState.POSE]
     states[:, 2] += still[2] - start[2]
     return Problem(
         sim,
@@ -107,5 +108,5 @@ def _poses(start: Floats, time: Floats, distance: float, height: float, crouch: 
     rise = np.where(air > 0.0, 4.0 * height * air * (1.0 - air), crouch * ((1.0 + _RAISED) * push - 1.0))
     poses[:, 2] += rise
     half = -0.5 * (_LEAD * push**2 + (2.0 * np.pi - _LEAD) * air)
-    poses[:, 3:7] = np.column_stack([np.cos(half), 0.0 * half, np.sin(half), 0.0 * half])
+    poses[:, BaseState.QUATERNION] = np.column_stack([np.cos(half), 0.0 * half, np.sin(half), 0.0 * half])
     return poses
