@@ -20,7 +20,7 @@ _FILL, _EDGE, _BONE, _CONTACT, _GROUND = "#b9cde4", "#33557a", "#8a8f99", "#c844
 def thumbnail(mechanism: Mechanism, q: ArrayLike | None = None, *, size: float = 2.0) -> Any:
     """A small picture of a mechanism: bodies as hulls of their shapes, joints as lines, contacts as red balls.
 
-    Bodies without a shape are drawn as lines from their joint to those that they carry.
+    Bodies without a shape are drawn as lines from their joint to those that they carry, and to their contacts.
 
     Args:
         mechanism: the mechanism.
@@ -68,7 +68,9 @@ def _camera() -> tuple[Floats, Floats, Floats]:
 
 
 def _bones(mechanism: Mechanism, at: Any) -> list[tuple[Floats, Floats]]:
-    """Lines from the joint that carries a body, or its centre of mass, to the joints that it carries."""
+    """Lines from the joint that carries a body to the joints that it carries, and if it has no shape to its contacts;
+    to its centre of mass where there are neither.
+    """
     out = []
     own = {j.child: at[j.child].at(np.asarray(j.child_point)) for j in mechanism.joints}
     for joint in mechanism.joints:
@@ -77,9 +79,11 @@ def _bones(mechanism: Mechanism, at: Any) -> list[tuple[Floats, Floats]]:
         point = at[joint.parent].at(np.asarray(joint.parent_point))
         out.append((own[joint.parent], point))
         out.append((point, own[joint.child]))
-    parents = {j.parent for j in mechanism.joints}
-    out += [(own[b.name], at[b.name].point) for b in mechanism.bodies if b.name not in parents and b.shape is None]
-    return out
+    bare = {b.name for b in mechanism.bodies if not b.shapes}
+    ends = [(c.body, np.asarray(c.point)) for c in mechanism.contacts if c.body in bare]
+    lonely = bare - {j.parent for j in mechanism.joints} - {name for name, _ in ends}
+    ends += [(name, np.zeros(3)) for name in sorted(lonely)]
+    return out + [(own[name], at[name].at(point)) for name, point in ends]
 
 
 def _surface(shape: Solid) -> Floats:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dojo_opt.constraint import Goal
+from dojo_opt.constraint import Frame, Goal, Point
 from dojo_opt.planning.component_names import chosen_components
 from dojo_opt.viewer.drawing import Piece, extent, pieces
 from sim.mechanism import checks
@@ -17,9 +17,13 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import rotation_matrix
 from sim.mechanism.short_repr import short_repr
 from sim.model.state_columns import BodyState
+from sim.simulator.inverse_kinematics import ik
+from sim.simulator.kinematics import Kinematics
 from sim.simulator.results import Trajectory
 from sim.simulator.simulator import Simulator
 from solvers.types import Floats
+
+_TARGET = "the point with a target"
 
 
 @dataclass(frozen=True)
@@ -137,19 +141,44 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
 
 
 def _goal(result: Any, sim: Simulator) -> Floats | None:
-    """(nx,) target of the last knot of a plan, if it has a `Goal` there; coordinates that it leaves free as planned."""
+    """(nx,) state at the goal of a plan: where a `Goal`, a `Frame` or a `Point` of its last knot puts the robot, each
+    from the state that the ones before give. Coordinates that they leave free are as planned.
+    """
     problem: Any = getattr(result, "problem", None)
-    for spec in () if problem is None else problem.specs[1]:
-        if isinstance(spec, Goal) and np.isin([-1, problem.horizon], np.atleast_1d(spec.knots)).any():
-            target = np.array(np.atleast_2d(np.asarray(spec.target, dtype=np.float64))[-1])
-            if target.shape != (sim.nx,):
-                continue
-            mask = np.zeros(sim.ndx)
-            mask[chosen_components("Goal(components=...)", spec.components, sim)] = 1.0
-            last = np.asarray(result.x[-1], dtype=np.float64)
-            if mask[: sim.nv].any():
-                return np.asarray(sim.integrate(last, mask * sim.difference(target, last)))
-    return None
+    if problem is None:
+        return None
+    last = np.asarray(result.x[-1], dtype=np.float64)
+    reached, free = last, True
+    for spec in problem.specs[1]:
+        if isinstance(spec, Goal | Frame | Point) and np.isin([-1, problem.horizon], np.atleast_1d(spec.knots)).any():
+            there = _at_goal(spec, sim, reached) if isinstance(spec, Goal) else _at_frame(spec, sim, reached)
+            reached, free = (reached, free) if there is None else (there, False)
+    return None if free else reached
+
+
+def _at_goal(spec: Goal, sim: Simulator, x: Floats) -> Floats | None:
+    """The state at a goal; None if it has no coordinates."""
+    target = np.array(np.atleast_2d(np.asarray(spec.target, dtype=np.float64))[-1])
+    if target.shape != (sim.nx,):
+        return None
+    mask = np.zeros(sim.ndx)
+    mask[chosen_components("Goal(components=...)", spec.components, sim)] = 1.0
+    return np.asarray(sim.integrate(x, mask * sim.difference(target, x))) if mask[: sim.nv].any() else None
+
+
+def _at_frame(spec: Frame | Point, sim: Simulator, x: Floats) -> Floats | None:
+    """The state with a frame at its target; None with bounds or chosen entries, or if no coordinates nearby do that."""
+    if spec.lower is not None or spec.upper is not None or spec.periodic or not isinstance(spec.weight, int | float):
+        return None
+    place, turn = (spec.target, None) if isinstance(spec, Point) else (spec.place, spec.orientation)
+    if place is not None:
+        place = np.broadcast_to(np.atleast_2d(np.asarray(place, dtype=np.float64))[-1], (3,))
+    if turn is not None:
+        turn = np.atleast_2d(np.asarray(turn, dtype=np.float64))[-1]
+    kin = Kinematics(sim)
+    kin.add(_TARGET, spec.frame, spec.offset)
+    found = ik(kin, {_TARGET: place if turn is None else (place, turn)}, x[: sim.nq], attempts=1)
+    return np.concatenate([found.q, x[sim.nq :]]) if found.success else None
 
 
 def _standing(mech: Mechanism) -> Motion:

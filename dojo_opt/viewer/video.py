@@ -96,7 +96,7 @@ def save_picture(
     size: tuple[int, int] = (640, 360),
     time: float = 0.0,
 ) -> Path:
-    """Write a picture of a motion, or of a mechanism at rest, as a .png; drawn as in `save_video`.
+    """Write a picture of a motion, or of a mechanism at rest, as a .png; drawn as in `save_video`, with the goal.
 
     Args:
         result: Trajectory, Plan or ClosedLoop; or a Mechanism, which stands in its neutral state.
@@ -154,7 +154,7 @@ def _frames(m: Motion, times: Any, size: tuple[int, int]) -> Iterator[Pixels]:
     moving = m.time[-1] > 0.0
     with tempfile.TemporaryDirectory() as folder, _browser() as browser:
         file = Path(folder) / "motion.html"
-        file.write_text(html_of(m, moving=moving), encoding="utf-8")
+        file.write_text(html_of(m, moving=moving, shown={"ghost": True}), encoding="utf-8")
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         page.goto(file.as_uri())
         page.add_style_tag(content="#bar {display: none !important}")

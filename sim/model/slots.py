@@ -227,3 +227,5 @@ class Slot(Code):
     ADD_CORNER_SLIPS = 182
     TAKE_CORNERS = 183
     REPORT_CORNERS = 184
+    # a bound of the distance of two polytopes
+    APART_POLYTOPES = 185

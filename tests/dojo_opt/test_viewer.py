@@ -358,6 +358,33 @@ def test_the_goal_of_a_plan_is_a_ghost_where_the_plan_leaves_nothing_free():
     assert motion(sim.rollout(plans[0].x[0], plans[0].u)).goal is None
 
 
+def test_the_goal_of_a_reach_is_a_ghost_with_the_frame_at_its_target():
+    arm = dojo.Simulator(dojo.models.panda(gripper=False), time_step=0.05)
+    kin = dojo.Kinematics(arm)
+    target = kin.pose("link7", arm.neutral()[: arm.nq])[0] + (0.0, 0.1, 0.1)
+    problem = dojo.problems.reach(arm, "link7", target, duration=0.5, time_step=0.05)
+    start = dojo.ilqr(problem, options=dojo.Options(max_iterations=1))
+    body, origin, _ = kin.place("link7")
+    pose = motion(start).goal[body]
+    np.testing.assert_allclose(pose[:3] + rotation_matrix(pose[3:]) @ origin, target, atol=1e-7)
+    ends = [dojo.constraint.Point("link7", target), dojo.constraint.Point("link7", target, knots=-1, weight={"x": 1.0})]
+    for end in ends:  # at all knots, and one entry alone
+        other = dojo.Problem(arm, arm.neutral(), 2, cost=[dojo.cost.Effort(1e-3)], constraints=[end])
+        assert motion(dojo.ilqr(other, options=dojo.Options(max_iterations=1))).goal is None
+
+
+def test_a_thumbnail_has_the_shank_between_the_last_joint_and_the_contact():
+    bodies = [dojo.Body("hip", 1.0, shape=dojo.Sphere(0.1)), dojo.Body("shank", 1.0, inertia=0.01 * np.eye(3))]
+    joints = [
+        dojo.Joint("floating", None, "hip"),
+        dojo.Joint("revolute", "hip", "shank", child_point=(0, 0, 0.2), axis=(0, 1, 0)),
+    ]
+    mech = dojo.Mechanism(bodies, joints, [dojo.Contact("shank", point=(0.0, 0.0, -0.3))])
+    bones = [line.get_xydata() for line in dojo.plots.thumbnail(mech).axes[0].lines if line.get_linewidth() == 2.0]
+    longest = max(float(np.linalg.norm(bone[-1] - bone[0])) for bone in bones)
+    assert longest == pytest.approx(0.5 * np.cos(np.radians(18.0)), rel=1e-6)  # seen from above
+
+
 @pytest.mark.slow
 def test_motions_side_by_side_are_apart_and_end_together(quadruped, tmp_path):
     two = [motion(quadruped), motion(quadruped.simulator.rollout(quadruped.x[0], quadruped.u[:10]))]

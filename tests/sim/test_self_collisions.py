@@ -7,11 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import dojo_opt as dojo
 from sim.mechanism.pose import HERE, Pose, turn
 from sim.mechanism.self_collisions import separation
+from sim.model.shape_kinds import OUT, Pair
+from support.collide import apart_at_least, collide
 from support.scenes import pendulum
+from support.solids import features, random_case
 from support.urdf_files import collision, inertial, joint, link, write
 
 
@@ -29,6 +33,25 @@ def test_gaps_of_shapes_are_those_of_geometry() -> None:
     assert separation(HERE, rod, beside, rod) == pytest.approx(0.2 - 0.1, abs=2e-5)  # two rods that cross
     assert separation(HERE, box, Pose(np.eye(3), np.array([0.19, 0.19, 0.0])), box) < 0.0
     assert separation(HERE, box, Pose(np.eye(3), np.array([0.2, 0.0, 0.0])), box) < 0.0  # side by side
+
+
+def test_the_bound_of_two_hulls_is_at_most_their_distance_and_equals_it_below_a_face(rng: np.random.Generator) -> None:
+    equal = 0
+    for _ in range(300):
+        case = random_case("polytope_polytope", rng)
+        R, r = Rotation.from_rotvec(2.0 * rng.normal(size=3)).as_matrix().ravel(), rng.normal(size=3)
+        r *= rng.uniform(0.2, 1.5) / np.linalg.norm(r)
+        bound = apart_at_least(case.kind, case.sizes, case.hull, R, r)
+        out, gaps = np.empty(OUT), []
+        for feature in range(features(case)):
+            collide(case.kind, feature, case.sizes, case.hull, R, r, out)
+            gaps.append(out[0])
+        assert bound <= min(gaps) + 1e-12
+        equal += bound > min(gaps) - 1e-12
+    assert equal > 20
+    ball = random_case("sphere_polytope", rng)
+    assert apart_at_least(ball.kind, ball.sizes, ball.hull, np.eye(3).ravel(), np.array([3.0, 0.0, 0.0])) < 3.0
+    assert apart_at_least(Pair.BOX_BOX, ball.sizes, ball.hull, np.eye(3).ravel(), np.zeros(3)) < -1e200
 
 
 def test_a_file_collides_with_itself_where_it_can(tmp_path: Path) -> None:

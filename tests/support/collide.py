@@ -48,6 +48,11 @@ def _open_sides(at: Table, kind: int, sizes: Vector, R: Vector, r: Vector) -> in
 
 
 @kernel
+def _apart_at_least(at: Table, kind: int, sizes: Vector, R: Vector, r: Vector) -> float:
+    return kernels.apart_at_least(model_view(at), kind, sizes, R, r)
+
+
+@kernel
 def _arrange(at: Table, kind: int, sizes: Vector, R: Vector, r: Vector, sides: int) -> Arrangement:
     return kernels.arrange(model_view(at), kind, sizes, R, r, sides)
 
@@ -79,6 +84,10 @@ def collide_rows(kind: int, feature: int, sizes: Vector, hull: Matrix, Rs: Matri
 
 def open_sides(kind: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
     return int(_open_sides(_at(hull), kind, sizes, R, r))
+
+
+def apart_at_least(kind: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> float:
+    return float(_apart_at_least(_at(hull), kind, sizes, R, r))
 
 
 def arrange(kind: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, sides: int) -> Any:

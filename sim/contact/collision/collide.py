@@ -23,6 +23,7 @@ from sim.contact.collision.pair_kernels import (
     sides_box_box,
     sides_capsule_box,
 )
+from sim.contact.collision.polytope_polytope import apart_polytopes
 from sim.contact.collision.swapped_shapes import exchange
 from sim.contact.collision.witness import ABSENT
 from sim.model.model import Model
@@ -65,6 +66,12 @@ def open_sides(model: Model, kind: int, sizes: Vector, R: Vector, r: Vector) -> 
     if kind == Pair.CAPSULE_BOX:
         return sides_capsule_box(model, sizes, R, r)
     return OPEN
+
+
+@kernel
+def apart_at_least(model: Model, kind: int, sizes: Vector, R: Vector, r: Vector) -> float:
+    """A bound of the distance of the two shapes that takes a small part of the time of `arrange`; -1e300 for none."""
+    return apart_polytopes(model, sizes, R, r) if kind % SWAPPED == Pair.POLYTOPE_POLYTOPE else -1e300
 
 
 @kernel

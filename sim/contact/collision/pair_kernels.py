@@ -289,6 +289,7 @@ KERNELS: dict[Pair, tuple[Callable[..., Any], ...]] = {
     Pair.CAPSULE_FIELD: (_capsule_field, choose_capsule_field),
     Pair.POLYTOPE_POLYTOPE: (
         _polytope_polytope,
+        polytope_polytope.apart_polytopes,
         arrange_polytope_polytope,
         choose_polytope_polytope,
         face_polytope_polytope,

@@ -33,8 +33,10 @@ from sim.contact.collision.witness import (
     vertex_a,
     vertex_b,
 )
+from sim.model.model import Model
 from sim.model.record_columns import PairSize
-from solvers.compiler import inner_kernel
+from sim.model.slots import Slot
+from solvers.compiler import inner_kernel, optional
 from solvers.rotation import Vec3, cross
 from solvers.types import Matrix, Vector
 
@@ -95,6 +97,18 @@ def points_out(hull: Matrix, o: int, e: int, u: Vec3, n: Vec3, leaning: float) -
 
 
 @inner_kernel
+def _straddles(hull: Matrix, o: int, e: int, u: Vec3) -> bool:
+    """Whether the normals between the two faces of edge e reach the plane across u, or lean over to it; u: an edge of
+    the other shape. If not, `points_out` is false for the normal of both edges: its terms are dot(u, face)/|u x ue|.
+    """
+    f, g = edge_faces(hull, o, e)
+    if f < 0:
+        return True
+    p, q = dot(row(hull, f), u), dot(row(hull, g), u)
+    return min(p, q) < _LEANING and max(p, q) > -_LEANING
+
+
+@inner_kernel
 def _edge_axis(
     i: int, j: int, leaning: float, sizes: Vector, hull: Matrix, R: Vector, r: Vector
 ) -> tuple[int, float, bool]:
@@ -106,7 +120,7 @@ def _edge_axis(
     y, ub, lb = edge(hull, ob, j)
     ua = to_b(R, u)
     c = dot(ua, ub)
-    if 1.0 - c * c < _CROSSING * _CROSSING:
+    if 1.0 - c * c < _CROSSING * _CROSSING or not _straddles(hull, oa, i, to_a(R, ub)):
         return 0, 0.0, False
     x, y = to_b(R, along(x, 0.5 * la, u)), along(y, 0.5 * lb, ub)
     x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
@@ -124,33 +138,59 @@ def _edge_axis(
 
 
 @inner_kernel
-def separation(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Arrangement:
-    """Of the normals of faces and of pairs of edges, the one along which the two are farthest apart, or overlap least:
-    (row of the face, or -1 for edges; the same again; distance along it; 1; 1).
+def apart_along_faces(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> tuple[int, float]:
+    """Row of the face along whose normal the two are farthest apart, or overlap least, and the distance along it
+    without their radii: at most that of the shapes.
     """
     oa, ob = int(sizes[0]), int(sizes[PairSize.B])
     na, nb = int(hull[oa, 0]), int(hull[ob, 0])
     best, face = -1e300, -1
     for f in range(ob + 1 + nb + int(hull[ob, 1]), ob + 1 + nb + int(hull[ob, 1]) + int(hull[ob, 2])):
+        n = row(hull, f)
+        w = to_a(R, n)
+        height = dot(n, (r[0], r[1], r[2])) - hull[f, 3]
         least = 1e300
         for k in range(na):
-            x = to_b(R, row(hull, oa + 1 + k))
-            least = min(least, dot(row(hull, f), (x[0] + r[0], x[1] + r[1], x[2] + r[2])) - hull[f, 3])
-        if least > best:
-            best, face = least, f
+            least = min(least, dot(w, row(hull, oa + 1 + k)))
+        if least + height > best:
+            best, face = least + height, f
     for f in range(oa + 1 + na + int(hull[oa, 1]), oa + 1 + na + int(hull[oa, 1]) + int(hull[oa, 2])):
+        n = to_b(R, row(hull, f))
+        height = -dot(n, (r[0], r[1], r[2])) - hull[f, 3]
         least = 1e300
         for k in range(nb):
-            y = row(hull, ob + 1 + k)
-            least = min(least, dot(row(hull, f), to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2]))) - hull[f, 3])
-        if least > best:
-            best, face = least, f
+            least = min(least, dot(n, row(hull, ob + 1 + k)))
+        if least + height > best:
+            best, face = least + height, f
+    return face, best
+
+
+@optional(Slot.APART_POLYTOPES, default=-1e300)
+def apart_polytopes(model: Model, sizes: Vector, R: Vector, r: Vector) -> float:
+    """`apart_at_least` of collide.py for this pair."""
+    return apart_along_faces(sizes, model.hull, R, r)[1] - sizes[1] - sizes[PairSize.B + 1]
+
+
+@inner_kernel
+def separation(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Arrangement:
+    """Of the normals of faces and of pairs of edges, the one along which the two are farthest apart, or overlap least:
+    (row of the face, or -1 for edges; how many pairs `two_edges` finds at most; distance along it; 1; 1).
+    """
+    face, best = apart_along_faces(sizes, hull, R, r)
+    oa, ob = int(sizes[0]), int(sizes[PairSize.B])
+    outside, inside = 0, 0
     for i in range(int(hull[oa, 1])):
+        u = to_b(R, edge(hull, oa, i)[1])
         for j in range(int(hull[ob, 1])):
+            if not _straddles(hull, ob, j, u):
+                continue
             code, d, _ = _edge_axis(i, j, 0.0, sizes, hull, R, r)
             if code != 0 and d > best + TIE * abs(best):
                 best, face = d, -1
-    return face, face, best, 1.0, 1.0
+            code, d, crosses = _edge_axis(i, j, _LEANING, sizes, hull, R, r)
+            if code != 0 and crosses:
+                outside, inside = outside + (d >= 0.0), inside + (d < 0.0)
+    return face, outside + (0 if best > 0.0 else inside), best, 1.0, 1.0
 
 
 @inner_kernel
@@ -162,7 +202,10 @@ def two_edges(m: int, deepest: float, sizes: Vector, hull: Matrix, R: Vector, r:
     """
     oa, ob = int(sizes[0]), int(sizes[PairSize.B])
     for i in range(int(hull[oa, 1])):
+        u = to_b(R, edge(hull, oa, i)[1])
         for j in range(int(hull[ob, 1])):
+            if not _straddles(hull, ob, j, u):
+                continue
             code, d, crosses = _edge_axis(i, j, _LEANING, sizes, hull, R, r)
             if code == 0 or not crosses:
                 continue
@@ -200,7 +243,7 @@ def choose_elements(
     feature: int, arrangement: Arrangement, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector
 ) -> int:
     """The elements that are contact point `feature` at this pose; writes the contact, too."""
-    face, _, s, _, _ = arrangement
+    face, crossings, s, _, _ = arrangement
     oa, ob = int(sizes[0]), int(sizes[PairSize.B])
     na, nb = int(hull[oa, 0]), int(hull[ob, 0])
     if feature < na:
@@ -213,7 +256,8 @@ def choose_elements(
         own = s < 0.0 and 0 <= face < ob and below(hull, oa, face, y)
         code = 2 + (face - oa if own else nearest_element(hull, oa, y))
     else:
-        code = two_edges(feature - na - nb, s, sizes, hull, R, r)
+        m = feature - na - nb
+        code = two_edges(m, s, sizes, hull, R, r) if m < crossings else 0
     put_elements(feature, code, sizes, hull, R, r, out)
     return code
 

@@ -18,6 +18,7 @@ Columns of model.pair_far: PairBound of sim/model/record_columns.py.
 
 from __future__ import annotations
 
+from sim.contact.collision.collide import apart_at_least
 from sim.contact.collision.edge_axes import OPEN
 from sim.contact.contact_law import contact_impulse, start_contact
 from sim.contact.inactive_bounds import ANGLE
@@ -94,6 +95,11 @@ def _begin_pair(model: Model, data: Data, options: StepOptions, j: int) -> float
     keep_distance(model, data, j, apart)
     if is_beyond(model, data, j):
         return FAR
+    if model.pair_far[j, PairBound.REACH] < 1e300:  # the distance itself takes as long as a step
+        apart = max(apart, _bound(model, data, j))
+        keep_distance(model, data, j, apart)
+        if is_beyond(model, data, j):
+            return FAR
     a = _far_enough(model, options, j, 0.5 * (apart - travel))
     if a > 0.0:
         data.pair_sides[j] = OPEN
@@ -102,6 +108,13 @@ def _begin_pair(model: Model, data: Data, options: StepOptions, j: int) -> float
     apart = open_pairs(model, data, j)
     keep_distance(model, data, j, apart)
     return FAR if is_beyond(model, data, j) else _far_enough(model, options, j, 0.5 * (apart - travel))
+
+
+@kernel
+def _bound(model: Model, data: Data, j: int) -> float:
+    """`apart_at_least` of the collision that begins at pair j, at pair_relative."""
+    pose = data.pair_relative[j]
+    return apart_at_least(model, model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9:])
 
 
 @kernel
@@ -119,8 +132,10 @@ def _travel(model: Model, data: Data, j: int) -> float:
 
 @kernel
 def _far_enough(model: Model, options: StepOptions, j: int, a: float) -> float:
-    """a where a collision with this half gap is inactive, 0 where it is active."""
+    """a where a collision with this half gap is inactive, its reach where it has no force, 0 where it is active."""
     f = model.pair_far[j]
+    if 2.0 * a >= f[PairBound.REACH]:
+        return f[PairBound.REACH]
     mu = model.contact_friction[model.contact_height.shape[0] + j]
     h = options.h
     if not a > 0.0:
@@ -246,7 +261,8 @@ def _came_within_reach(model: Model, data: Data) -> bool:
     while j < model.pair_kind.shape[0]:
         if data.pair_activation[j] == FAR and not is_beyond(model, data, j):
             place_shapes(model, data, j, data.pos3, data.rot3)
-            if distance(model, data, j) < model.pair_far[j, PairBound.REACH]:
+            reach = model.pair_far[j, PairBound.REACH]
+            if _bound(model, data, j) < reach and distance(model, data, j) < reach:
                 found = True
                 _activate(model, data, j)
         j = end_of(model, j)

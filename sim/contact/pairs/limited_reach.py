@@ -9,9 +9,10 @@ which has two continuous derivatives. Slacks, impulses and friction keep their l
 derivative is in that of the wrench.
 
 The broad phase knows of every collision how far its shapes were apart once, and how far points of both bodies have
-moved since, at most. From twice the reach on, all gaps are beyond it: separations along the axes of polytopes are at
-least the distance over sqrt(3). Collisions that this excludes are neither placed nor measured; and while no two bodies
-have moved by more than the least margin of all (pair_margin), only those within their reach are evaluated.
+moved since, at most. From twice the reach on, all gaps are beyond it: separations along the axes of boxes are at least
+the distance over sqrt(3). Those of polytopes are at least the distance, so that they are beyond from the reach on.
+Collisions that this excludes are neither placed nor measured; and while no two bodies have moved by more than the least
+margin of all (pair_margin), only those within their reach are evaluated.
 """
 
 from __future__ import annotations
@@ -22,12 +23,13 @@ from sim.contact.inactive_bounds import ANGLE
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.record_columns import PairBound, PairFade, Way, Witness
-from solvers.compiler import kernel
+from sim.model.shape_kinds import SWAPPED, Pair
+from solvers.compiler import inner_kernel, kernel
 from solvers.rotation import Vec3, rotate
 
 BEYOND = 2e9  # gap in the row of the first pair where it is beyond its reach, see pair_report.py
 FAR = -1.0  # pair_activation of a collision beyond its reach
-_APART = 2.0  # reaches from where on no gap is within one
+_APART = 2.0  # reaches from where on no gap is within one, but for polytopes
 _HALF_ANGLE = 3.2  # an angle is at most so many times the sine of its half
 
 
@@ -114,11 +116,18 @@ def keep_distance(model: Model, data: Data, j: int, apart: float) -> None:
     data.pair_clear[j] = max(data.pair_clear[j], apart + _ways(model, data, j, Way.BEFORE.value))
 
 
+@inner_kernel
+def _least_clear(model: Model, j: int) -> float:
+    """Distance from which on no gap of the collision that begins at pair j is within its reach."""
+    reach = model.pair_far[j, PairBound.REACH]
+    return reach if model.pair_kind[j] % SWAPPED == Pair.POLYTOPE_POLYTOPE else _APART * reach
+
+
 @kernel
 def is_beyond(model: Model, data: Data, j: int) -> bool:
     """Whether the collision that begins at pair j stays beyond its reach on the ways ahead, by the last measurement."""
     ways = _ways(model, data, j, Way.BEFORE.value) + _ways(model, data, j, Way.AHEAD.value)
-    return data.pair_clear[j] - ways > _APART * model.pair_far[j, PairBound.REACH]
+    return data.pair_clear[j] - ways > _least_clear(model, j)
 
 
 @kernel
@@ -174,8 +183,7 @@ def sort_pairs(model: Model, data: Data) -> None:
 def _leave(model: Model, data: Data, j: int) -> None:
     """The collision that begins at pair j is beyond its reach."""
     data.pair_activation[j] = FAR
-    margin = data.pair_clear[j] - _APART * model.pair_far[j, PairBound.REACH]
-    data.pair_margin[0] = min(data.pair_margin[0], margin)
+    data.pair_margin[0] = min(data.pair_margin[0], data.pair_clear[j] - _least_clear(model, j))
 
 
 @kernel

@@ -150,9 +150,11 @@ def _neutral(robot: Robot, choices: Choices, name: str, depth: int = 0) -> float
 def _inertias(groups: list[MergedLinks], choices: Choices, notes: Notes) -> dict[str, RigidInertia]:
     """Inertia of every body in its own frame; impossible inertias are repaired or refused."""
     out = {body.name: combined(body.inertias) for body in groups}
-    shaped = choices.repair and any(collision_shapes(body, out[body.name].com) for body in groups)
-    if groups and not shaped and not any(part.mass for part in out.values()):
-        raise UrdfError(f"load_urdf: {choices.file}: no moving link has a mass")
+    if groups and not any(part.mass for part in out.values()):
+        shaped = any(collision_shapes(body, out[body.name].com) for body in groups)
+        if not (shaped and choices.repair):
+            how = "; repair=True takes masses from the collision shapes" if shaped else ""
+            raise UrdfError(f"load_urdf: {choices.file}: no moving link has a mass{how}")
     bad: list[str] = []
     for body in groups:
         why = fault(out[body.name])
