@@ -36,7 +36,13 @@ from sim.contact.inactive import choose_active, has_activated, sunk_contact
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.contact.pairs.active_features import choose_pairs, choose_shapes, open_pairs, overlapping
 from sim.contact.pairs.clearance import measure_pairs, omitted_pairs, pairs_reached
-from sim.contact.pairs.cylinder_pairs import choose_cylinders, collide_cylinders, cylinder_before, cylinder_distance
+from sim.contact.pairs.cylinder_pairs import (
+    choose_cylinders,
+    collide_cylinders,
+    cylinder_apart,
+    cylinder_before,
+    cylinder_distance,
+)
 from sim.contact.pairs.inactive_pairs import all_near, begin_pairs, enlist_pairs, far_pair_impulses, pairs_came_near
 from sim.contact.pairs.pair_contact import pair_kinematics
 from sim.contact.pairs.pair_energy import pair_slack, pairs_gained
@@ -217,6 +223,7 @@ _PAIRS = (
 )
 _CYLINDERS = (
     cylinder_distance,
+    cylinder_apart,
     collide_cylinders,
     choose_cylinders,
     cylinder_before,

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from sim.contact.collision import collide as kernels
+from sim.contact.collision import cylinder_contacts as cylinder_kernels
 from sim.contact.collision.edge_axes import Arrangement
 from sim.contact.collision.pair_kernels import KERNELS
 from sim.model.layout import Sizes, allocate_model, model_view, table
 from sim.model.model import Model
-from sim.model.shape_kinds import OUT
+from sim.model.shape_kinds import OUT, Pair
 from solvers.compiler import Table, kernel, link
 from solvers.types import Matrix, Vector
 
@@ -53,6 +54,11 @@ def _apart_at_least(at: Table, kind: int, sizes: Vector, R: Vector, r: Vector) -
 
 
 @kernel
+def _apart_from_cylinder(at: Table, kind: int, sizes: Vector, R: Vector, r: Vector) -> float:
+    return cylinder_kernels.apart_from_cylinder(kind, sizes, model_view(at).hull, R, r)
+
+
+@kernel
 def _arrange(at: Table, kind: int, sizes: Vector, R: Vector, r: Vector, sides: int) -> Arrangement:
     return kernels.arrange(model_view(at), kind, sizes, R, r, sides)
 
@@ -87,7 +93,8 @@ def open_sides(kind: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> 
 
 
 def apart_at_least(kind: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> float:
-    return float(_apart_at_least(_at(hull), kind, sizes, R, r))
+    bound = _apart_from_cylinder if kind >= Pair.POLYTOPE_CYLINDER else _apart_at_least
+    return float(bound(_at(hull), kind, sizes, R, r))
 
 
 def arrange(kind: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, sides: int) -> Any:

@@ -27,6 +27,14 @@ def separation_of_cylinder(
 
 
 @kernel
+def apart_from_cylinder(kind: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> float:
+    """A bound of `separation_of_cylinder` that takes a small part of its time."""
+    if kind % SWAPPED == Pair.POLYTOPE_CYLINDER:
+        return polytope_cylinder.apart_at_least(sizes, hull, R, r) - sizes[1]
+    return cylinder_cylinder.apart_at_least(sizes, R, r)
+
+
+@kernel
 def choose_on_cylinder(
     kind: int, sizes: Vector, hull: Matrix, pose: Pose, turned: Vector, codes: Integers, first: int, out: Vector
 ) -> None:

@@ -12,6 +12,8 @@ Codes: 16 + 8 i + kind, i: the end; or which rims, the side of the normal of two
 
 from __future__ import annotations
 
+from math import sqrt
+
 from sim.contact.collision.box import column
 from sim.contact.collision.cylinder_crossings import (
     crossing,
@@ -29,7 +31,7 @@ from sim.contact.collision.rim import (
     rim_below,
 )
 from sim.contact.collision.swapped_shapes import exchange
-from sim.contact.collision.witness import TIE, absent, dot
+from sim.contact.collision.witness import TIE, absent, along, dot
 from sim.model.record_columns import PairSize
 from sim.model.shape_kinds import CROSSINGS, RIM_POINTS
 from solvers.compiler import inner_kernel
@@ -39,6 +41,24 @@ from solvers.types import Integers, Vector
 _PARTS = 17  # places where two cylinders may cross: 1 of the axes, 2 on every rim, 2 of every two rims
 
 Survey = tuple[float, int, float, float]  # separation, code of a crossing that gives it or 0, ends of a and of b
+
+
+@inner_kernel
+def apart_at_least(sizes: Vector, R: Vector, r: Vector) -> float:
+    """A bound of the distance of the two: along both axes, and across them through the centre of the other."""
+    u = column(R, 2)
+    x = (r[0], r[1], r[2])
+    best = -1e300
+    for k in range(2):
+        axis = (0.0, 0.0, 1.0) if k == 0 else u
+        t = dot(axis, x)
+        side = 1.0 if t > 0.0 else -1.0
+        best = max(best, separation_along((side * axis[0], side * axis[1], side * axis[2]), sizes, R, r))
+        n = along(x, -t, axis)
+        across = sqrt(dot(n, n))
+        if across > 0.0:
+            best = max(best, separation_along((n[0] / across, n[1] / across, n[2] / across), sizes, R, r))
+    return best
 
 
 @inner_kernel

@@ -12,6 +12,8 @@ Codes: 16 + 8 i + the element of b (cylinder.py), i: the face, or the edge, with
 
 from __future__ import annotations
 
+from math import sqrt
+
 from sim.contact.collision.box import to_b
 from sim.contact.collision.cylinder import SIDE, TOP, nearest, reach, vertex_on_cylinder
 from sim.contact.collision.feature_code import substituted_feature
@@ -46,6 +48,23 @@ def face_plane(hull: Matrix, face: int, R: Vector, r: Vector) -> tuple[Vec3, flo
     """n, s of the plane n.x = s of a face of a (its row), n into a."""
     m = to_b(R, row(hull, face))
     return (-m[0], -m[1], -m[2]), -hull[face, 3] - dot(m, (r[0], r[1], r[2]))
+
+
+@inner_kernel
+def apart_at_least(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> float:
+    """A bound of the distance of the two, a without its radius: along the axis of b, across it through the centre of a,
+    and along the faces of a.
+    """
+    o, rho, half = int(sizes[0]), sizes[PairSize.B], sizes[PairSize.B + 1]
+    best = separation_along((0.0, 0.0, 1.0 if r[2] > 0.0 else -1.0), sizes, hull, R, r)
+    across = sqrt(r[0] * r[0] + r[1] * r[1])
+    if across > 0.0:
+        best = max(best, separation_along((r[0] / across, r[1] / across, 0.0), sizes, hull, R, r))
+    first = o + 1 + int(hull[o, 0] + hull[o, 1])
+    for f in range(first, first + int(hull[o, 2])):
+        n, s = face_plane(hull, f, R, r)
+        best = max(best, s - reach(n, rho, half))
+    return best
 
 
 @inner_kernel

@@ -5,6 +5,7 @@ and pair_contact.py for the others. Scenes without such collisions do not compil
 from __future__ import annotations
 
 from sim.contact.collision.cylinder_contacts import (
+    apart_from_cylinder,
     choose_on_cylinder,
     collide_with_cylinder,
     instead_on_cylinder,
@@ -40,6 +41,13 @@ def cylinder_distance(model: Model, data: Data, first: int) -> float:
         data.pair_code,
         data.pair_trial[0],
     )
+
+
+@optional(Slot.CYLINDER_APART, default=-1e300)
+def cylinder_apart(model: Model, data: Data, first: int) -> float:
+    """A bound of `cylinder_distance`."""
+    pose = data.pair_relative[first]
+    return apart_from_cylinder(model.pair_kind[first], model.pair_sizes[first], model.hull, pose[:9], pose[9:])
 
 
 @inner_kernel

@@ -23,6 +23,7 @@ from sim.contact.collision.edge_axes import OPEN
 from sim.contact.contact_law import contact_impulse, start_contact
 from sim.contact.inactive_bounds import ANGLE
 from sim.contact.pairs.active_features import choose_shapes, distance, open_pairs
+from sim.contact.pairs.cylinder_pairs import cylinder_apart, on_cylinder
 from sim.contact.pairs.limited_reach import (
     FAR,
     end_of,
@@ -114,6 +115,8 @@ def _begin_pair(model: Model, data: Data, options: StepOptions, j: int) -> float
 def _bound(model: Model, data: Data, j: int) -> float:
     """`apart_at_least` of the collision that begins at pair j, at pair_relative."""
     pose = data.pair_relative[j]
+    if on_cylinder(model.pair_kind[j]):
+        return cylinder_apart(model, data, j)
     return apart_at_least(model, model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9:])
 
 
