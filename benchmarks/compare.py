@@ -3,7 +3,7 @@
     python benchmarks/compare.py all --out DIR            every study
     python benchmarks/compare.py accuracy ROBOT.urdf      a robot, as `dojo-opt report` does, and in other engines too
 
-`pip install ".[bench,drake,bullet]"` adds MuJoCo, Drake and PyBullet; `".[crocoddyl]"` a planner.
+`pip install "dojo-opt[bench,drake,bullet]"` adds MuJoCo, Drake and PyBullet; `"dojo-opt[crocoddyl]"` a planner.
 """
 
 from __future__ import annotations

@@ -214,7 +214,7 @@ def _run_suite(args: argparse.Namespace) -> int:
     else:
         print(f"{'success' if outcome.success else 'no success'}: {loop.message}")
         print("  " + ", ".join(f"{measure} {value:.3g}" for measure, value in outcome.measures.items()))
-        ticks = "ticks at {rate_hz:g} Hz: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms of the processor"
+        ticks = "ticks at {rate_hz:g} Hz: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms of processor time"
         ticks = ticks if isfinite(outcome.tick_median_ms) else "too short for a second tick"
         print((ticks + ", {fallbacks} fallbacks; penetration {penetration_mm:.2g} mm").format(**numbers))
     return 0 if outcome.success else 1
@@ -237,7 +237,7 @@ def _plan_task(args: argparse.Namespace, task: PlanTask) -> int:
     else:
         print(f"{'success' if outcome.success else 'no success'}: {plan.message}")
         print("  " + ", ".join(f"{measure} {value:.3g}" for measure, value in outcome.measures.items()))
-        print("cost {cost:.4g}, {iterations} iterations, {seconds:.2f} s of the processor".format(**numbers))
+        print("cost {cost:.4g}, {iterations} iterations, {seconds:.2f} s of processor time".format(**numbers))
     return 0 if outcome.success else 1
 
 

@@ -20,6 +20,7 @@ __all__ = ["Feet"]
 
 _STEP = 1e-6  # of the differences: positions are smooth in the angles, so its square is the error
 _ITERATIONS = 50
+_PROGRESS, _PATIENCE = 0.999, 8  # a target that is not nearer after so many iterations is out of reach
 _CLOSE = 1e-10  # [m] a foot this near to its target is there
 _DAMPING = 1e-8  # keeps a stretched leg solvable
 
@@ -178,9 +179,12 @@ class Feet:
         sim, nb = self.sim, self.base
         x = np.array(np.broadcast_to(x, (len(np.asarray(targets)), sim.nx)), dtype=float)
         goal = checks.array("Feet.place(targets)", targets, (len(x), len(self.names), 3))
+        least, waited = np.inf, 0
         for _ in range(_ITERATIONS):
             error = (goal - self.positions(x)).reshape(len(x), -1)
-            if np.abs(error).max() <= _CLOSE:
+            worst = float(np.abs(error).max())
+            least, waited = (worst, 0) if worst < _PROGRESS * least else (least, waited + 1)
+            if worst <= _CLOSE or waited > _PATIENCE:
                 break
             J = self.jacobian(x)[..., nb:].reshape(len(x), error.shape[1], -1)
             H = np.einsum("nij,nik->njk", J, J) + _DAMPING * np.eye(J.shape[2])
@@ -191,7 +195,7 @@ class Feet:
         if miss.max() > 1e-6:
             t, k = (int(i) for i in np.unravel_index(miss.argmax(), miss.shape))
             raise ValueError(
-                f"Feet.place(targets): {self.names[k]!r} comes no nearer than {miss[t, k]:.3g} m to its target "
+                f"Feet.place(targets): foot {self.names[k]!r} comes no nearer than {miss[t, k]:.3g} m to its target "
                 f"{goal[t, k]} in row {t}"
             )
         self._check_stops(x)

@@ -157,7 +157,10 @@ def assemble(sim: Simulator, name: str, base: Floats, feet: Floats, contact: Fla
     """Gait from the pose of the base (T + 2, 7) and the feet (T + 2, k, 3) at times -h, 0, ..., T h."""
     x = np.tile(sim.neutral(), (len(base), 1))
     x[:, BaseState.POSE] = base
-    x = Feet(sim, names).place(x, feet)
+    try:
+        x = Feet(sim, names).place(x, feet)
+    except ValueError as error:
+        raise ValueError(f"{error}; move less far or fast, lift the feet less, or change the height") from error
     steps = sim.difference(x[1:], x[:-1])[:, : sim.nv]
     x = x[1:]
     x[:, sim.nq :] = steps / sim.time_step

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,8 @@ class Legs:
     ) -> None:
         mech: Mechanism = robot.mechanism if isinstance(robot, Simulator) else robot
         if not isinstance(mech, Mechanism):
-            raise TypeError(f"Legs(robot): expected a Mechanism or a Simulator, got {robot!r}")
+            hint = "; dojo.load_urdf and dojo.load_mjcf load files" if isinstance(robot, str | PathLike) else ""
+            raise TypeError(f"Legs(robot): expected a Mechanism or a Simulator, got {checks.shown(robot)}{hint}")
         if mech.joints[0].kind != "floating" or mech.nv == 6:
             raise ValueError(f"Legs(robot): expected a robot with legs on a floating base, got {mech!r}")
         if stance is not None:
@@ -164,7 +166,7 @@ def _named(mech: Mechanism, kin: Kinematics, name: str, given: Any) -> list[Cont
     """Contacts of a name: one contact, those of a body, or a ball about the origin of a link."""
     if name in {contact.name for contact in mech.contacts}:
         return [contact for contact in mech.contacts if contact.name == name]
-    i, point, _ = kin.place(checks.one_of("Legs(feet)", name, [*mech.contact_names, *kin.frames]))
+    i, point, _ = kin.place(checks.one_of("Legs(feet=...)", name, [*kin.frames, *mech.contact_names]))
     body = mech.body_names[i]
     own = [contact for contact in mech.contacts if contact.body == body]
     if name in mech.body_names and own:

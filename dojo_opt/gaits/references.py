@@ -8,6 +8,7 @@ of the bodies at the ends of the tree. The base looks along x.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -31,19 +32,21 @@ _BOUND = {(False, False): 0.0, (False, True): 0.0, (True, False): 0.5, (True, Tr
 _WALK = {(False, True): 0.0, (True, True): 0.25, (False, False): 0.5, (True, False): 0.75}
 _HOP = dict.fromkeys(_TROT, 0.0)
 _STRONGEST = 1000.0  # largest push of a jump, over the weight
-_KEYWORDS = "speed period duty lateral heading_rate cycles step_height height footholds tilt".split()
+_KEYWORDS = "speed distance period duty lateral heading_rate cycles step_height height footholds tilt".split()
 
 
-def trot(sim: Simulator, *, speed: float = 0.2, period: float = 1.0, duty: float = 0.5, **gait: Any) -> Gait:
+def trot(sim: Simulator, *, speed: float | None = None, period: float = 1.0, duty: float = 0.5, **gait: Any) -> Gait:
     """A trot: diagonal feet together.
 
     Args:
         sim: simulator of a robot with legs on a floating base.
-        speed: forward speed of the base [m/s].
+        speed: forward speed of the base [m/s] (default None: 0.2, or that of `distance`).
         period: length of a cycle, a whole number of time steps [s].
         duty: share of the period that a foot is on the ground, between 0 and 1.
         **gait: keywords that all periodic gaits have:
 
+            distance       displacement of the base over all cycles, without turning, instead of a speed: speed x period
+                           x cycles [m] (default None)
             lateral        speed of the base to the left [m/s] (default 0)
             heading_rate   rate of turning, positive to the left [rad/s] (default 0)
             cycles         number of periods (default 2)
@@ -61,15 +64,15 @@ def trot(sim: Simulator, *, speed: float = 0.2, period: float = 1.0, duty: float
         ValueError: for an argument out of range, a robot without legs, a foot that cannot reach its place, or a joint
             that would exceed its limits.
     """
-    return _periodic(sim, "trot", _TROT, speed=speed, period=period, duty=duty, **gait)
+    return _periodic(sim, "trot", _TROT, usual=0.2, speed=speed, period=period, duty=duty, **gait)
 
 
-def pace(sim: Simulator, *, speed: float = 0.2, period: float = 0.4, duty: float = 0.5, **gait: Any) -> Gait:
+def pace(sim: Simulator, *, speed: float | None = None, period: float = 0.4, duty: float = 0.5, **gait: Any) -> Gait:
     """A pace: feet of the same side together.
 
     Args:
         sim: simulator of a robot with legs on a floating base.
-        speed: forward speed of the base [m/s].
+        speed: forward speed of the base [m/s] (default None: 0.2, or that of `distance`).
         period: length of a cycle, a whole number of time steps [s].
         duty: share of the period that a foot is on the ground, between 0 and 1.
         **gait: keywords of all periodic gaits, see `trot`.
@@ -81,17 +84,23 @@ def pace(sim: Simulator, *, speed: float = 0.2, period: float = 0.4, duty: float
         TypeError: `sim` is not a Simulator, or a keyword is unknown.
         ValueError: as for `trot`.
     """
-    return _periodic(sim, "pace", _PACE, speed=speed, period=period, duty=duty, **gait)
+    return _periodic(sim, "pace", _PACE, usual=0.2, speed=speed, period=period, duty=duty, **gait)
 
 
 def bound(
-    sim: Simulator, *, speed: float = 0.5, period: float = 0.36, duty: float = 1 / 3, tilt: float = 0.4, **gait: Any
+    sim: Simulator,
+    *,
+    speed: float | None = None,
+    period: float = 0.36,
+    duty: float = 1 / 3,
+    tilt: float = 0.4,
+    **gait: Any,
 ) -> Gait:
     """A bound: hind feet, flight (for duty < 0.5), front feet, flight.
 
     Args:
         sim: simulator of a robot with legs on a floating base.
-        speed: forward speed of the base [m/s].
+        speed: forward speed of the base [m/s] (default None: 0.5, or that of `distance`).
         period: length of a cycle, a whole number of time steps [s].
         duty: share of the period that a foot is on the ground, between 0 and 1.
         tilt: largest roll and pitch of the base due to the change of its feet [rad].
@@ -104,15 +113,15 @@ def bound(
         TypeError: `sim` is not a Simulator, or a keyword is unknown.
         ValueError: as for `trot`.
     """
-    return _periodic(sim, "bound", _BOUND, speed=speed, period=period, duty=duty, tilt=tilt, **gait)
+    return _periodic(sim, "bound", _BOUND, usual=0.5, speed=speed, period=period, duty=duty, tilt=tilt, **gait)
 
 
-def walk(sim: Simulator, *, speed: float = 0.1, period: float = 1.0, duty: float = 0.75, **gait: Any) -> Gait:
+def walk(sim: Simulator, *, speed: float | None = None, period: float = 1.0, duty: float = 0.75, **gait: Any) -> Gait:
     """A walk: left hind, left front, right hind, right front foot.
 
     Args:
         sim: simulator of a robot with legs on a floating base.
-        speed: forward speed of the base [m/s].
+        speed: forward speed of the base [m/s] (default None: 0.1, or that of `distance`).
         period: length of a cycle, a whole number of time steps [s].
         duty: share of the period that a foot is on the ground, between 0 and 1.
         **gait: keywords of all periodic gaits, see `trot`.
@@ -124,15 +133,15 @@ def walk(sim: Simulator, *, speed: float = 0.1, period: float = 1.0, duty: float
         TypeError: `sim` is not a Simulator, or a keyword is unknown.
         ValueError: as for `trot`.
     """
-    return _periodic(sim, "walk", _WALK, speed=speed, period=period, duty=duty, **gait)
+    return _periodic(sim, "walk", _WALK, usual=0.1, speed=speed, period=period, duty=duty, **gait)
 
 
-def hop(sim: Simulator, *, speed: float = 0.0, period: float = 0.5, duty: float = 0.5, **gait: Any) -> Gait:
+def hop(sim: Simulator, *, speed: float | None = None, period: float = 0.5, duty: float = 0.5, **gait: Any) -> Gait:
     """A hop: all feet together.
 
     Args:
         sim: simulator of a robot with legs on a floating base.
-        speed: forward speed of the base [m/s].
+        speed: forward speed of the base [m/s] (default None: 0, or that of `distance`).
         period: length of a cycle, a whole number of time steps [s].
         duty: share of the period that a foot is on the ground, between 0 and 1.
         **gait: keywords of all periodic gaits, see `trot`.
@@ -144,7 +153,7 @@ def hop(sim: Simulator, *, speed: float = 0.0, period: float = 0.5, duty: float 
         TypeError: `sim` is not a Simulator, or a keyword is unknown.
         ValueError: as for `trot`.
     """
-    return _periodic(sim, "hop", _HOP, speed=speed, period=period, duty=duty, **gait)
+    return _periodic(sim, "hop", _HOP, usual=0.0, speed=speed, period=period, duty=duty, **gait)
 
 
 def turn(sim: Simulator, *, heading_rate: float = 0.5, period: float = 0.5, **gait: Any) -> Gait:
@@ -163,7 +172,8 @@ def turn(sim: Simulator, *, heading_rate: float = 0.5, period: float = 0.5, **ga
         TypeError: `sim` is not a Simulator, or a keyword is unknown.
         ValueError: as for `trot`.
     """
-    return trot(sim, **{"speed": 0.0, **gait}, heading_rate=heading_rate, period=period)
+    usual = {} if "distance" in gait else {"speed": 0.0}
+    return trot(sim, **{**usual, **gait}, heading_rate=heading_rate, period=period)
 
 
 def stand(sim: Simulator, *, duration: float = 1.0, height: float | None = None) -> Gait:
@@ -307,14 +317,22 @@ def _whole(call: str, duration: float, step: float) -> int:
     return count
 
 
+def settings_of(gait: Any) -> list[str]:
+    """The keywords of a function of this file."""
+    names = [name for name in signature(gait).parameters if name not in ("sim", "gait")]
+    return names if gait is jump else list(dict.fromkeys([*names, *_KEYWORDS]))
+
+
 def _periodic(
     sim: Simulator,
     name: str,
     offsets: dict[tuple[bool, bool], float],
     *,
-    speed: float,
+    usual: float,
+    speed: float | None,
     period: float,
     duty: float,
+    distance: float | None = None,
     lateral: float = 0.0,
     heading_rate: float = 0.0,
     cycles: int = 2,
@@ -328,7 +346,7 @@ def _periodic(
     call = f"gaits.{name}"
     checks.keywords(f"{call}(...)", unknown, _KEYWORDS)
     _check_legs(call, sim)
-    for name, value in (("speed", speed), ("lateral", lateral), ("heading_rate", heading_rate)):
+    for name, value in (("lateral", lateral), ("heading_rate", heading_rate)):
         checks.number(f"{call}({name}=...)", value)
     if not 0.0 < checks.number(f"{call}(duty=...)", duty) < 1.0:
         raise ValueError(f"{call}(duty=...): expected a share of the period between 0 and 1, got {duty}")
@@ -339,13 +357,14 @@ def _periodic(
     once = _whole(f"{call}(period=...)", period, sim.time_step)
     steps = once * checks.whole_number(f"{call}(cycles=...)", cycles)
     check_length(f"{call}(cycles=..., period=...)", sim, steps, "repeat a plan: Plan.repeated")
+    forward = _forward(call, usual, speed, distance, steps * sim.time_step)
     feet, ground, neutral = Feet(sim), _ground(sim), sim.neutral()
     places = ground[:, :2] - neutral[:2]
     if footholds is not None:
         places = checks.array(f"{call}(footholds=...)", footholds, places.shape)
     offset = _offsets(offsets, places, [contact.body for contact in feet.contacts])
     pattern = Footfall(
-        offset, duty, period, step_height, complex(speed, lateral), heading_rate, places[:, 0] + 1j * places[:, 1]
+        offset, duty, period, step_height, complex(forward, lateral), heading_rate, places[:, 0] + 1j * places[:, 1]
     )
     t = sim.time_step * np.arange(-1, steps + 1)
     spot, heading = pattern.base(t)
@@ -360,6 +379,15 @@ def _periodic(
     where, lift = pattern.feet(t)
     targets = np.stack([where.real + neutral[0], where.imag + neutral[1], lift + ground[:, 2]], axis=2)
     return assemble(sim, name, base, targets, pattern.contact(t), names=feet.names)
+
+
+def _forward(call: str, usual: float, speed: float | None, distance: float | None, duration: float) -> float:
+    """Forward speed [m/s], from the speed or the distance that is given."""
+    if speed is not None and distance is not None:
+        raise ValueError(f"{call}(speed=..., distance=...): expected one of them, got {speed} m/s and {distance} m")
+    if distance is not None:
+        return checks.number(f"{call}(distance=...)", distance) / duration
+    return usual if speed is None else checks.number(f"{call}(speed=...)", speed)
 
 
 def _offsets(offsets: dict[tuple[bool, bool], float], places: Floats, bodies: Sequence[str]) -> Floats:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.task_functions import check_number, check_observation, compiled_call
 from dojo_opt.planning.manifold import displace, tangent_layout
 from dojo_opt.planning.residual import jit
 from sim.mechanism import checks
@@ -183,7 +184,8 @@ class Task:
     """The observations and the reward of a policy, and the ends of episodes. Actions are in [-1, 1].
 
     The functions are compiled, as by `dojo.jit`, and differentiated by central differences on the manifold of
-    states; they must not write into their arguments other than `out`. With a command, such as a velocity to keep, the
+    states; they must not write into their arguments other than `out`. Those of a user are called once in the neutral
+    state, uncompiled, and refused by name if they do not fit. With a command, such as a velocity to keep, the
     state x of the task is that of the simulator, followed by the command: x[sim.nx:]. The forces of contacts come last:
     for each of the `touch` groups (6,), force [N] and torque about the centre of mass [N m], world axes, in the time
     step before; zero at first, and not differentiated.
@@ -254,6 +256,16 @@ class Task:
         ContactGroups(self.sim, self.touch)  # checks the names
         if not np.all(self.low < self.high):
             raise ValueError(f"Task(low=..., high=...): expected low < high, got {self.low} and {self.high}")
+        self._check_functions()
+
+    def _check_functions(self) -> None:
+        """Refuse functions of the user that do not take or return what they have to."""
+        x, a = np.concatenate([self.sim.neutral(), np.zeros(self.nx - self.sim.nx)]), np.zeros(self.sim.nu)
+        check_observation(self.observation, x, self.observations)
+        check_number("reward", self.reward, {"x": x, "a": a, "after": x}, "one number")
+        check_number("terminated", self.terminated, {"x": x}, "True or False")
+        if self.survival_probability is not None:
+            check_number("survival_probability", self.survival_probability, {"x": x}, "one number")
 
     def __reduce__(self) -> Any:
         """By its fields; functions by their code, so that other processes need not import them."""
@@ -342,7 +354,7 @@ class Task:
         n = len(xs)
         values = np.zeros((n, self.observations))
         out = np.zeros((n if slopes else 0, self.observations, self.sim.ndx))
-        self._observation_loop(self._layout, xs, self._work.copy(), values, out)
+        compiled_call("observation", self._observation_loop, self._layout, xs, self._work.copy(), values, out)
         return values, out
 
     def observe_one(self, x: Floats) -> Floats:
@@ -355,7 +367,7 @@ class Task:
             (no,) observation.
         """
         out = np.zeros(self.observations)
-        self._observation(np.array(x), out)
+        compiled_call("observation", self._observation, np.array(x), out)
         return out
 
     def rewards(self, xs: Floats, actions: Floats, nexts: Floats, slopes: bool = False) -> tuple[Floats, Floats]:
@@ -372,7 +384,8 @@ class Task:
         """
         n, width = len(xs), 2 * self.sim.ndx + self.sim.nu
         values, out = np.zeros(n), np.zeros((n if slopes else 0, width))
-        self._reward_loop(self._layout, xs, actions, nexts, self._work.copy(), values, out)
+        work = self._work.copy()
+        compiled_call("reward", self._reward_loop, self._layout, xs, actions, nexts, work, values, out)
         return values, out
 
     def ends(self, xs: Floats) -> Flags:
@@ -385,7 +398,7 @@ class Task:
             (n,) flags.
         """
         out = np.zeros(len(xs), dtype=np.bool_)
-        self._end_loop(xs, out)
+        compiled_call("terminated", self._end_loop, xs, out)
         return out
 
     def judge(self, x: Floats, action: Floats, after: Floats) -> tuple[Floats, float, bool]:
@@ -400,7 +413,8 @@ class Task:
             The observation after it, the reward with that of survival, and whether the episode ends.
         """
         observation, end = np.zeros(self.observations), np.array(after)  # copies: a function may write into them
-        reward, over = self._judge_loop(np.array(x), np.array(action), end, observation)
+        three = "observation=..., reward=..., terminated"
+        reward, over = compiled_call(three, self._judge_loop, np.array(x), np.array(action), end, observation)
         return observation, float(reward) + (0.0 if over else self.survival), bool(over)
 
     def survives(self, xs: Floats, ends: Flags) -> tuple[Floats, Floats]:
@@ -416,7 +430,8 @@ class Task:
         values: Floats = 1.0 - ends.astype(np.float64)
         slopes = np.zeros((len(xs), self.sim.ndx))
         if self.survival_probability is not None:
-            self._survival_loop(self._layout, xs, self._work.copy(), values, slopes)
+            loop, work = self._survival_loop, self._work.copy()
+            compiled_call("survival_probability", loop, self._layout, xs, work, values, slopes)
         return values, slopes
 
     def first(self, rng: np.random.Generator) -> Floats:

@@ -1,7 +1,8 @@
-"""`checked_numbers`: functions that build models and problems refuse wrong numbers by the name of their argument."""
+"""`checked_numbers`: functions that build models and problems refuse wrong arguments by the call that the user made."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import wraps
 from typing import Any, TypeVar, cast
@@ -11,6 +12,7 @@ import numpy as np
 from sim.mechanism import checks
 
 F = TypeVar("F", bound=Callable[..., Any])
+_INNER = re.compile(r"(Legs|gaits\.\w+|problems\.\w+)(?=\()|Feet\.place\(targets\)")  # called on the way
 
 
 def _check(call: str, kind: str, value: Any) -> None:
@@ -29,7 +31,8 @@ def _check(call: str, kind: str, value: Any) -> None:
 def checked_numbers(room: str) -> Callable[[F], F]:
     """A decorator: arguments that are annotated as float, int or bool are such, or the error names room.function(...).
 
-    Ranges are for the function to check; numbers so large that they overflow in it are refused here.
+    Ranges are for the function to check; numbers so large that they overflow in it are refused here. The errors of the
+    gaits, legs and problems that the function calls name it, too: its user called none of them.
     """
 
     def decorate(function: F) -> F:
@@ -49,6 +52,12 @@ def checked_numbers(room: str) -> Callable[[F], F]:
             except (OverflowError, FloatingPointError) as error:
                 large = ", ".join(f"{name}={checks.shown(value)}" for name, value in given.items())
                 raise ValueError(f"{call}({large}): numbers overflow") from error
+            except (TypeError, ValueError) as error:
+                inner = _INNER.match(str(error))
+                if inner is None or inner[0] == call or type(error) not in (TypeError, ValueError):
+                    raise
+                outer = call if inner[1] else f"{call}(...)"
+                raise type(error)(outer + str(error)[inner.end() :]) from error
 
         return cast(F, checked)
 

@@ -205,7 +205,7 @@ class ResidualKernels:
             for part in rows(len(knots)):
                 loop(layout, x, u, knots[part], self._scratch, self._frozen, values[part], out[part])
         except CompilationError as error:
-            raise ValueError(f"residual {name!r} {_of_the_compiler(error)}") from error
+            raise ValueError(f"residual {name!r} {of_the_compiler(error)}") from error
         except Exception as error:
             for row in range(knots.size):
                 part = slice(row, row + 1)
@@ -217,7 +217,7 @@ class ResidualKernels:
             raise ValueError(f"residual {name!r}: {type(error).__name__}: {error}") from error
 
 
-def _of_the_compiler(error: Exception) -> str:
+def of_the_compiler(error: Exception) -> str:
     """The message of the compiler, without the part about the compiler."""
     if _READ_ONLY.search(str(error)):
         return _WRITES

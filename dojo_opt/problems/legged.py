@@ -17,7 +17,7 @@ from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from dojo_opt.problems import locomotion
-from dojo_opt.problems.locomotion import EFFORT, PLACE, follow
+from dojo_opt.problems.locomotion import EFFORT, FOLLOW, PLACE, check_settings, follow
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.model.state_columns import BaseState
@@ -63,10 +63,11 @@ def trot(
         feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
             radii [m] in a table by name (default None: found).
         stance: coordinates of the stance by joint (default None: found).
-        **settings: speed [m/s], step_height [m], damping (least damper of the joints [N m s/rad], 0.5 for the
-            quadruped, in proportion for others), further arguments of `gaits.trot` (period, duty, cycles, heading_rate,
-            height, footholds, ...) and of `follow` (guess, periodic, ...); of the quadruped also time_step, friction
-            and contacts. With periodic=True a plan is one period long, unless `cycles` is given.
+        **settings: speed [m/s], or distance [m] of all cycles together (speed x period x cycles), step_height [m],
+            damping (least damper of the joints [N m s/rad], 0.5 for the quadruped, in proportion for others), further
+            arguments of `gaits.trot` (period, duty, cycles, heading_rate, height, footholds, ...) and of `follow`
+            (guess, periodic, ...); of the quadruped also time_step, friction and contacts. With periodic=True a plan is
+            one period long, unless `cycles` is given.
 
     Returns:
         The problem.
@@ -116,10 +117,13 @@ def walk(
 
 def _periodic(legs: Legs, name: str, period: float, speed: float, settings: dict[str, Any]) -> Problem:
     """The problem to follow two periods of a gait; period [s] and speed [m/s] of a robot as high as the A1."""
+    check_settings(name, getattr(gaits, name), settings, ("damping",))
     slow = legs.size**0.5
     step = _rounded(settings.pop("period", period * slow) / _KNOTS)
     follows, rest = _shared_out({"substeps": _SUBSTEPS, **settings})
-    usual = {"speed": speed * slow, "step_height": _LIFT * legs.size, "cycles": 1 if follows.get("periodic") else 2}
+    usual = {"step_height": _LIFT * legs.size, "cycles": 1 if follows.get("periodic") else 2}
+    if rest.get("distance") is None:
+        usual["speed"] = speed * slow
     substeps = whole_number(f"problems.{name}(substeps=...)", follows["substeps"])
     sim = legs.simulator(step / substeps, PLANNED)
     if Feet(sim).flat:  # legs that are nearly stretched reach neither to the side nor ahead
@@ -167,6 +171,7 @@ def jump(
     if robot is None:
         return locomotion.jump(**_of_the_quadruped("problems.jump", feet, stance, settings))
     legs = Legs(robot, feet, damping=settings.pop("damping", None), stance=stance, share=_LOOSE)
+    check_settings("jump", gaits.jump, settings, ("damping", "refinement"))
     slow, size = legs.size**0.5, legs.size
     refinement = settings.pop("refinement", 5)
     follows, rest = _shared_out(settings)
@@ -245,7 +250,7 @@ def stand_up(
     if low is not None and not checks.number("problems.stand_up(low=...)", low, above=0.0) < 1.0:
         raise ValueError(f"problems.stand_up(low=...): expected a share of the height below 1, got {low:g}")
     follows, rest = _shared_out(settings)
-    checks.keywords("problems.stand_up(...)", rest, ())
+    checks.keywords("problems.stand_up(...)", rest, (*FOLLOW, "low", "duration", "damping", "stance"))
     slow = legs.size**0.5
     length = slow if duration is None else checks.number("problems.stand_up(duration=...)", duration, above=0.0)
     substeps = whole_number("problems.stand_up(substeps=...)", follows.get("substeps", 1))
@@ -294,13 +299,10 @@ def _rise(sim: Simulator, steps: int, by: float) -> Gait:
     return assemble(sim, "stand up", base, where, np.ones(where.shape[:2], dtype=bool), names=feet.names)
 
 
-_FOLLOW = ("guess", "periodic", "substeps", "control_limits", "place", "attitude", "effort")
-
-
 def _shared_out(settings: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Arguments of `follow`, and those of the gait."""
-    follows = {key: value for key, value in settings.items() if key in _FOLLOW}
-    return follows, {key: value for key, value in settings.items() if key not in _FOLLOW}
+    follows = {key: value for key, value in settings.items() if key in FOLLOW}
+    return follows, {key: value for key, value in settings.items() if key not in FOLLOW}
 
 
 def _scaled(legs: Legs, gait: Gait, given: dict[str, Any]) -> Problem:

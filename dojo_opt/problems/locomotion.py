@@ -14,6 +14,7 @@ from dojo_opt.cost import Effort, Tracking
 from dojo_opt.gaits.equilibrium import equilibrium
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.gait import Gait
+from dojo_opt.gaits.references import settings_of
 from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import CONTINUATION, PLANNED
 from dojo_opt.planning.problem import Problem
@@ -135,7 +136,7 @@ def _stride(sim: Simulator, reference: Floats) -> Floats:
 @checked_numbers("problems")
 def trot(
     *,
-    speed: float = 0.2,
+    speed: float | None = None,
     damping: float = 0.5,
     step_height: float = 0.025,
     height: float | None = 0.29,
@@ -150,16 +151,16 @@ def trot(
     base at the end is a constraint. Torques are limited to 33.5 N m.
 
     Args:
-        speed: forward speed [m/s]; 0 trots on the spot.
+        speed: forward speed [m/s]; 0 trots on the spot (default None: 0.2, or that of `distance`).
         damping: damper of the joints [N m s/rad].
         step_height: lift of a swinging foot [m].
         height: height of the base, on average [m]; None for that of the neutral state.
         footholds: (4, 2) places of the feet FR, FL, RR, RL from the base, forward and to the left [m]; None for those
             of the neutral state.
         time_step: length of a knot [s].
-        **settings: further arguments of `gaits.trot` (period, duty, cycles, heading_rate, ...) and of `follow` (guess,
-            periodic, ...), and `friction` and `contacts` of `models.quadruped`. With periodic=True a plan is one period
-            long, unless `cycles` is given.
+        **settings: further arguments of `gaits.trot` (distance, period, duty, cycles, heading_rate, ...) and of
+            `follow` (guess, periodic, ...), and `friction` and `contacts` of `models.quadruped`. With periodic=True a
+            plan is one period long, unless `cycles` is given.
 
     Returns:
         The problem.
@@ -201,11 +202,11 @@ def turn(*, heading_rate: float = 0.5, damping: float = 0.5, time_step: float = 
 
 
 @checked_numbers("problems")
-def pace(*, speed: float = 0.2, damping: float = 0.5, time_step: float = 0.02, **settings: Any) -> Problem:
+def pace(*, speed: float | None = None, damping: float = 0.5, time_step: float = 0.02, **settings: Any) -> Problem:
     """The quadruped paces, both feet of a side together.
 
     Args:
-        speed: forward speed [m/s].
+        speed: forward speed [m/s] (default None: 0.2, or that of `distance`).
         damping: damper of the joints [N m s/rad].
         time_step: length of a knot [s].
         **settings: further arguments of `gaits.pace` and of `follow`, and of the model, as for `trot`.
@@ -221,11 +222,11 @@ def pace(*, speed: float = 0.2, damping: float = 0.5, time_step: float = 0.02, *
 
 
 @checked_numbers("problems")
-def walk(*, speed: float = 0.1, damping: float = 0.5, time_step: float = 0.05, **settings: Any) -> Problem:
+def walk(*, speed: float | None = None, damping: float = 0.5, time_step: float = 0.05, **settings: Any) -> Problem:
     """The quadruped walks, one foot after the other.
 
     Args:
-        speed: forward speed [m/s].
+        speed: forward speed [m/s] (default None: 0.1, or that of `distance`).
         damping: damper of the joints [N m s/rad].
         time_step: length of a knot [s].
         **settings: further arguments of `gaits.walk` and of `follow`, and of the model, as for `trot`.
@@ -242,12 +243,17 @@ def walk(*, speed: float = 0.1, damping: float = 0.5, time_step: float = 0.05, *
 
 @checked_numbers("problems")
 def bound(
-    *, speed: float = 0.5, damping: float = 0.5, step_height: float = 0.08, time_step: float = 0.02, **settings: Any
+    *,
+    speed: float | None = None,
+    damping: float = 0.5,
+    step_height: float = 0.08,
+    time_step: float = 0.02,
+    **settings: Any,
 ) -> Problem:
     """The quadruped bounds: hind feet, flight, front feet, flight.
 
     Args:
-        speed: forward speed [m/s].
+        speed: forward speed [m/s] (default None: 0.5, or that of `distance`).
         damping: damper of the joints [N m s/rad].
         step_height: lift of a swinging foot [m]. With less than the default, a foot is so low at the beginning and the
             end of its swing that plans drag it along the ground.
@@ -321,15 +327,36 @@ def with_apex(problem: Problem, refinement: int) -> Problem:
     return problem
 
 
-_FOLLOW = ("guess", "periodic", "substeps", "control_limits", "place", "attitude", "effort")
+FOLLOW = ("guess", "periodic", "substeps", "control_limits", "place", "attitude", "effort")
+_MODEL = ("friction", "contacts")
+
+
+def check_settings(name: str, gait: Any, settings: dict[str, Any], own: tuple[str, ...]) -> None:
+    """Refuse settings that neither the problem itself, nor its gait, nor `follow` has, with all that they have.
+
+    Args:
+        name: the problem.
+        gait: function of `gaits`.
+        settings: the given settings.
+        own: names of the problem's own settings.
+
+    Raises:
+        TypeError: for an unknown setting.
+    """
+    known = list(dict.fromkeys([*settings_of(gait), *FOLLOW, *own]))
+    for word in settings:
+        if word not in known:
+            hint = checks.nearest(word, known) or "."
+            raise TypeError(f"problems.{name}(...): no setting {word!r}{hint} There are {', '.join(known)}")
 
 
 def _quadruped(gait: Any, time_step: float, damping: float, settings: dict[str, Any], **keywords: Any) -> Problem:
     """The problem to follow a gait of the quadruped; `settings` are shared out between the model, gait and problem."""
+    check_settings(gait.__name__, gait, settings, ("damping", "time_step", *_MODEL))
     follows: dict[str, Any] = {"control_limits": (-TORQUE_LIMIT, TORQUE_LIMIT)}
-    follows |= {key: settings[key] for key in _FOLLOW if key in settings}
-    rest = {key: value for key, value in settings.items() if key not in (*_FOLLOW, "friction", "contacts")}
-    model = {key: settings[key] for key in ("friction", "contacts") if key in settings}
+    follows |= {key: settings[key] for key in FOLLOW if key in settings}
+    rest = {key: value for key, value in settings.items() if key not in (*FOLLOW, *_MODEL)}
+    model = {key: settings[key] for key in _MODEL if key in settings}
     if follows.get("periodic") and gait is not gaits.jump:
         rest.setdefault("cycles", 1)
     h = time_step / whole_number("problems.follow(substeps=...)", follows.get("substeps", 1))

@@ -1,5 +1,7 @@
 """Learning and identification refuse wrong arguments by name, before any work."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,11 +18,23 @@ MOTION = SIM.rollout(SIM.neutral(), steps=3)
 ONE = np.ones(1)
 
 
-def still(time, x):
-    return ONE
+def observation(x, out):
+    out[0], out[1] = x[0], x[1]
 
 
-TASK = dojo.learn.Task(SIM, 1, still, 2, still, -ONE, ONE, still, still, steps=5)
+def reward(x, a, after):
+    return -(after[0] ** 2)
+
+
+def never(x):
+    return False
+
+
+def start(rng):
+    return np.zeros(2)
+
+
+TASK = dojo.learn.Task(SIM, 1, observation, 2, reward, -ONE, ONE, start, never, steps=5)
 POLICY = LearnedPolicy(Network((2, 1)), np.zeros(3), np.zeros(2), np.ones(2), TASK)
 PLAN = (np.zeros((3, 2)), np.zeros((2, 1)), np.zeros((2, 1, 2)))
 
@@ -80,6 +94,51 @@ CALLS = {
     "command of a number": (lambda: POLICY.commanded(3)(0.0, np.zeros(2)), "commanded(command)"),
 }
 # fmt: on
+
+
+def half(x, out):
+    out[0] = x[0]
+
+
+def too_wide(x, out):
+    out[2] = x[0]
+
+
+def returned(x, out):
+    return x
+
+
+def writes(x, out):
+    x[0] = 1.0
+
+
+FUNCTIONS = {
+    "observation of less": ("observation", half, "'half' does not write out[1]", "2 entries"),
+    "observation of more": ("observation", too_wide, "'too_wide': IndexError", "out (2,)"),
+    "observation that is returned": ("observation", returned, "'returned' does not write out[0]"),
+    "observation of a state alone": ("observation", lambda x: x, "TypeError", "x (2,), out (2,)"),
+    "observation that writes": ("observation", writes, "'writes' writes into x"),
+    "reward of two": ("reward", lambda x, a: 0.0, "TypeError", "x (2,), a (1,), after (2,)"),
+    "reward of an array": ("reward", lambda x, a, after: -(after**2), "array of shape (2,)", "one number"),
+    "reward of one entry": ("reward", lambda x, a, after: -(a**2), "array of shape (1,)", "one number"),
+    "reward of nothing": ("reward", lambda x, a, after: None, "returns None", "one number"),
+    "end of each": ("terminated", lambda x: x > 1.0, "array of shape (2,)", "True or False"),
+    "end of two": ("terminated", lambda x, a: True, "TypeError", "x (2,)"),
+    "survival of an array": ("survival_probability", lambda x: 0.0 * x, "array of shape (2,)", "one number"),
+}
+
+
+@pytest.mark.parametrize("case", FUNCTIONS)
+def test_a_function_of_a_task_is_refused_by_name(case):
+    name, function, *words = FUNCTIONS[case]
+    check_refused(lambda: replace(TASK, **{name: function}), f"Task({name}=...)", *words)
+
+
+def test_what_cannot_be_compiled_names_the_argument():
+    task = replace(TASK, reward=lambda x, a, after: float(str(after[0])[:3]))
+    check_refused(
+        lambda: task.rewards(np.zeros((1, 2)), np.zeros((1, 1)), np.zeros((1, 2))), "Task(reward=...)", "Numba"
+    )
 
 
 @pytest.mark.parametrize("case", CALLS)

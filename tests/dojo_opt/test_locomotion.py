@@ -144,6 +144,26 @@ def test_periodic_gaits_go_on(name, settings):
     assert np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < 0.05
 
 
+@pytest.mark.parametrize("robot", [None, "any"])
+@pytest.mark.parametrize(
+    "name, settings",
+    [("trot", {}), ("trot", {"cycles": 3, "period": 0.8}), ("walk", {"periodic": True}), ("walk", {"speed": None})],
+)
+def test_the_distance_of_a_gait(name, settings, robot):
+    given = () if robot is None else (models.quadruped(),)
+    path = getattr(problems, name)(*given, distance=0.23, **settings).specs[0][0].reference
+    assert path[-1, 0] - path[0, 0] == pytest.approx(0.23, abs=1e-12)
+
+
+@pytest.mark.parametrize("gait", [gaits.pace, gaits.bound, gaits.hop, gaits.turn])
+def test_the_distance_of_other_gaits(gait):
+    sim = Simulator(models.quadruped(), time_step=0.02)
+    made = gait(sim, distance=0.1, cycles=1, **({"heading_rate": 0.0} if gait is gaits.turn else {}))
+    assert made.x[-1, 0] - made.x[0, 0] == pytest.approx(0.1, abs=1e-12)
+    with pytest.raises(ValueError, match="expected one of them"):
+        gait(sim, distance=0.1, speed=0.1)
+
+
 def test_a_gait_that_turns_is_not_periodic():
     with pytest.raises(ValueError, match="ends as it began, apart from its place"):
         problems.turn(periodic=True)

@@ -30,7 +30,7 @@ EPS = (1e-5, 1e-2)  # of differenced motions: the usual choice, and a wide one t
 CHAINED = ("implicitfast", "discrete")  # MuJoCo's integrators with Jacobians
 AHEAD = 5e-3  # [m] above the height from which a step reaches the ground
 _LEFT_OUT = ("MuJoCo implicit", "Drake RK3")  # of a block as implicitfast; explicit, for stiff contacts
-_NO_MUJOCO = 'without MuJoCo; pip install ".[bench]" for its rows'
+_NO_MUJOCO = 'without MuJoCo; pip install "dojo-opt[bench]" for its rows'
 
 
 @dataclass(frozen=True)

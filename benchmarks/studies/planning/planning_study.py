@@ -82,7 +82,7 @@ class PlanningStudy:
     def _peers(self, report: Report, progress: Progress) -> dict[str, list[PlanOutcome]]:
         """MuJoCo's plans of the reference problems."""
         if find_spec("mujoco") is None:
-            report.notes.append('without MuJoCo; pip install ".[bench]" for its plans')
+            report.notes.append('without MuJoCo; pip install "dojo-opt[bench]" for its plans')
             return {}
         found = {
             name: [peer(cases.reference(name), settings) for settings in (PEERS[:1] if self.quick else PEERS)]

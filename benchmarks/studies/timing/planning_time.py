@@ -88,7 +88,7 @@ def _missing(package: str) -> str:
     if package == "mujoco":
         return "" if find_spec("mujoco") is not None else "trot: without MuJoCo"
     if find_spec("crocoddyl") is None:
-        return 'trot: without crocoddyl; pip install ".[crocoddyl]"'
+        return 'trot: without crocoddyl; pip install "dojo-opt[crocoddyl]"'
     try:
         found = version("crocoddyl"), version("pin")
     except PackageNotFoundError as error:

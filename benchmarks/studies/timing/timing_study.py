@@ -73,7 +73,7 @@ class TimingStudy:
         _batch(report, rounds)
         report.notes.append("step, gradient: microseconds of processor time; iterations: Newton iterations per step")
         if find_spec("mujoco") is None:
-            report.notes.append('without MuJoCo; pip install ".[bench]" for the ratios')
+            report.notes.append('without MuJoCo; pip install "dojo-opt[bench]" for the ratios')
         return report
 
 
