@@ -11,9 +11,10 @@ With --smoothing the tasks of IDTO run with three kinds of smoothing of the deri
 one at all knots, and one that grows along the horizon to the larger one. The larger one is that of the task, or ten
 times that of the rollouts.
 Every task runs from its start and from N perturbed ones, on two plants: ours, at 1 ms with kappa 1e-8, and
-MuJoCo's with its default contacts, where it is installed. Measured here: everything but the rates. The publication
-replans at these on four threads, and gives no rates of success: `help(TASK)` states each criterion. Ticks are
-timed by the processor, on one core.
+MuJoCo's with its default contacts, where it is installed. Hills are cylinders in MuJoCo, as in the publication: feet
+that sink into a height field touch the sides of its prisms, which brake them. Measured here: everything but the rates.
+The publication replans at these on four threads, and gives no rates of success: `help(TASK)` states each criterion.
+Ticks are timed by the processor, on one core.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from dojo_opt.mpc.settings import OPTIONS
 from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report.result import Cell, Report, Row, Table
+from dojo_opt.tasks.idto.mini_cheetah import with_cylinders
 from dojo_opt.tasks.suite import SuiteTask
 
 SPEEDS = {"free_gait": 0.3, "free_gait_disturbed": 0.3, "free_gait_fast": 0.6}  # [m/s] of the quadruped
@@ -88,7 +90,10 @@ def starts(task: Any, kind: str, perturbed: range) -> list[Any]:
     from benchmarks.engines.mujoco_plant import MujocoPlant
 
     options = {"cone": "elliptic", "impratio": "10"} if kind == FIRM else {}
-    return [MujocoPlant(task.model, task.initial_state(seed), **options) for seed in seeds]
+    model = task.model
+    if task.name == "idto.mini_cheetah_hills":
+        model = model.replace(mechanism=with_cylinders(model.mechanism))
+    return [MujocoPlant(model, task.initial_state(seed), **options) for seed in seeds]
 
 
 def line(task: Any, kind: str, perturbed: range, seconds: float | None) -> tuple[list[Cell], list[Any]]:

@@ -13,6 +13,7 @@ from dojo_opt.mpc.moving_reference import AnchoredReference
 from dojo_opt.mpc.servo import ModelServo
 from dojo_opt.planning.iterate import Iteration
 from dojo_opt.tasks.free_gait import Lead
+from dojo_opt.tasks.idto.mini_cheetah import with_cylinders
 from dojo_opt.tasks.suite import servo_effort
 from sim.mechanism.overlaps import overlaps
 from solvers.status import Status
@@ -232,6 +233,22 @@ def test_mujoco_has_the_same_hills():
     assert -5e-3 < result.contacts.gap[0] < 0.0
     with pytest.raises(ValueError, match="rises from level ground"):
         MujocoPlant(dojo.Simulator(falling.with_terrain(dojo.Terrain.steps([0.1], 0.3)), time_step=1e-3), start)
+
+
+def test_hills_as_cylinders_are_where_the_terrain_is():
+    """The lowest gap of every foot above them, level ground and hills alike."""
+    task = dojo.tasks.idto.mini_cheetah_hills()
+    solid = task.model.replace(mechanism=with_cylinders(task.model.mechanism))
+    for x in (1.2, 1.8, 2.1, 2.55, 4.0, 6.0):
+        state = task.start.copy()
+        state[[0, 2]] = x, 0.36
+        rough = task.model.step(state).contacts.gap.ravel()[:4]
+        gaps = solid.step(state).contacts.gap.ravel()
+        names = [candidate.collision for candidate in solid.mechanism.contact_candidates]
+        feet = [contact.name for contact in solid.mechanism.contacts]
+        hills = np.array([min(g for g, n in zip(gaps[4:], names, strict=True) if n.startswith(foot)) for foot in feet])
+        np.testing.assert_allclose(np.minimum(gaps[:4], hills), rough, atol=1e-3)
+        assert (hills < gaps[:4]).any() == (x > 1.5)  # the first hill begins at 1.69
 
 
 def turned(quaternion, vector):

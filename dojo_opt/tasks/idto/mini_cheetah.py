@@ -12,9 +12,11 @@ from dojo_opt.tasks.free_gait import GaitWeights, free_gait_mpc
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
 from dojo_opt.tasks.suite import SuiteTask
 from sim.mechanism.checks import whole_number
+from sim.mechanism.collision import Collision
 from sim.mechanism.contact import Contact
 from sim.mechanism.input import Input
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.shapes import Cylinder, Sphere
 from sim.mechanism.terrain import Terrain
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
@@ -31,6 +33,7 @@ _WEIGHTS = GaitWeights(pose=10.0, effort=1e-4, slip=10.0, near=0.01, alike=0.05)
 _SERVO = 50.0, 1.0  # [N m/rad], [N m s/rad]
 _HILL, _FIRST, _APART, _ROUND = 0.05, 2.0, 1.0, 1.0  # [m] height, place, distance and radius of hills
 _GRID = 0.01  # [m]
+_LONG = 25.0  # [m] of the cylinders
 _LEGS = {"fl": (1.0, 1.0), "fr": (1.0, -1.0), "hl": (-1.0, 1.0), "hr": (-1.0, -1.0)}
 
 
@@ -169,6 +172,33 @@ def hills(count: int) -> Terrain:
         return np.sqrt(np.maximum(_ROUND**2 - off**2, (_ROUND - _HILL) ** 2)) - (_ROUND - _HILL)
 
     return Terrain.from_function(height, lines, [0.0])
+
+
+def with_cylinders(robot: Mechanism, count: int = 5) -> Mechanism:
+    """The robot with the hills as cylinders on level ground, for engines in whose height fields feet sink.
+
+    Args:
+        robot: the robot, on any ground.
+        count: number of hills (default 5).
+
+    Returns:
+        The mechanism: each foot touches the ground and every hill.
+    """
+    turn = (0.5**0.5, 0.5**0.5, 0.0, 0.0)  # the axis along y
+    collisions = [
+        Collision(
+            foot.body,
+            None,
+            Sphere(foot.radius, center=foot.point),
+            Cylinder(_ROUND, _LONG, center=(_FIRST + _APART * k, 0.0, _HILL - _ROUND), orientation=turn),
+            friction=foot.friction,
+            name=f"{foot.name} on hill {k}",
+        )
+        for k in range(count)
+        for foot in robot.contacts
+    ]
+    level = [replace(foot, terrain=None) for foot in robot.contacts]
+    return replace(robot, contacts=level, collisions=collisions)
 
 
 def mini_cheetah_hills(*, count: int = 5, speed: float = 0.4, **settings: Any) -> SuiteTask:
