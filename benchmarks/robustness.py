@@ -1,6 +1,6 @@
 """Solve one step from thousands of random extreme states and count every miss.
 
-    python benchmarks/robustness.py                     20,000 states, the whole table
+    python benchmarks/robustness.py                     20,000 states of each of five seeds, the whole table
     python benchmarks/robustness.py --states 2000 --mechanism hopper
 
 Mechanisms: block (8 corners), hopper (2 balls), quadruped with 4 and with 12 contacts. Orientation uniform, joints
@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
@@ -36,6 +37,7 @@ MECHANISMS = {
 FRICTIONS = (0.0, 0.5, 1.0, 2.0)
 TIME_STEPS = (0.005, 0.01, 0.02, 0.05)
 KAPPAS = (1e-4, 1e-8)
+SEEDS = (0, 1, 2, 3, 4)
 SPEED = 20.0  # [m/s, rad/s]
 GAIN = 0.1  # of the kinetic energy
 
@@ -51,6 +53,7 @@ class Cell:
     states: int = 0
     refused: int = 0  # states that a step cannot represent
     gaining: int = 0  # states with solutions that all gain energy
+    divided: int = 0  # of the solved steps
     iterations: list[int] = field(default_factory=list)  # of the solved steps
     misses: Counter[str] = field(default_factory=Counter)  # by Status
     unreported: int = 0  # solved by status, but not finite, below the ground, or with more energy than before
@@ -65,6 +68,7 @@ class Cell:
         self.states += other.states
         self.refused += other.refused
         self.gaining += other.gaining
+        self.divided += other.divided
         self.iterations += other.iterations
         self.misses += other.misses
         self.unreported += other.unreported
@@ -128,6 +132,7 @@ def run_cell(name: str, friction: float, h: float, kappa: float, states: int, se
             cell.unreported += status == dojo.Status.SOLVED
         elif status == dojo.Status.SOLVED:
             cell.iterations.append(int(result.iterations))
+            cell.divided += result.parts > 1
             gain = sim.energy(result.x) - sim.energy(x)
             fine = np.isfinite(result.x).all() and lowest(sim, result.x) > -1e-6
             smoothing = kappa / h * len(sim.mechanism.contacts)
@@ -145,6 +150,7 @@ HEADER = (
     "cannot be represented",
     "gains energy",
     "solved",
+    "divided",
     "not solved",
     "median",
     "99 %",
@@ -158,7 +164,8 @@ def line(cell: Cell, label: str) -> list[TableCell]:
     its = cell.iterations or [0]
     spread = [float(np.median(its)), float(np.percentile(its, 99)), max(its)]
     misses = ", ".join(f"{name} {count}" for name, count in cell.misses.items())
-    return [label, cell.states, cell.refused, cell.gaining, cell.solved, cell.misses.total(), *spread, misses]
+    counts = [cell.states, cell.refused, cell.gaining, cell.solved, cell.divided, cell.misses.total()]
+    return [label, *counts, *spread, misses]
 
 
 def total(cells: list[Cell], name: str) -> Cell:
@@ -169,15 +176,23 @@ def total(cells: list[Cell], name: str) -> Cell:
     return out
 
 
-def study(states: int, mechanisms: list[str], seed: int) -> list[Cell]:
-    """All cells; about `states` states over all mechanisms."""
+def run_seeds(name: str, friction: float, h: float, kappa: float, states: int, seeds: Sequence[int]) -> Cell:
+    """One cell of the table, with the states of every seed."""
+    cell = Cell(name, friction, h, kappa)
+    for seed in seeds:
+        cell.add(run_cell(name, friction, h, kappa, states, seed))
+    return cell
+
+
+def study(states: int, mechanisms: list[str], seeds: Sequence[int]) -> list[Cell]:
+    """All cells; about `states` states of each seed over all mechanisms."""
     per_cell = max(1, round(states / (len(mechanisms) * len(FRICTIONS) * len(TIME_STEPS) * len(KAPPAS))))
-    settings = list(product(mechanisms, FRICTIONS, TIME_STEPS, KAPPAS))
+    settings = product(mechanisms, FRICTIONS, TIME_STEPS, KAPPAS)
     named = [
-        (f"{name}, friction {mu:g}, {1e3 * h:g} ms, kappa {kappa:g}", (name, mu, h, kappa))
+        (f"{name}, friction {mu:g}, {1e3 * h:g} ms, kappa {kappa:g}", (name, mu, h, kappa, per_cell, seeds))
         for name, mu, h, kappa in settings
     ]
-    return [run_cell(*setting, per_cell, seed) for setting in progress()(named, "robustness")]
+    return [run_seeds(*setting) for setting in progress()(named, "robustness")]
 
 
 def summary(cells: list[Cell]) -> Report:
@@ -191,7 +206,9 @@ def summary(cells: list[Cell]) -> Report:
         number(
             "called solved without being so", whole.unreported, 0, note="not finite, below the ground, or gains energy"
         ),
-        number("refused: every solution found gains energy", whole.gaining),
+        number("refused: every solution found gains energy", whole.gaining, 0),
+        number("refused: not to be represented", whole.refused, 0),
+        number("divided", whole.divided),
         number("iterations, median", float(np.median(its))),
         number("iterations, 99 %", float(np.percentile(its, 99))),
         number("iterations, most", max(its)),
@@ -207,16 +224,16 @@ def summary(cells: list[Cell]) -> Report:
 
 def run(args: argparse.Namespace) -> Report:
     """The whole table."""
-    states = 256 if args.quick else args.states
-    return summary(study(states, args.mechanism or list(MECHANISMS), args.seed))
+    states, seeds = (256, args.seeds[:1]) if args.quick else (args.states, args.seeds)
+    return summary(study(states, args.mechanism or list(MECHANISMS), seeds))
 
 
 def main(argv: list[str] | None = None) -> int:
     """Print or write the report; exit status 1 if a state was missed."""
     arguments = parser(__doc__)
-    arguments.add_argument("--states", type=int, default=20_000, help="states over all cells")
+    arguments.add_argument("--states", type=int, default=20_000, help="states of a seed, over all cells")
     arguments.add_argument("--mechanism", choices=MECHANISMS, action="append", help="only this one (may be repeated)")
-    arguments.add_argument("--seed", type=int, default=0)
+    arguments.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
     return deliver("robustness", run, arguments, argv)
 
 
