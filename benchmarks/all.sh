@@ -60,6 +60,7 @@ measure start_strategies "$python" "$here/benchmarks/start_strategies.py" $quick
 measure falls "$python" "$here/benchmarks/falls.py" $quick --out "$out"
 measure gaits "$python" "$here/benchmarks/gaits.py" $quick --out "$out"
 measure flips "$python" "$here/benchmarks/flips.py" $quick --out "$out"
+measure replays "$python" "$here/benchmarks/replays.py" $quick --out "$out"
 measure loops "$python" "$here/benchmarks/loops.py" $quick --out "$out"
 measure collisions "$python" "$here/benchmarks/collisions.py" --motions 120 $quick --out "$out"
 measure mpc "$python" "$here/benchmarks/mpc.py" $quick --out "$out"

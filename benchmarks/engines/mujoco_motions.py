@@ -25,6 +25,18 @@ def slide(sim: Simulator, cone: str, velocity: Floats, steps: int) -> Floats:
     return path
 
 
+def drop(sim: Simulator, x: Floats, steps: int) -> Floats:
+    """(steps + 1, nq) coordinates of a motion without inputs from the state x (nx,)."""
+    model = mujoco_scene.load(sim.model, sim.time_step, integrator="implicitfast")
+    data = mujoco_scene.state(model, x)
+    path = np.zeros((steps + 1, sim.nq))
+    path[0] = data.qpos
+    for k in range(steps):
+        _mujoco().mj_step(model, data)
+        path[k + 1] = data.qpos
+    return path
+
+
 def push_rate(sim: Simulator, axis: int, force: float, steps: int, change: float = 1e-4) -> float:
     """d(displacement)/d(force) along an axis by a central difference, from its own rest [m/N]."""
     places = []

@@ -29,6 +29,7 @@ from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import RENAMED, Options, Stage
 from dojo_opt.planning.plan import History, Plan
 from dojo_opt.planning.problem import Problem
+from dojo_opt.planning.refinement import refine
 from dojo_opt.planning.subproblem import Subproblem
 from sim.mechanism import checks
 from sim.mechanism.renamed import renamed_keywords
@@ -77,8 +78,8 @@ def ilqr(
     guess with a resting joint that has to move begins at the smoothest stage. When an attempt fails, the planner
     restarts at another stage, within `max_iterations`; the table of iterations shows it.
 
-    A problem with a `refinement` is planned with its own time steps first, and from there with shorter ones. The plan
-    is then one of the finer problem, and its history is that of both.
+    A problem with a `refinement` or a `refined_accuracy` is planned with its own time steps first, and from there with
+    shorter ones. The plan is then one of the finest problem, and its history is that of all.
 
     Args:
         problem: the problem.
@@ -118,16 +119,11 @@ def ilqr(
         guess = (controls, states, warm_start)
         return multi_start(ilqr, problem, guess, {"options": options}, starts, seed, executor)
     solver = Solver(problem, options)
-    finer = None if problem.refinement == 1 else problem.refined(problem.refinement)  # refused before any work
+    problem.refined(problem.refinement)  # which refuses a wrong one before any work
     plan = solver.solve(controls, states, warm_start)
-    if finer is None or not plan.success:
+    if not plan.success:
         return plan
-    options.say(f"Refinement: every time step divided by {problem.refinement}:")
-    last = Solver(finer, options).solve(warm_start=plan)
-    history, seconds = plan.history + last.history, plan.seconds + last.seconds
-    both = replace(last, nit=plan.nit + last.nit, history=history, seconds=seconds)
-    options.say(f"{plan.nit} + {last.nit} iterations, {1e3 * seconds:.1f} ms in all")
-    return both
+    return refine(problem, plan, options, lambda finer, last: Solver(finer, options).solve(warm_start=last))
 
 
 class _Attempt(NamedTuple):

@@ -126,5 +126,5 @@ def of_problem(plan: Plan, problem: Problem) -> Plan:
     Returns:
         The plan.
     """
-    of = problem if plan.substeps == problem.substeps else problem.refined(problem.refinement)
+    of = problem if plan.substeps == problem.substeps else problem.refined(plan.substeps // problem.substeps)
     return replace(plan, problem=of, simulator=of.sim)

@@ -18,7 +18,9 @@ from sim.mechanism.memory_limit import check_room
 from sim.simulator.simulator import Simulator
 from solvers.types import Matrix, Vector
 
-__all__ = ["Problem"]
+__all__ = ["REPLAY_ACCURACY", "Problem"]
+
+REPLAY_ACCURACY = 1e-5  # [m/s, rad/s] of the replay that `refined_accuracy` compares a plan with
 
 
 def _check_simulator(call: str, sim: Any) -> None:
@@ -57,6 +59,16 @@ def _components(call: str, chosen: Any, sim: Simulator) -> Any:
     return np.unique(chosen_components(call, None if chosen is True else chosen, sim))
 
 
+def _accuracy(asked: float | None, sim: Simulator) -> float | None:
+    """A checked accuracy of plans, of a mechanism whose steps can have one."""
+    if asked is None:
+        return None
+    least = 10.0 * REPLAY_ACCURACY  # the replay is the reference
+    number = checks.number("Problem(refined_accuracy=...)", asked, at_least=least)
+    sim.replace(order=2, accuracy=REPLAY_ACCURACY)
+    return number
+
+
 def _terms(given: Any) -> tuple[Spec, ...]:
     """One term, or several, as a tuple."""
     return tuple(given) if isinstance(given, Iterable) else (given,)
@@ -81,6 +93,9 @@ class Problem:
             `start` is then a guess (default None: a fixed start). With the constraint `Periodic`, such a plan is a
             periodic gait.
         refinement: with more than 1, `ilqr` ends by planning `refined(refinement)` from its first plan (default 1).
+        refined_accuracy: largest difference of a coordinate between the plan and `Plan.replay(accuracy=1e-5)`, at any
+            knot, at least 1e-4 [m, rad]: `ilqr` ends by planning with 2, 4, ..., 32 times as many time steps, or as
+            many times `refinement`, until the plan is as accurate as this (default None: without replay).
         refined_constraints: one constraint or several of that problem only, which do not help from a distant guess.
 
     Raises:
@@ -102,6 +117,7 @@ class Problem:
         states0: ArrayLike | None = None,
         free_start: Any = None,
         refinement: int = 1,
+        refined_accuracy: float | None = None,
         refined_constraints: Spec | Sequence[Spec] = (),
     ) -> None:
         _check_simulator("Problem(sim)", sim)
@@ -109,6 +125,7 @@ class Problem:
         self.horizon = whole_number("Problem(horizon=...)", horizon)
         self.substeps = whole_number("Problem(substeps=...)", substeps)
         self.refinement = whole_number("Problem(refinement=...)", refinement)
+        self.refined_accuracy = _accuracy(refined_accuracy, sim)
         self._check_memory()
         start = numbers("Problem(start=...)", start)
         if start.shape != (sim.nx,):
@@ -166,7 +183,7 @@ class Problem:
         finer = copy.copy(self)
         finer.sim = self.sim.replace(time_step=self.sim.time_step / count)
         finer.substeps = self.substeps * count
-        finer.refinement = 1
+        finer.refinement, finer.refined_accuracy = 1, None
         finer.specs, finer.refined_constraints = (self.specs[0], (*self.specs[1], *self.refined_constraints)), ()
         finer.bind()
         return finer

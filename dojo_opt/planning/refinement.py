@@ -1,0 +1,86 @@
+"""Refinement: a plan that is solved again with shorter time steps, once or until its replay agrees with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from dojo_opt.planning.options import Options
+from dojo_opt.planning.plan import Plan
+from dojo_opt.planning.problem import REPLAY_ACCURACY, Problem
+from sim.simulator.results import Interrupted
+from solvers.status import MESSAGES, Status
+
+__all__ = ["refine", "replay_error"]
+
+_MOST = 32  # parts of a time step
+
+Solve = Callable[[Problem, Plan], Plan]  # of a problem, from a plan
+
+
+def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan:
+    """The plan solved again with shorter time steps, as the problem asks.
+
+    First every time step is divided into `refinement` parts. With a `refined_accuracy` the number of parts is doubled
+    until plan and replay are no further apart than that; with more than 32 parts a plan begins to use each
+    step of them.
+
+    Args:
+        problem: the problem, with its own time steps.
+        plan: its solved plan.
+        options: of `ilqr`, which print.
+        solve: solves a problem with shorter steps, from a plan.
+
+    Returns:
+        The last plan, with the iterations of all; ACCURACY_NOT_REACHED if the replay is still too far off.
+
+    Raises:
+        Interrupted: after Ctrl-C during a replay; its `result` is the plan so far.
+    """
+    plans, count, asked = [plan], problem.refinement, problem.refined_accuracy
+    if count == 1 and asked is not None and problem.refined_constraints:
+        count = 2  # these are constraints of a refined problem
+    while True:
+        if count > 1:
+            options.say(f"Refinement: every time step divided by {count}:")
+            plans.append(solve(problem.refined(count), plans[-1]))
+        if asked is None or not plans[-1].success:
+            return _joined(plans, options)
+        try:
+            apart = replay_error(plans[-1])
+        except KeyboardInterrupt:
+            raise Interrupted(_ended(_joined(plans, options), Status.INTERRUPTED)) from None
+        options.say(f"Replay with an accuracy of {REPLAY_ACCURACY:g}: {apart:.1e} from the plan, asked {asked:g}")
+        if apart <= asked:
+            return _joined(plans, options)
+        if 2 * count > _MOST:
+            return _ended(_joined(plans, options), Status.ACCURACY_NOT_REACHED, f" {apart:.1e} apart, asked {asked:g}.")
+        count *= 2
+
+
+def replay_error(plan: Plan) -> float:
+    """Largest difference of a coordinate between a plan and its replay, at any knot [m, rad]; infinite if it ends."""
+    replay = plan.replay(accuracy=REPLAY_ACCURACY)
+    if replay.status != Status.SOLVED:
+        return np.inf
+    sim = plan.simulator
+    return float(np.abs(sim.difference(plan.x, replay.x)[:, : sim.nv]).max())
+
+
+def _ended(plan: Plan, status: Status, detail: str = "") -> Plan:
+    """The plan with another end."""
+    message = MESSAGES[status] if status == Status.INTERRUPTED else "The replay does not agree with the plan:"
+    return replace(plan, success=False, status=status, message=message + detail)
+
+
+def _joined(plans: list[Plan], options: Options) -> Plan:
+    """The last plan, with the iterations, records and time of all."""
+    if len(plans) == 1:
+        return plans[0]
+    seconds = sum(plan.seconds for plan in plans)
+    history = [record for plan in plans for record in plan.history]
+    counts = " + ".join(str(plan.nit) for plan in plans)
+    options.say(f"{counts} iterations, {1e3 * seconds:.1f} ms in all")
+    return replace(plans[-1], nit=sum(plan.nit for plan in plans), history=history, seconds=seconds)

@@ -1,0 +1,93 @@
+"""Refinement by accuracy: time steps are divided until the replay of a plan agrees with it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt.planning import refinement
+from dojo_opt.planning.multi_start import of_problem
+from dojo_opt.planning.refinement import replay_error
+from dojo_opt.problems import hop
+from sim.simulator.results import Interrupted
+
+
+def asked(accuracy, **settings):
+    """A hop with a refined accuracy [m, rad]."""
+    problem = hop()
+    problem.refined_accuracy = accuracy
+    for name, value in settings.items():
+        setattr(problem, name, value)
+    return problem
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("accuracy", [0.05, 0.015])
+def test_steps_are_as_short_as_the_replay_needs(accuracy):
+    problem = asked(accuracy)
+    plan = dojo.ilqr(problem)
+    assert plan.success and len(plan.u) == problem.horizon and plan.nit == len(plan.history)
+    assert replay_error(plan) <= accuracy
+    longer = dojo.ilqr(hop())
+    for count in [2**k for k in range(1, 6) if 2**k < plan.substeps]:  # all of these are too long
+        assert replay_error(longer) > accuracy
+        longer = dojo.ilqr(problem.refined(count), warm_start=longer)
+    replay = plan.replay(accuracy=1e-5)
+    assert np.abs(replay.x[:, :7] - plan.x[:, :7]).max() <= 1.5 * accuracy  # seen by hand, quaternions as numbers
+
+
+def test_a_plan_that_is_good_enough_is_kept():
+    plan, same = dojo.ilqr(asked(1.0)), dojo.ilqr(hop())
+    assert plan.success and plan.substeps == 1
+    np.testing.assert_array_equal(plan.x, same.x)
+
+
+def test_the_refinement_is_the_first_that_is_tried_and_its_constraints_hold():
+    assert dojo.ilqr(asked(1.0, refinement=3)).substeps == 3
+    goal = dojo.constraint.StateBounds(-np.inf, 10.0, components="body z", knots=10)
+    plan = dojo.ilqr(asked(1.0, refined_constraints=(goal,)))
+    assert plan.substeps == 2 and len(plan.multipliers) == len(dojo.ilqr(hop()).multipliers) + 1
+
+
+def test_a_replay_that_stays_apart_is_no_success(monkeypatch):
+    monkeypatch.setattr(refinement, "_MOST", 2)
+    plan = dojo.ilqr(asked(1e-3))
+    assert not plan.success and plan.status == dojo.Status.ACCURACY_NOT_REACHED
+    assert plan.substeps == 2 and plan.message.startswith("The replay does not agree with the plan: ")
+    assert plan.message.endswith(" apart, asked 0.001.")
+
+
+def test_ctrl_c_during_a_replay_leaves_the_plan(monkeypatch):
+    def interrupt(plan):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(refinement, "replay_error", interrupt)
+    with pytest.raises(Interrupted) as stopped:
+        dojo.ilqr(asked(0.05))
+    plan = stopped.value.result
+    assert plan.status == dojo.Status.INTERRUPTED and not plan.success and len(plan.u) == 20
+
+
+def test_a_plan_of_a_worker_finds_its_problem():
+    problem = asked(0.05)
+    plan = replace(dojo.ilqr(problem), problem=None, simulator=None)
+    assert plan.substeps > 1
+    found = of_problem(plan, problem)
+    assert found.simulator.time_step == pytest.approx(plan.time_step) and found.problem.refined_accuracy is None
+
+
+@pytest.mark.parametrize(("accuracy", "text"), [(1e-5, ">= 0.0001"), (-1.0, ">= 0.0001"), ("fine", "number")])
+def test_a_wrong_accuracy_is_refused(accuracy, text):
+    sim = dojo.Simulator(dojo.models.cartpole(), time_step=0.05)
+    with pytest.raises((ValueError, TypeError), match=r"Problem\(refined_accuracy=\.\.\.\)") as error:
+        dojo.Problem(sim, sim.neutral(), 10, refined_accuracy=accuracy)
+    assert text in str(error.value)
+
+
+def test_mechanisms_without_an_accuracy_are_refused():
+    rough = dojo.models.cartpole()
+    joint = replace(rough.joints[0], friction=0.1)
+    sim = dojo.Simulator(replace(rough, joints=(joint, *rough.joints[1:])), time_step=0.05)
+    with pytest.raises(ValueError, match="dry friction"):
+        dojo.Problem(sim, sim.neutral(), 10, refined_accuracy=0.01)
