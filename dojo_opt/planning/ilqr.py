@@ -119,7 +119,8 @@ def ilqr(
         guess = (controls, states, warm_start)
         return multi_start(ilqr, problem, guess, {"options": options}, starts, seed, executor)
     solver = Solver(problem, options)
-    problem.refined(problem.refinement)  # which refuses a wrong one before any work
+    if problem.refinement != 1:
+        problem.refined(problem.refinement)  # which refuses a wrong one before any work
     plan = solver.solve(controls, states, warm_start)
     if not plan.success:
         return plan

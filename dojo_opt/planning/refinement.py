@@ -24,8 +24,8 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
     """The plan solved again with shorter time steps, as the problem asks.
 
     First every time step is divided into `refinement` parts. With a `refined_accuracy` the number of parts is doubled
-    until plan and replay are no further apart than that; with more than 32 parts a plan begins to use each
-    step of them.
+    until plan and replay are no further apart than that; more than 32 parts make
+    problems that are hard to solve.
 
     Args:
         problem: the problem, with its own time steps.
