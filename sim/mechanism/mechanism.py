@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from sim.mechanism.renamed import renamed
 from sim.mechanism.self_collisions import self_collisions
 from sim.mechanism.shape_contacts import shape_contacts
 from sim.mechanism.shapes import Solid, Sphere, rotation_matrix
+from sim.mechanism.short_repr import drawn
 from sim.mechanism.terrain import Terrain
 from sim.mechanism.tree import check_axes, check_loops, check_masses, sort_tree
 from sim.mechanism.visual import Visual
@@ -116,6 +118,9 @@ class Mechanism:
         parts |= {"collisions": self.collisions, "loops": self.loops, "gears": self.gears}
         sizes = "".join(f", {part} {len(found)}" for part, found in parts.items() if found)
         return f"{type(self).__name__}({self.name}, nq {self.nq}, nv {self.nv}{sizes})"
+
+    def _repr_html_(self) -> str:
+        return drawn(self) + f"<p>{escape(repr(self))}</p>"
 
     @property
     def nbody(self) -> int:
