@@ -4,14 +4,11 @@ of Numba that have work to do on a kernel.
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 from numba.core import interpreter, transforms, typed_passes, untyped_passes
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import Compiler, DefaultPassBuilder, StateDict
 from numba.core.compiler_machinery import PassManager, _pass_registry, register_pass
 from numba.core.errors import NumbaError
 from numba.core.ir_utils import build_definitions
@@ -19,7 +16,9 @@ from numba.core.rewrites import rewrite_registry
 from numba.core.ssa import reconstruct_ssa
 
 from solvers.compiler.arithmetic import KernelTyping
+from solvers.compiler.garbage import seldom_collected
 from solvers.compiler.inference import KernelInference
+from solvers.compiler.inlining import Inlining
 from solvers.compiler.libraries import EntryLibrary, InnerLibrary, OptionalLibrary, RolledLibrary, SeldomLibrary
 from solvers.compiler.lowering import KernelLowering
 from solvers.compiler.progress import compiling
@@ -135,33 +134,21 @@ _REPLACED = {
     untyped_passes.TranslateByteCode: _Translation,
     untyped_passes.IRProcessing: _Processing,
     untyped_passes.GenericRewrites: _Rewrites,
+    untyped_passes.InlineInlinables: Inlining,
     untyped_passes.ReconstructSSA: _SingleAssignment,
     typed_passes.PreLowerStripPhis: _StripPhis,
     typed_passes.NopythonTypeInference: KernelInference,
     typed_passes.NativeLowering: KernelLowering,
 }
-_SELDOM = (50_000, 20, 100)  # thresholds of the garbage collector
-
-
-@contextmanager
-def _seldom_collected() -> Iterator[None]:
-    """Collect garbage seldom: a compilation makes millions of objects of which most stay while it goes on, and going
-    through them again and again was an eighth of a cold start.
-    """
-    before = gc.get_threshold()
-    if not gc.isenabled() or not 0 < before[0] < _SELDOM[0]:
-        yield
-        return
-    gc.set_threshold(*_SELDOM)
-    try:
-        yield
-    finally:
-        if gc.get_threshold() == _SELDOM:  # unless it was changed meanwhile
-            gc.set_threshold(*before)
 
 
 class _Passes(PassManager):
     """Passes that run without the events, the clocks and the texts for both that Numba makes for each."""
+
+    def finalize(self) -> None:
+        """Find what the passes need of each other, once."""
+        if not self.finalized:
+            super().finalize()
 
     def run(self, state: Any) -> None:
         """Run them."""
@@ -189,7 +176,15 @@ class _Prepared:
         """Do nothing."""
 
 
-_PASSES: list[PassManager] = []  # the same for all kernels
+_PASSES: dict[str, PassManager] = {}  # the same for all kernels
+
+
+def _chosen(name: str, default: PassManager) -> PassManager:
+    """Those of Numba's passes that are not idle."""
+    chosen = _Passes(name)
+    chosen.passes = [(_REPLACED.get(kind, kind), said) for kind, said in default.passes if kind not in _IDLE]
+    chosen.finalize()
+    return chosen
 
 
 class _Compiler(Compiler):
@@ -202,20 +197,24 @@ class _Compiler(Compiler):
 
     def define_pipelines(self) -> list[PassManager]:
         """Which passes, in which order."""
-        if not _PASSES:
+        if "kernel" not in _PASSES:
             (default,) = super().define_pipelines()
-            chosen = _Passes("kernel")
-            chosen.passes = [(_REPLACED.get(kind, kind), said) for kind, said in default.passes if kind not in _IDLE]
-            chosen.finalize()
-            _PASSES.append(chosen)
-        return list(_PASSES)
+            _PASSES["kernel"] = _chosen("kernel", default)
+        return [_PASSES["kernel"]]
+
+    def untyped_passes(self) -> PassManager:
+        """Those up to Numba's representation without types: of a function whose text becomes part of a kernel."""
+        if "text" not in _PASSES:
+            state = StateDict(func_ir=None, flags=self.state.flags)
+            _PASSES["text"] = _chosen("text", DefaultPassBuilder.define_untyped_pipeline(state))
+        return _PASSES["text"]
 
     def compile_extra(self, func: Any) -> Any:
         """Compile one function."""
         library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         library.enable_object_caching()
         self.state.library = library
-        with compiling(func), _seldom_collected():
+        with compiling(func), seldom_collected():
             return super().compile_extra(func)
 
 

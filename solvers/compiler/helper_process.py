@@ -23,6 +23,7 @@ from typing import Any, Protocol, TypeVar
 import numba
 
 from solvers.compiler.cache import STORE
+from solvers.compiler.garbage import seldom_collected
 from solvers.compiler.progress import expect
 
 __all__ = ["divided", "end_with", "serve"]
@@ -151,10 +152,11 @@ def serve(job: Callable[[Any], Job]) -> None:
     """Compile the kernels that the standard input names, until it ends.   job: that of a kernel."""
     threading.Thread(target=end_with, args=(os.getppid(),), daemon=True).start()
     print(_ANSWER, flush=True)
-    for line in sys.stdin:
-        module, name = line.strip().split(":")
-        job(vars(import_module(module))[name]).address()
-        print(_ANSWER, flush=True)
+    with seldom_collected():
+        for line in sys.stdin:
+            module, name = line.strip().split(":")
+            job(vars(import_module(module))[name]).address()
+            print(_ANSWER, flush=True)
 
 
 def end_with(parent: int) -> None:

@@ -37,6 +37,7 @@ from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from solvers.compiler.garbage import seldom_collected
 from solvers.compiler.helper_process import divided, serve
 from solvers.compiler.kernels import entry, is_kept
 from solvers.compiler.pipeline import OptionalCompiler, RolledCompiler, SeldomCompiler
@@ -235,7 +236,7 @@ def link(table: NDArray[np.int64] | list[Callable[..., Any]], *kernels: Callable
     slotted = [kernel for kernel in every if isinstance(kernel, OptionalKernel)]
     if not numba.config.DISABLE_JIT:
         jobs = [_job(kernel) for kernel in every if kernel not in slotted or not cast(Any, kernel).compiled]
-        with closing(divided(jobs)) as queue:
+        with seldom_collected(), closing(divided(jobs)) as queue:
             for job in parts(queue, len(jobs)):
                 job.address()
     for found in slotted:
