@@ -39,7 +39,7 @@ def single(name: str, rounds: int) -> tuple[float, float]:
     made, options = _named(name)
     env = gymnasium.make(made, **options).unwrapped
     task: Any = env._episode.task  # type: ignore[attr-defined]
-    row = task.sim.single_row(task.substeps, contacts=bool(task.touch))
+    row = task.sim.stepper(task.substeps, contacts=bool(task.touch))
     env.action_space.seed(0)
     steps, sims = [], []
     for k in range(rounds + 1):

@@ -35,6 +35,12 @@ OLD: dict[str, tuple[Callable[[], Any], Callable[[], Any], str]] = {
     "step.substeps": (lambda: SIM.step(X).substeps, lambda: 1, "StepResult.parts"),
     "step.share": (lambda: SIM.step(X).share, lambda: 1.0, "StepResult.momentum_fraction"),
     "feedback.knot": (lambda: SIM.rollout_feedback(X, US).knot, lambda: 3, "FeedbackRollout.solved_knots"),
+    "single_row": (
+        lambda: SIM.single_row().step(X[None], US[:1]).x,
+        lambda: SIM.stepper().step(X[None], US[:1]).x,
+        "Simulator.stepper",
+    ),
+    "has_single_rows": (lambda: SIM.has_single_rows, lambda: SIM.has_stepper, "Simulator.has_stepper"),
     "batch.knot": (lambda: SIM.rollout_batch([X], [US]).knot, lambda: [3], "RolloutBatch.solved_steps"),
     "terrain": (
         lambda: dojo.models.sphere().on(dojo.Terrain.slope(0.2)).contacts[0].normal,

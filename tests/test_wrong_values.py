@@ -119,7 +119,7 @@ def simulated() -> Calls:
         "difference": (sim.difference, {"x1": x, "x0": x}),
         "inactive_contacts": (sim.inactive_contacts, {"x": x, "u": u}),
         "reactions": (sim.reactions, {"x": x, "u": u, "frame": "world"}),
-        "single_row": (sim.single_row, {"substeps": 1, "contacts": False}),
+        "stepper": (sim.stepper, {"substeps": 1, "contacts": False}),
         "step_batch": (
             sim.step_batch,
             {"X": x[None], "U": us[:1], "derivatives": False, "parameters": None, "contacts": False},

@@ -51,7 +51,7 @@ class _TaskEpisode:
         self.edge, self.kind = np.ones(task.sim.nu), np.float32
         self.x, self._count = np.zeros((1, task.nx)), task.steps
         self._rngs, self._model = [np.random.default_rng()], Drawn.of(task)
-        self._quick = task.sim.has_single_rows
+        self._quick = task.sim.has_stepper
 
     def reset(self, rng: np.random.Generator) -> Vector:
         """To a first state."""
@@ -84,7 +84,7 @@ class _TaskEpisode:
             found = self._model.step(x, inputs[None])
             return found.x, "" if found.success else found.message
         touch = self.task.touch_groups
-        row = sim.single_row(self.task.substeps, touch is not None)
+        row = sim.stepper(self.task.substeps, touch is not None)
         if not row.advance(x[0, :nx], inputs):
             return x, row.result(x[:, :nx]).message
         after = x.copy()

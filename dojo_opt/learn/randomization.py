@@ -14,9 +14,9 @@ from sim.mechanism import checks
 from sim.mechanism.memory_limit import room_for
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.contact_groups import ContactGroups
-from sim.simulator.row_batch import StepBatch
 from sim.simulator.row_impulses import RowImpulses
 from sim.simulator.simulator import Simulator
+from sim.simulator.step_batch import StepBatch
 from solvers.types import Floats
 
 __all__ = ["Models", "Randomization", "check_pushes", "draw_pushes"]

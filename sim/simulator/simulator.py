@@ -37,8 +37,8 @@ from sim.simulator.results import (
     status_message,
 )
 from sim.simulator.rollout_duration import simulator_for_duration
-from sim.simulator.row_batch import RowStepping
 from sim.simulator.settings import Settings, default_kappa, with_accuracy
+from sim.simulator.step_batch import BatchStepping
 from solvers.status import Status
 from solvers.types import Floats
 
@@ -48,7 +48,7 @@ _SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order", "divi
 _ORDERS = (2, 4, 6, 8)
 
 
-class Simulator(RowStepping):
+class Simulator(BatchStepping):
     """A mechanism, a time step, and the accuracy of its steps.
 
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.

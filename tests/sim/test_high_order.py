@@ -111,7 +111,7 @@ def test_batches_steps_and_copies_agree_with_rollouts() -> None:
         np.testing.assert_array_equal(run.rollout(x, us[1]).x, batch.x[1])
     rows = sim.step_batch(np.tile(x, (2, 1)), us[:, 0], derivatives=True)
     np.testing.assert_array_equal(rows.x, batch.x[:, 1])
-    np.testing.assert_array_equal(sim.single_row().step(x[None], us[0, :1]).x, batch.x[:1, 1])
+    np.testing.assert_array_equal(sim.stepper().step(x[None], us[0, :1]).x, batch.x[:1, 1])
     A, B = sim.linearize(x, us[1, 0])
     np.testing.assert_array_equal(rows.A[1], A)
     np.testing.assert_array_equal(rows.B[1], B)

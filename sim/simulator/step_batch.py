@@ -18,6 +18,7 @@ from sim.integrators.rollout import Linearized, MotionBuffers
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory_limit import room_for
+from sim.mechanism.renamed import renamed
 from sim.mechanism.short_repr import short_repr
 from sim.model.interruptible_loops import pieces
 from sim.model.record_columns import Dry, StepReport, StepSetting
@@ -267,7 +268,7 @@ class RowBatch:
                 x_next[rows] = found[:, -1]
 
 
-class SingleRow:
+class KnotStepper:
     """Knots of one row after another, in buffers of its own: its threads and arrays would take as long as its steps.
 
     Args:
@@ -339,7 +340,7 @@ class SingleRow:
         return self._motion.contacts[-1:]
 
 
-class RowStepping(StateSpace):
+class BatchStepping(StateSpace):
     """Steps of independent rows, for simulators."""
 
     def step_batch(
@@ -392,8 +393,8 @@ class RowStepping(StateSpace):
         derivatives = checks.flag(f"{call}(derivatives=...)", derivatives)
         kept = self._impulses(call, impulses, count)
         alone = count == 1 and kappa is None and not parameters and not derivatives and not len(kept)
-        if alone and self.has_single_rows:
-            return checked(self.single_row(steps, contacts).step(states, inputs), throw)
+        if alone and self.has_stepper:
+            return checked(self.stepper(steps, contacts).step(states, inputs), throw)
         kappas = np.full(count, np.nan)
         if kappa is not None:
             if self.order > 2:
@@ -449,44 +450,47 @@ class RowStepping(StateSpace):
         return RowImpulses.of(self._engine.model, 0)
 
     @cached_property
-    def _single_rows(self) -> dict[tuple[int, int, bool], SingleRow]:
+    def _steppers(self) -> dict[tuple[int, int, bool], KnotStepper]:
         """By threads, numbers of steps, and whether they keep contacts."""
         return {}
 
-    def single_row(self, substeps: int = 1, contacts: bool = False) -> SingleRow:
-        """The steps of a single row, as `step_batch` takes them, without checks of arguments: for many short calls.
+    def stepper(self, substeps: int = 1, contacts: bool = False) -> KnotStepper:
+        """Steps of a single state, as `step_batch` takes them, without checks of arguments: for many short calls.
 
         Args:
             substeps: time steps per knot.
             contacts: whether those of the last step are kept.
 
         Returns:
-            SingleRow of this thread, whose `step(X, U)` takes finite (1, nx) and (1, nu).
+            KnotStepper of this thread, whose `step(X, U)` takes finite (1, nx) and (1, nu).
 
         Raises:
-            ValueError: substeps is not a whole number above 0, or the simulator has no single rows.
+            ValueError: substeps is not a whole number above 0, or the simulator has no stepper.
         """
         if type(substeps) is not int or type(contacts) is not bool:
-            substeps = checks.whole_number("Simulator.single_row(substeps)", substeps)
-            contacts = checks.flag("Simulator.single_row(contacts)", contacts)
+            substeps = checks.whole_number("Simulator.stepper(substeps)", substeps)
+            contacts = checks.flag("Simulator.stepper(contacts)", contacts)
         key = get_ident(), substeps, contacts
-        if key not in self._single_rows:
+        if key not in self._steppers:
             each = 8.0 * (self.nx + self.nu + REPORT)
-            steps = room_for("Simulator.single_row(substeps)", substeps, each)
-            if not self.has_single_rows:
+            steps = room_for("Simulator.stepper(substeps)", substeps, each)
+            if not self.has_stepper:
                 raise ValueError(
-                    "Simulator.single_row: expected a simulator without an accuracy, and of order 2 where there are "
+                    "Simulator.stepper: expected a simulator without an accuracy, and of order 2 where there are "
                     "contacts or limits"
                 )
-            self._single_rows[key] = SingleRow(self.mechanism, self._engine, steps, contacts)
-        return self._single_rows[key]
+            self._steppers[key] = KnotStepper(self.mechanism, self._engine, steps, contacts)
+        return self._steppers[key]
 
     @property
-    def has_single_rows(self) -> bool:
-        """Whether the simulator has single rows: only with steps of one order in compiled loops, without an
+    def has_stepper(self) -> bool:
+        """Whether the simulator has a `stepper`: only with steps of one order in compiled loops, without an
         accuracy.
         """
         return self._engine.in_one_kernel
+
+    single_row = renamed("stepper")
+    has_single_rows = renamed("has_stepper")
 
     @cached_property
     def _row_models(self) -> RowModels:
