@@ -18,7 +18,7 @@ from sim.simulator.npz_file import check_head, check_shapes, reading, write_npz
 from sim.simulator.results import FeedbackRollout
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
-from solvers.types import Matrix, Stack
+from solvers.types import Matrix, Stack, Vector
 
 __all__ = ["History", "Plan"]
 
@@ -163,7 +163,8 @@ class Plan:
         """The plan under its own gains, each knot simulated to an accuracy, its input held.
 
         Impacts happen at their own times, not at those of the plan's steps. States of such a simulator have the
-        velocities of nodes, so those of the plan are converted.
+        velocities of nodes, so that of the first state is converted. The gains compare the others with the plan's mean
+        velocities, for which they were made.
 
         Args:
             accuracy: error of the joint coordinates per second of motion [m/s, rad/s], see `Simulator`.
@@ -181,9 +182,19 @@ class Plan:
             raise ValueError("Plan.replay: expected a plan with its simulator")
         smoothing = {} if kappa is None else {"kappa": kappa}
         exact = sim.replace(time_step=self.time_step * self.substeps, order=2, accuracy=accuracy, **smoothing)
-        nodes = np.concatenate([self.x[:, : sim.nq], sim.velocity(self.x)], axis=1)
         limits = sim.mechanism.input_limits if problem is None else problem.control_limits
-        return cast(FeedbackRollout, exact.rollout_feedback(nodes[0], self.u, xs=nodes, Ks=self.K, limits=limits))
+        found = exact.rollout_feedback(self._start(sim), self.u, xs=self.x, Ks=self.K, limits=limits)
+        return cast(FeedbackRollout, found)
+
+    def _start(self, sim: Simulator) -> Vector:
+        """(nx,) the first state, with the velocity at its node: the mean of those over the steps before and after.
+
+        `Simulator.velocity` is the one before the ground acts there: half a step of falling for a robot that stands.
+        """
+        if sim.order > 2 or sim.accuracy is not None:
+            return self.x[0]
+        after = sim.step_batch(self.x[:1], self.u[:1]).x[0, sim.nq :]
+        return np.concatenate([self.x[0, : sim.nq], 0.5 * (self.x[0, sim.nq :] + after)])
 
     def summary(self) -> str:
         """The table of iterations and a closing line.
