@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import warnings
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +21,7 @@ from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory_limit import check_room
 from sim.mechanism.shape_contacts import shape_contacts
-from sim.mechanism.shapes import Solid, Sphere
+from sim.mechanism.shapes import Solid, Sphere, rotation_matrices
 from sim.simulator.inverse_kinematics import ik
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
@@ -36,7 +37,8 @@ _REST = 0.2  # of the duration, at the end
 _PLACE, _TURN, _ANGLE, _RATE = 1.0, 1.0, 0.1, 0.01
 _EFFORT = 0.01  # of squares of a torque, in units of the largest that holds the arm
 _ROUGH = 0.5  # friction of an object whose shapes have none
-_TIP = "the ball that pushes"
+_TIP, _WRIST = "the ball that pushes", "the joint of the ball's link"
+_POSTURES = ((-1.0, 0.0), (-1.0, 1.0), (0.0, 1.0))  # directions from the ball to that joint: along the way, and upwards
 
 
 @checked_numbers("problems")
@@ -57,9 +59,10 @@ def push(
 
     The object stands with its x axis in the direction of the push. The hand is a ball at a frame of the arm; it begins
     1 cm behind the object, at the height of its centre of mass. In the guess the hand moves straight ahead with the
-    object in front of it, under the torques that hold the arm, without contact. Place and heading of the object at the
-    end are constraints, and both are at rest there. The friction of the object's shapes, 0.5 where they have none, acts
-    at the table and at the ball.
+    object in front of it, under the torques that hold the arm, without contact. The links of the arm have no contacts
+    with the object and the table. They stay outside of both where the arm can; a warning tells where it cannot. Place
+    and heading of the object at the end are constraints, and both are at rest there. The friction of the object's
+    shapes, 0.5 where they have none, acts at the table and at the ball.
 
     Args:
         arm: the mechanism, or its simulator, whose time step is then `time_step`; its own contacts are omitted.
@@ -81,7 +84,8 @@ def push(
         TypeError: `arm` is neither a mechanism nor a simulator, or `object` no body.
         ValueError: the frame is unknown, the hand cannot reach the object or its goal, or an argument is out of range.
     """
-    kin = _arm(arm, frame, offset, time_step)
+    checks.number(f"{_CALL}(radius=...)", radius, above=0.0)
+    kin = _arm(arm, frame, offset, radius, time_step)
     alone = kin.sim
     if not isinstance(object, Body):
         raise TypeError(f"{_CALL}(object): expected a Body, got {object!r}")
@@ -89,7 +93,6 @@ def push(
     far = float(np.linalg.norm(way))
     if far == 0.0:
         raise ValueError(f"{_CALL}(goal): expected a displacement along the table, got zero")
-    checks.number(f"{_CALL}(radius=...)", radius, above=0.0)
     checks.number(f"{_CALL}(duration=...)", duration, above=0.0)
     q = alone.neutral()[: alone.nq]
     q = q if start is None else np.array(checks.array(f"{_CALL}(start=...)", start, (alone.nq,)))
@@ -101,7 +104,8 @@ def push(
     share = np.clip(np.arange(-1.0, horizon + 1.0) / ((1.0 - _REST) * horizon), 0.0, 1.0)
     moved = -_GAP + (far + _GAP) * _smooth(share)
     hand = up - (_half(object, np.array([-1.0, 0.0, 0.0])) + radius) * forward + moved[:, None] * forward
-    below, hands = _reached(kin, q, [below, *(_ahead(kin, way) if start is None and at is None else ())], hand)
+    tables = [below, *(_ahead(kin, way) if start is None and at is None else ())]
+    below, hands = _reached(kin, q, tables, hand, _Course(object, np.array(up), forward, np.maximum(moved, 0.0)))
     place = below + up
     pose = np.array([*place, *_heading(forward)])
     sim = _scene(kin, object, pose, radius, float(below[2]))
@@ -122,8 +126,10 @@ def push(
     )
 
 
-def _arm(arm: Mechanism | Simulator, frame: str | None, offset: ArrayLike, time_step: float) -> Kinematics:
-    """Kinematics of the arm without its contacts, with the frame of the ball."""
+def _arm(
+    arm: Mechanism | Simulator, frame: str | None, offset: ArrayLike, radius: float, time_step: float
+) -> Kinematics:
+    """Kinematics of the arm without its contacts, with the frames of the ball and of the joint of its link."""
     mech = arm.mechanism if isinstance(arm, Simulator) else arm
     if not isinstance(mech, Mechanism):
         raise TypeError(f"{_CALL}(arm): expected a Mechanism or a Simulator, got {arm!r}")
@@ -131,6 +137,11 @@ def _arm(arm: Mechanism | Simulator, frame: str | None, offset: ArrayLike, time_
     kin = Kinematics(Simulator(replace(mech, contacts=(), collisions=()), time_step=time_step))
     checks.one_of(f"{_CALL}(frame=...)", frame, kin.frames)
     kin.add(_TIP, frame, checks.vector(f"{_CALL}(offset=...)", offset, 3))
+    number, origin, turn = kin.place(frame)
+    joint = next(joint for joint in mech.joints if joint.child == mech.body_names[number])
+    wrist = np.asarray(joint.child_point, dtype=float)
+    if np.linalg.norm(wrist - kin.place(_TIP)[1]) > radius:  # otherwise its direction from the ball says nothing
+        kin.add(_WRIST, frame, turn.T @ (wrist - origin))
     return kin
 
 
@@ -186,25 +197,85 @@ def _ahead(kin: Kinematics, way: Floats) -> list[Floats]:
     return [base + share * reach / far * way for share in _AHEAD if share * reach + far < reach]
 
 
-def _reached(kin: Kinematics, q: Floats, tables: list[Floats], hand: Floats) -> tuple[Floats, Floats]:
-    """The first of some points (3,) from which the hand (n, 3) can go its way, and the coordinates (n, nq) there."""
-    errors = []
+@dataclass(frozen=True)
+class _Course:
+    """Where the object is while it is pushed."""
+
+    object: Body
+    up: Floats  # (3,) from the table to its centre of mass [m]
+    forward: Floats  # (3,) direction of the way
+    moved: Floats  # (n,) distances along it [m]
+
+    def is_clear(self, kin: Kinematics, below: Floats, hands: Floats) -> bool:
+        """Whether joints and centres of mass of the arm stay above the table and outside the object.
+
+        Args:
+            kin: of the arm.
+            below: (3,) point of the table below the object at the beginning [m].
+            hands: (n, nq) coordinates of the arm.
+        """
+        mech = kin.mechanism
+        bodies = kin.sim.maximal(np.concatenate([hands, np.zeros((len(hands), kin.sim.nv))], axis=1))
+        number = {name: k for k, name in enumerate(mech.body_names)}
+        points = [bodies[:, k, :3] for k in range(len(number))]
+        for joint in mech.joints:
+            if joint.parent in number:  # that of the base may be on the table
+                body = bodies[:, number[joint.child]]
+                points.append(
+                    body[:, :3] + rotation_matrices(body[:, 6:10]) @ np.asarray(joint.child_point, dtype=float)
+                )
+        arm = np.array(points)
+        axes = np.array([self.forward, np.cross([0.0, 0.0, 1.0], self.forward), [0.0, 0.0, 1.0]])
+        relative = (arm - (below + self.up + self.moved[:, None] * self.forward)) @ axes.T
+        low = [-_half(self.object, -axis) for axis in np.eye(3)]
+        high = [_half(self.object, axis) for axis in np.eye(3)]
+        inside = np.all((relative > low) & (relative < high), axis=-1)
+        return not np.any(inside) and bool(np.all(arm[..., 2] > below[2]))
+
+
+def _reached(kin: Kinematics, q: Floats, tables: list[Floats], hand: Floats, course: _Course) -> tuple[Floats, Floats]:
+    """The first of some points (3,) of the table from which the hand (n, 3) can go its way, and the coordinates (n, nq)
+    of the arm there: such that its links go through neither object nor table, if there are any.
+    """
+    errors, possible = [], []
     for below in tables:
-        try:
-            return below, _follow(kin, q, below + hand)
-        except ValueError as error:
-            errors.append(error)
-    raise errors[0]
+        for posture in (None, *(_POSTURES if _WRIST in kin.frames else ())):
+            try:
+                hands = _follow(kin, q, below + hand, posture, course.forward)
+            except ValueError as error:
+                errors.append(error)
+                continue
+            if course.is_clear(kin, below, hands):
+                return below, hands
+            possible.append((below, hands))
+    if not possible:
+        raise errors[0]
+    warnings.warn(
+        f"{_CALL}: links of the arm go through the object or the table, whose contacts with them are omitted; give "
+        "offset=... to the end of the hand, at=..., or start=...",
+        stacklevel=4,
+    )
+    return possible[0]
 
 
-def _follow(kin: Kinematics, q: Floats, tips: Floats) -> Floats:
-    """(n, nq) coordinates of the arm with its ball at the places (n, 3), each from those before."""
-    out = []
+def _follow(kin: Kinematics, q: Floats, tips: Floats, posture: tuple[float, float] | None, forward: Floats) -> Floats:
+    """(n, nq) coordinates of the arm with its ball at the places (n, 3), each from those before.
+
+    posture: direction from the ball to the joint of its link, along `forward` and upwards (None: any).
+    """
+    out: list[Floats] = []
+    wrist = np.zeros(3)
+    if posture is not None:
+        direction = posture[0] * forward + [0.0, 0.0, posture[1]]
+        length = float(np.linalg.norm(kin.place(_WRIST)[1] - kin.place(_TIP)[1]))
+        wrist = length / float(np.linalg.norm(direction)) * direction
     for place in tips:
-        found = ik(kin, {_TIP: place}, q)
+        found = ik(kin, {_TIP: place} | ({} if posture is None else {_WRIST: place + wrist}), q)
         if not found.success:
+            where = "go on with the object to its goal" if out else "begin behind the object"
             raise ValueError(
-                f"{_CALL}(at=..., goal): the hand at {np.round(place, 3)}: {found.message} Give at=..., or start=..."
+                f"{_CALL}(goal, at=...): the hand cannot {where}, at {np.round(place, 3)}: {found.message} Give a "
+                "nearer goal, at=..., or start=..."
             )
         q = found.q
         out.append(q)

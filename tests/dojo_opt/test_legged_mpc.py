@@ -63,11 +63,32 @@ def test_an_arm_that_is_folded_finds_a_place_to_push_from():
     ]  # fmt: skip
     arm = dojo.Mechanism([dojo.Body(name, 1.0, shape=link) for name in names], joints)
     box = dojo.Body("box", 0.2, shape=dojo.Box(0.1, 0.1, 0.1))
-    problem = dojo.problems.push(arm, box, (0.0, 0.1), duration=0.5)
+    tip = (0.0, 0.0, 0.15)
+    problem = dojo.problems.push(arm, box, (0.0, 0.1), offset=tip, duration=0.5)
     at = problem.sim.mechanism.q_slice("box").start
     assert problem.start[at] == pytest.approx(0.0, abs=1e-9) and 0.2 < problem.start[at + 1] < 0.6
     with pytest.raises(ValueError, match=r"out of reach.*start=\.\.\."):
-        dojo.problems.push(arm, box, (0.0, 0.1), at=(0.0, 0.0, 0.0))
+        dojo.problems.push(arm, box, (0.0, 0.1), offset=tip, at=(0.0, 0.0, 0.0))
+
+
+def test_links_of_a_pushing_arm_stay_outside_the_object():
+    """From its neutral state the arm reached behind the box with its wrist inside it, of which nothing was said."""
+    half = np.array([0.1, 0.1, 0.15])
+    box = dojo.Body("box", 0.5, shape=dojo.Box(*(2.0 * half)))
+    problem = dojo.problems.push(dojo.models.panda(gripper=False), box, (0.2, 0.0))
+    bodies = problem.sim.maximal(problem.states0)[..., :3]
+    links, thing = bodies[:, :-1], bodies[:, -1:]
+    assert problem.sim.mechanism.body_names[-1] == "box"
+    assert (np.abs(links - thing) > half).any(axis=-1).all() and links[..., 2].min() > 0.0
+
+
+def test_links_that_cannot_stay_outside_are_told():
+    """The ball is at the rear end of a sliding rod."""
+    joints = [dojo.Joint("prismatic", None, "rod", axis=(0, 1, 0), parent_point=(0, 0, 0.05))]
+    arm = dojo.Mechanism([dojo.Body("rod", 1.0, shape=dojo.Box(0.02, 0.2, 0.02))], joints)
+    box = dojo.Body("box", 0.2, shape=dojo.Box(0.1, 0.1, 0.1))
+    with pytest.warns(UserWarning, match="go through the object"):
+        dojo.problems.push(arm, box, (0.0, 0.1), offset=(0.0, -0.1, 0.0), duration=0.2)
 
 
 @pytest.mark.slow
