@@ -73,6 +73,8 @@ def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None,
     call, out = "identify(trajectories)", []
     if isinstance(trajectories, Trajectory) or not isinstance(trajectories, Iterable):
         raise TypeError(f"{call}: expected a list of motions, got {checks.shown(trajectories)}")
+    if isinstance(trajectories, tuple) and [getattr(part, "ndim", 0) for part in trajectories] == [2, 2]:
+        raise TypeError(f"{call}: expected a list of motions, got one pair; give a list: [(states, inputs)]")
     for number, given in enumerate(trajectories):
         raw = (given.x, given.u) if isinstance(given, Trajectory) else states_and_inputs(call, given)
         us = checks.array(call, raw[1], ("T", sim.nu))

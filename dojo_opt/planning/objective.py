@@ -92,6 +92,16 @@ class Objective:
         for term in (*self.costs, *self.constraints):
             term.expand(xs, us, self.g, self.H)
 
+    def term_not_finite(self, xs: Matrix, us: Matrix) -> str:
+        """The first cost or constraint whose residual or derivatives at (xs, us) are not finite, as a sentence."""
+        for kind, terms in (("cost", self.costs), ("constraint", self.constraints)):
+            for number, term in enumerate(terms):
+                g, H = np.zeros_like(self.g), np.zeros_like(self.H)
+                term.expand(xs, us, g, H)
+                if not all(np.isfinite(part).all() for part in (term.residual, g, H)):
+                    return f" It is {kind} {number}, {term.title}."
+        return ""
+
     def worst(self, xs: Matrix, us: Matrix) -> tuple[float, str]:
         """Largest violation of a constraint, and which entry of which it is."""
         found = 0.0, ""

@@ -173,6 +173,11 @@ class ResidualKernels:
         self._layout = np.zeros(0, dtype=np.int64)
         self._scratch = self._frozen = np.zeros((0, 0))
 
+    @property
+    def name(self) -> str:
+        """Name of the user's residual."""
+        return self._residual[0]
+
     def values(self, xs: Matrix, us: Matrix, knots: Integers, out: Matrix) -> None:
         """out[i] = r(x, u) at knots[i]."""
         self._run(self._residual, self._layout, xs, us, knots, out, _NO_ROWS)

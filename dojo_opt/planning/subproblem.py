@@ -152,6 +152,8 @@ class Subproblem:
             knots = [k for part in parts for k in np.flatnonzero(~np.isfinite(part).reshape(len(part), -1).all(axis=1))]
             if knots:
                 self.detail = f" In the derivatives of the {name}, at knot {min(knots)}."
+                if name == "costs":
+                    self.detail += self._objective.term_not_finite(now.x, now.u)
                 return Status.NOT_FINITE
         value = value_hessian(self._buffer, self._problem.sim.ndx)
         if predicted.status == Status.NOT_FINITE or not np.all(np.isfinite(value)):

@@ -16,7 +16,6 @@ from sim.simulator.simulator import Simulator
 from solvers.rotation import inverse_right_jacobian
 from solvers.types import Integers, Matrix, Stack, Vector
 
-_UNIT = 1e-6  # by how much the length of a quaternion may be off
 _ROUNDED = 1e-12  # below, it is as near to one as sums get
 
 
@@ -79,6 +78,11 @@ class Term:
     def entry_name(self, sim: Simulator, entry: int) -> str:
         """The subject of an entry of the residual, in words."""
         return f"entry {entry}" if self.columns is None else component_name(sim, int(self.columns[entry]))
+
+    @property
+    def title(self) -> str:
+        """Its name in a message."""
+        return self.name
 
     def at_kappa(self, kappa: float | None) -> None:
         """Take forces at this central-path parameter from now on; None for that of the simulator."""
@@ -187,6 +191,10 @@ class ResidualTerm(Term):
         self._kernels = kernels
         self._layout = layout
 
+    @property
+    def title(self) -> str:
+        return f"{self.name} of {self._kernels.name!r}"
+
     def update(self, xs: Matrix, us: Matrix) -> None:
         self._kernels.values(xs, us, self.knots, self.residual)
 
@@ -218,7 +226,7 @@ def state_table(call: str, value: ArrayLike, rows: int, columns: int, layout: In
         part = states[:, first : first + 4]
         length = np.linalg.norm(part, axis=1)
         off = np.abs(length - 1.0)
-        if off.max(initial=0.0) > _UNIT:
+        if off.max(initial=0.0) > checks.UNIT:
             row = int(off.argmax())
             raise ValueError(
                 f"{call}: expected a unit quaternion (w, x, y, z) at [{first}:{first + 4}], got length {length[row]:g}"

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _CURVES = 3  # coordinates that are drawn: those that move most
 _NAMED = 14  # parameters whose names fit beside the correlations
+_DARK = 0.6  # correlations above have a dark field
 _SPAN = 5.0  # deviations that the histogram covers
 
 __all__ = ["identification"]
@@ -81,10 +82,14 @@ def _histogram(found: Identified, residuals: list[Floats], ax: Axes) -> None:
 
 def _correlations(found: Identified, ax: Axes) -> None:
     """Correlations of the parameters."""
-    image = ax.imshow(found.correlation, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
-    ax.figure.colorbar(image, ax=ax, label="correlation of the estimates")
+    image = ax.imshow(found.correlation, vmin=-1.0, vmax=1.0, cmap="RdBu_r", aspect="auto")
+    ax.figure.colorbar(image, ax=ax, label="correlation of the estimates", pad=0.02)
     n = len(found.labels)
     if n <= _NAMED:
+        for i, j in np.ndindex(n, n):
+            value = float(found.correlation[i, j])
+            color = "white" if abs(value) > _DARK else "black"
+            ax.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=7, color=color)
         ax.set_xticks(range(n), found.labels, rotation=60, ha="right", fontsize=7)
         ax.set_yticks(range(n), found.labels, fontsize=7)
     else:
@@ -93,7 +98,19 @@ def _correlations(found: Identified, ax: Axes) -> None:
 
 def _iterations(found: Identified, ax: Axes) -> None:
     """The cost over the iterations, by smoothing."""
+    from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+
     for kappa in dict.fromkeys(record["kappa"] for record in found.history):
         some = [record for record in found.history if record["kappa"] == kappa]
         ax.semilogy([r["iteration"] for r in some], [r["rms"] for r in some], "o-", label=f"kappa {kappa:.0e} N s m")
+    if ax.lines:
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        ax.yaxis.set_minor_formatter(NullFormatter() if _decades(found) > 1.0 else ax.yaxis.get_major_formatter())
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     finish(ax, "rms of the residuals over their noise", "iteration")
+
+
+def _decades(found: Identified) -> float:
+    """Decades that the cost spans."""
+    values = [record["rms"] for record in found.history if record["rms"] > 0.0]
+    return float(np.ptp(np.log10(values))) if values else 0.0

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 
+_MOST, _DOTS = 8, 80  # lines of a panel of contacts; points of a path that are marked
 _FEW_DOFS, _COLUMNS = 10, 6  # up to so many degrees of freedom share a panel; so many branches fit beside one another
 
 
@@ -125,14 +126,45 @@ def controls(m: Motion, ax: Axes) -> Axes:
 
 @panel
 def contact_forces(m: Motion, ax: Axes) -> Axes:
-    """Mean normal force over each step of every loaded contact; the size of its friction force is dotted."""
+    """Mean normal force over each step of every loaded contact; the size of its friction force is dotted.
+
+    More than 8 loaded contacts are added up by body, and of more than 8 bodies the most loaded 7 have a line of their
+    own.
+    """
     edges = np.concatenate([[0.0], m.contact_time])
+    lines, many = _forces(m)
+    for i, (name, normal, friction) in enumerate(lines):
+        ax.stairs(normal, edges, baseline=None, label=name, color=f"C{i % 10}")
+        ax.stairs(friction, edges, baseline=None, linestyle=":", color=f"C{i % 10}")
+    by = "by body " if many else ""
+    return _finish(ax, f"contact forces {by}[N] (dotted: friction)", "time [s]", at_lines=True)
+
+
+def _forces(m: Motion) -> tuple[list[tuple[str, Any, Any]], bool]:
+    """(name, normal force (T,), friction (T,)) of each line, and whether they are those of bodies."""
     peak = m.normal_force.max(axis=0, initial=0.0)
-    for i, k in enumerate(np.flatnonzero(peak > 1e-3 * peak.max(initial=0.0))):
-        name, color = m.mechanism.contact_names[k], f"C{i % 10}"
-        ax.stairs(m.normal_force[:, k], edges, baseline=None, label=name, color=color)
-        ax.stairs(m.friction_force[:, k], edges, baseline=None, linestyle=":", color=color)
-    return _finish(ax, "contact forces [N] (dotted: friction)", "time [s]", at_lines=True)
+    loaded = np.flatnonzero(peak > 1e-3 * peak.max(initial=0.0))
+    mech = m.mechanism
+    if len(loaded) <= _MOST:
+        return [(mech.contact_names[k], m.normal_force[:, k], m.friction_force[:, k]) for k in loaded], False
+    points = [*mech.contacts, *mech.contact_candidates]
+    groups: dict[str, list[int]] = {}
+    for k in loaded:
+        groups.setdefault(_body_of(points[k]), []).append(int(k))
+    sums = [
+        (name, m.normal_force[:, ks].sum(axis=1), m.friction_force[:, ks].sum(axis=1)) for name, ks in groups.items()
+    ]
+    sums.sort(key=lambda line: -float(line[1].max(initial=0.0)))
+    if len(sums) > _MOST:
+        rest = sums[_MOST - 1 :]
+        others = sum(line[1] for line in rest), sum(line[2] for line in rest)
+        sums = [*sums[: _MOST - 1], (f"{len(rest)} others", *others)]
+    return sums, True
+
+
+def _body_of(point: Any) -> str:
+    """The body of a contact, or the name of a collision."""
+    return str(getattr(point, "body", None) or point.collision)
 
 
 @panel
@@ -141,6 +173,10 @@ def paths(m: Motion, ax: Axes) -> Axes:
     side = int(np.ptp(m.position[:, :, 1], axis=0).max() > np.ptp(m.position[:, :, 0], axis=0).max())
     names = m.mechanism.body_names
     feet = [c for c in m.mechanism.contacts if c.body != names[0]]
+    if len(feet) > _MOST:  # the lowest point of every body at the end of the tree
+        inner = {joint.parent for joint in m.mechanism.joints}
+        ends = {c.body: c for c in sorted(feet, key=lambda c: -_height(m, c)) if c.body not in inner}
+        feet = list(ends.values())[-_MOST:]
     drawn = [(names[0], m.position[:, 0])]
     for foot in feet:
         path = m.points(names.index(foot.body), foot.point)
@@ -148,11 +184,18 @@ def paths(m: Motion, ax: Axes) -> Axes:
     if not feet:
         drawn += [(name, m.position[:, k]) for k, name in enumerate(names[1:], start=1)]
     for label, path in drawn:
-        (line,) = ax.plot(path[:, side], path[:, 2], marker=".", markersize=4, label=label)
+        marker = "." if len(path) <= _DOTS else ""
+        (line,) = ax.plot(path[:, side], path[:, 2], marker=marker, markersize=4, label=label)
         ax.plot(path[-1, side], path[-1, 2], marker="o", color=line.get_color())
     _ground(m, side, ax)
     ax.set_aspect("equal", adjustable="datalim")
     return _finish(ax, "height [m]", f"{'xy'[side]} [m]")
+
+
+def _height(m: Motion, foot: Any) -> float:
+    """Least height of a contact [m]."""
+    path = m.points(m.mechanism.body_names.index(foot.body), foot.point)
+    return float(path[:, 2].min()) - float(foot.radius)
 
 
 def _ground(m: Motion, side: int, ax: Axes) -> None:

@@ -89,7 +89,7 @@ def _overview(reports: Mapping[str, Report]) -> Table:
         judged = [row for row in report.rows if row.met is not None]
         missed = [row.name for row in judged if not row.met]
         rows.append([name, report.title, f"{len(judged) - len(missed)} of {len(judged)}", "; ".join(missed)])
-    return Table("", ("study", "", "bars met", "missed"), rows)
+    return Table("", ("study", "", "criteria met", "missed"), rows)
 
 
 def _markdown(reports: Mapping[str, Report], command: str) -> str:

@@ -15,7 +15,8 @@ from sim.dynamics.external_forces import set_external
 from sim.dynamics.state_manifold import normalize_state
 from sim.integrators import rollout, runge_kutta
 from sim.integrators.phases import NEAR, fly
-from sim.integrators.rollout import UNIT, MotionBuffers, options_of, report_step
+from sim.integrators.rollout import MotionBuffers, options_of, report_step
+from sim.mechanism.checks import UNIT
 from sim.model.data import Data
 from sim.model.interruptible_loops import is_due, note_deadline
 from sim.model.layout import data_view, model_view

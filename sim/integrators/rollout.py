@@ -22,6 +22,7 @@ from sim.derivatives.step_gradient import gradient
 from sim.dynamics.external_forces import set_external
 from sim.dynamics.state_manifold import normalize_state
 from sim.integrators.feedback import FeedbackRun, begin_knot, end_knot
+from sim.mechanism.checks import UNIT
 from sim.model.data import Data
 from sim.model.interruptible_loops import is_due, note_deadline
 from sim.model.layout import data_view, model_view
@@ -38,7 +39,6 @@ from solvers.types import Cube, IntegerMatrix, Matrix, Vector
 _SOLVED = int(Status.SOLVED)
 _SINGULAR = int(Status.SINGULAR)
 _NOT_FINITE = int(Status.NOT_FINITE)
-UNIT = 1e-6  # by how much the length of a quaternion may be off
 REFUSED = -1  # in place of a Status: no state, or no inputs
 ACCURACY = 7e-14  # of derivatives, times the stiffness of their contacts over inertia (contact/softening.py)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence, Set
 from difflib import get_close_matches
 from math import isfinite
@@ -14,9 +15,11 @@ from numpy.typing import NDArray
 
 from solvers.types import Floats
 
-_MOST_LISTED = 20  # words in a message
+_MOST_LISTED, _MOST_CLOSE = 20, 5  # words in a message, and those that look like a given one
+_LEAST_LETTERS, _MOST_LETTERS = 4, 60  # of a word whose letters are looked for in others
 _LONG = 8192  # numbers; OpenBLAS divides products of 10,000 and more among threads
 _LONGEST = 200  # characters of a value in a message
+UNIT = 1e-3  # by how much the length of a quaternion may be off, as one typed with four digits is
 LARGEST = 2**53  # up to which floats hold all whole numbers
 
 
@@ -153,11 +156,11 @@ def names(call: str, value: Any) -> tuple[str, ...]:
 
 
 def mapping(call: str, value: Any) -> Mapping[Any, Any]:
-    """`value` as a table; None is an empty one."""
+    """`value` as a dict; None is an empty one."""
     if value is None:
         return {}
     if not isinstance(value, Mapping):
-        raise TypeError(f"{call}: expected a table, {{name: value}}, got {shown(value)}")
+        raise TypeError(f"{call}: expected a dict, {{name: value}}, got {shown(value)}")
     return value
 
 
@@ -171,10 +174,10 @@ def direction(call: str, value: Any) -> tuple[float, ...]:
 
 
 def quaternion(call: str, value: Any) -> tuple[float, ...]:
-    """`value` as a unit quaternion (w, x, y, z); refused when its length is off by more than 1e-6."""
+    """`value` scaled to a unit quaternion (w, x, y, z); refused when its length is off by more than UNIT."""
     out = array(call, value, (4,))
     length = float(np.linalg.norm(out))
-    if abs(length - 1.0) > 1e-6:
+    if abs(length - 1.0) > UNIT:
         raise ValueError(f"{call}: expected a unit quaternion (w, x, y, z), got length {length:g}")
     return tuple(float(x) for x in out / length)
 
@@ -220,26 +223,40 @@ def path(call: str, value: Any) -> Path:
     return Path(text)
 
 
-def one_of(call: str, value: Any, known: Iterable[str]) -> str:
-    """`value` as one of the known words."""
+def one_of(call: str, value: Any, known: Iterable[str], elsewhere: Mapping[str, str] | None = None) -> str:
+    """`value` as one of the known words; elsewhere: words for some of them in other libraries, which are suggested."""
     words = known if isinstance(known, Mapping | Sequence) and not isinstance(known, str) else list(known)
     if not isinstance(value, str) or value not in words:
-        raise ValueError(f"{call}: {shown(value)} is not one of: {listed(words)}{nearest(value, words)}")
+        same = (elsewhere or {}).get(value) if isinstance(value, str) else None
+        hint = f"; did you mean {same!r}?" if same in words else nearest(value, words)
+        raise ValueError(f"{call}: {shown(value)} is not one of: {listed(words, value)}{hint}")
     return value
 
 
-def listed(known: Iterable[str]) -> str:
-    """The known words for a message, the first of them where there are many."""
+def listed(known: Iterable[str], like: Any = None) -> str:
+    """The known words for a message; of many those that look like a word, or the first."""
     words = list(known)
-    rest = f", ... ({len(words)} in all)" if len(words) > _MOST_LISTED else ""
-    return ", ".join(words[:_MOST_LISTED]) + rest if words else "(none)"
+    if len(words) <= _MOST_LISTED:
+        return ", ".join(words) if words else "(none)"
+    return ", ".join(_close(like, words) or words[:_MOST_LISTED]) + f", ... ({len(words)} in all)"
 
 
 def nearest(value: Any, known: Iterable[str]) -> str:
     """The end of a message: "did you mean", when `value` looks like one of the known words; else nothing."""
     words = list(known)
-    close = get_close_matches(value, words, n=1, cutoff=0.6) if isinstance(value, str) and len(words) > 1 else []
+    close = _close(value, words) if len(words) > 1 else []
     return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def _close(value: Any, words: Sequence[str]) -> list[str]:
+    """Up to five words that look like a value, or have all its letters in order, as panda_finger_joint1 has finger1."""
+    if not isinstance(value, str):
+        return []
+    close = get_close_matches(value, words, n=_MOST_CLOSE, cutoff=0.6)
+    if close or not _LEAST_LETTERS <= len(value) <= _MOST_LETTERS:
+        return close
+    letters = re.compile(".*".join(map(re.escape, value.lower())), re.DOTALL)
+    return sorted((word for word in words if letters.search(word.lower())), key=len)[:_MOST_CLOSE]
 
 
 def no_attribute(module: str, name: str, known: Iterable[str]) -> AttributeError:

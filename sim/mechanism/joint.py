@@ -33,6 +33,13 @@ KINDS: dict[str, tuple[int, int]] = {
     "floating": (3, 3),
     "screw": (0, 1),  # about the axis, which it moves along by its pitch in every turn
 }
+# names of kinds in URDF, MJCF and other libraries
+_ELSEWHERE = {
+    "hinge": "revolute", "continuous": "revolute", "rotational": "revolute",
+    "slide": "prismatic", "slider": "prismatic", "linear": "prismatic",
+    "ball": "spherical", "socket": "spherical", "free": "floating", "freejoint": "floating",
+    "weld": "fixed", "welded": "fixed", "rigid": "fixed", "helical": "screw", "universal": "orbital",
+}  # fmt: skip
 
 
 @few_positional
@@ -111,7 +118,7 @@ class Joint:
         checks.name("Joint(child=...)", self.child)
         object.__setattr__(self, "name", checks.name_or("Joint(name=...)", self.name, self.child))
         call = f"Joint({self.name!r}"
-        checks.one_of(f"{call}, kind=...)", self.kind, KINDS)
+        checks.one_of(f"{call}, kind=...)", self.kind, KINDS, _ELSEWHERE)
         object.__setattr__(self, "parent", checks.name_or(f"{call}, parent=...)", self.parent, WORLD))
         for field in ("parent_point", "child_point"):
             object.__setattr__(self, field, checks.vector(f"{call}, {field}=...)", getattr(self, field), 3))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -314,8 +314,15 @@ class Mechanism:
         """
         return _with_obstacle(self, shape, bodies, name, **options)
 
+    if not TYPE_CHECKING:  # which would take it for a promise of any attribute
+
+        def __getattr__(self, name: str) -> Any:
+            """The error for a name that a mechanism does not have, with the way to those of a simulator."""
+            way = f"; a simulator has: dojo.Simulator(mechanism, time_step=0.01).{name}" * (name in _OF_SIMULATORS)
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{way}", name=name, obj=self)
+
     def _coordinates(self, call: str, given: Any) -> tuple[float, ...]:
-        """q from a table by joint, or from a vector; quaternions are checked and normalised."""
+        """q from a dict by joint, or from a vector; quaternions are checked and normalised."""
         q = np.zeros(self.nq)
         table = {} if given is None else given
         if isinstance(table, Mapping):
@@ -348,6 +355,13 @@ _KINDS = {
 }
 
 
+# methods of Simulator that a user may look for here
+_OF_SIMULATORS = (
+    "step", "rollout", "rollout_batch", "step_batch", "linearize", "linearize_rollout", "vjp", "reactions", "describe",
+    "parameters", "maximal", "minimal", "velocity", "state_from_velocity", "energy",
+)  # fmt: skip
+
+
 def _every_dof(joints: Sequence[Joint]) -> tuple[Input, ...]:
     """An input for every degree of freedom of every joint but the floating ones."""
     return tuple(Input(j.name, dof=d) for j in joints if j.kind != "floating" for d in range(j.nv))
@@ -364,6 +378,7 @@ def _parts(call: str, given: Any, kind: type) -> tuple[Any, ...]:
 
 # -- scenes: several robots and objects in one mechanism, obstacles, and other ground ----------------------------------
 
+_FREE = {"low": -np.inf, "gear": 1.0}  # of a report, for an input that its file does not have
 _CLEAR = 1e-9  # [m] between the lowest contact and the ground, see stance.py
 
 
@@ -382,19 +397,44 @@ def _added(mech: Mechanism, other: Mechanism, pose: ArrayLike, prefix: str, name
     joints = [_moved_joint(j, point, quat) for j in parts["joints"]]
     loops = [_moved_joint(j, point, quat) for j in parts["loops"]]
     collisions = [_moved_obstacle(c, point, quat) for c in parts["collisions"]]
-    return Mechanism(
-        [*mech.bodies, *parts["bodies"]],
-        [*mech.joints, *joints],
-        [*mech.contacts, *parts["contacts"]],
-        [*(mech.inputs or ()), *parts["inputs"]],
-        mech.gravity,
-        name,
-        neutral,
-        [*mech.collisions, *collisions],
-        [*mech.loops, *loops],
-        [*mech.gears, *parts["gears"]],
-        [*mech.scenery, *(_moved_visual(v, point, quat) for v in other.scenery)],
-    )
+    carrier, report = _with_report(mech, other, prefix)
+    given: dict[str, Any] = {
+        "bodies": [*mech.bodies, *parts["bodies"]],
+        "joints": [*mech.joints, *joints],
+        "contacts": [*mech.contacts, *parts["contacts"]],
+        "inputs": [*(mech.inputs or ()), *parts["inputs"]],
+        "gravity": mech.gravity,
+        "name": name,
+        "neutral": neutral,
+        "collisions": [*mech.collisions, *collisions],
+        "loops": [*mech.loops, *loops],
+        "gears": [*mech.gears, *parts["gears"]],
+        "scenery": [*mech.scenery, *(_moved_visual(v, point, quat) for v in other.scenery)],
+    }
+    return Mechanism(**given) if report is None else replace(carrier, **{**given, "report": report})
+
+
+def _with_report(mech: Mechanism, other: Mechanism, prefix: str) -> tuple[Mechanism, Any]:
+    """The first of two mechanisms of a scene that comes from a file, and its report for both, with the links of both.
+
+    Frames of the other file that are fixed to the world are omitted: they do not move with its pose.
+    """
+    mine, theirs = getattr(mech, "report", None), getattr(other, "report", None)
+    before, after = (0, len(other.inputs or ())) if mine is not None else (len(mech.inputs or ()), 0)
+    report = mine if mine is not None else theirs
+    if report is None:
+        return mech, None
+    changes: dict[str, Any] = {}
+    for field in fields(report):
+        value = getattr(report, field.name)
+        if isinstance(value, np.ndarray):  # of every input
+            free = _FREE.get(field.name, np.inf)
+            changes[field.name] = np.concatenate([np.full(before, free), value, np.full(after, free)])
+    places = "links" if hasattr(report, "links") else "bodies"
+    added = (getattr(theirs, "links", None) or getattr(theirs, "bodies", None) or {}).items()
+    moved = {prefix + k: replace(link, body=prefix + link.body) for k, link in added if link.body is not None}
+    changes[places] = {**moved, **(getattr(mine, places) if mine is not None else {})}
+    return (mech if mine is not None else other), replace(report, **changes)
 
 
 def _placed(call: str, pose: ArrayLike) -> tuple[Floats, Floats]:

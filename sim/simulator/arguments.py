@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.integrators.feedback import FeedbackLaw
-from sim.integrators.rollout import UNIT
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory_limit import check_room
@@ -39,7 +38,7 @@ class Arguments:
     def states(self, call: str, xs: ArrayLike) -> Floats:
         """A copy of the states (..., nx), with quaternions of length one."""
         out = np.array(xs, dtype=np.float64, order="C")
-        bad = self._engine.states.normalize(out.reshape(-1, self.nx), UNIT)
+        bad = self._engine.states.normalize(out.reshape(-1, self.nx), checks.UNIT)
         if bad >= 0:
             row, body = divmod(bad, self.nbody)
             at = f" in row {row}" if out.ndim > 1 else ""
@@ -91,6 +90,9 @@ class Arguments:
 
     def steps(self, method: str, steps: int | None) -> int:
         """A number of steps whose results fit the memory."""
+        if steps is None:
+            ways = "give us=..., steps=... or, with an accuracy, duration=..."
+            raise ValueError(f"Simulator.{method}(steps=...): expected a whole number >= 1, got None; {ways}")
         number = checks.whole_number(f"Simulator.{method}(steps=...)", steps)
         self.check_room(method, "steps=...", number, 0)
         return number
@@ -178,7 +180,7 @@ class Arguments:
             length = np.linalg.norm(zs[..., BodyState.QUATERNION], axis=-1)
             turn = np.linalg.norm(zs[..., BodyState.SPIN], axis=-1) * self.time_step
         for bad, why in (
-            (np.abs(length - 1.0) > UNIT, "expected a unit quaternion"),
+            (np.abs(length - 1.0) > checks.UNIT, "expected a unit quaternion"),
             (turn >= np.pi, MESSAGES[Status.TURN_TOO_LARGE]),
         ):
             if bad.any():

@@ -140,8 +140,9 @@ def _far_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
         return []
     last = int(np.argmax(np.where(np.isfinite(distances), distances, -np.inf)))
     nearest, farthest = f"{distances.min():.2g}", f"{distances[last]:.2g}"
-    span = f"{nearest} m" if nearest == farthest else f"{nearest} m, {mech.contact_names[last]} {farthest} m"
-    return [f"  {'inactive contacts':<18}omitted from the solver beyond a gap of {span}; their force kappa/gap stays"]
+    span = f"{nearest} m" if nearest == farthest else f"{nearest} m ({mech.contact_names[last]}: {farthest} m)"
+    rest = "they still push with an impulse of kappa/gap"
+    return [f"  {'inactive contacts':<18}omitted from the solver beyond a gap of {span}; {rest}"]
 
 
 def _parts(mech: Mechanism, order: int, second_order: str) -> list[tuple[str, str]]:

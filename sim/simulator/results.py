@@ -430,7 +430,9 @@ def states_and_inputs(call: str, trajectory: Any) -> tuple[Any, Any]:
         return trajectory.x, trajectory.u
     if isinstance(trajectory, tuple | list) and len(trajectory) == 2:
         return trajectory[0], trajectory[1]
-    raise TypeError(f"{call}: expected a Trajectory or (states, inputs), one time step apart, got {trajectory!r}")
+    raise TypeError(
+        f"{call}: expected a Trajectory or (states, inputs), one time step apart, got {checks.shown(trajectory)}"
+    )
 
 
 def status_message(

@@ -4,7 +4,8 @@ dojo_opt: compiling, once: no code is shipped; kept in /home/me/.cache/dojo_opt/
 dojo_opt: compiling function 34 of about 120 (5 s so far, part 2 of 14): the active set of contacts with the ground
 
 The second line is written again and again while it lasts; its words are the first ones of the module of the kernel that
-Python, or the table of optional kernels, asked for. Both are for users who wait: at a terminal or in a notebook.
+Python, or the table of optional kernels, asked for. It is for users who wait at a terminal or in a notebook; elsewhere
+there is the first line alone.
 
 DOJO_OPT_QUIET=1 says nothing.
 """
@@ -26,10 +27,12 @@ _WIDTH = 118
 T = TypeVar("T")
 
 
+def _is_quiet() -> bool:
+    return os.environ.get("DOJO_OPT_QUIET", "0") not in ("", "0") or sys.stderr is None
+
+
 def _is_watched() -> bool:
-    """Whether a user sees the output, and wants to."""
-    if os.environ.get("DOJO_OPT_QUIET", "0") not in ("", "0"):
-        return False
+    """Whether a user sees lines that are written again."""
     return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
 
 
@@ -63,11 +66,13 @@ class _Clock:
         if spent < self.next_word:
             return
         self.next_word = spent + _PATIENCE
-        if not _is_watched():
+        if _is_quiet() or (self.told and not _is_watched()):
             return
         if not self.told:
             self.told = True
-            print(f"dojo_opt: compiling, once{self.reason}", file=sys.stderr)
+            print(f"dojo_opt: compiling, once{self.reason}", file=sys.stderr, flush=True)
+            if not _is_watched():
+                return
         count = f"{len(self.names)} of about {self.expected}" if self.expected else f"{len(self.names)}"
         text = f"dojo_opt: compiling function {count} ({spent:.0f} s so far{self.part}): {self.topic}"
         print(f"\r{text[:_WIDTH]:<{_WIDTH}}", end="", file=sys.stderr, flush=True)

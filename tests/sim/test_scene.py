@@ -140,3 +140,27 @@ def test_contacts_inputs_limits_and_names_are_carried_over():
         assert (new.name, new.parent, new.limits) == (f"a1/{old.name}", f"a1/{old.parent}", old.limits)
     assert both.input_names[-12:] == tuple(f"a1/{name}" for name in robot.input_names)
     np.testing.assert_allclose(both.neutral[-19:], robot.neutral)
+
+
+LINKS = """<robot name="two"><link name="base"><inertial><mass value="1"/>
+  <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+  <collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <link name="tip"/><joint name="weld" type="fixed"><parent link="base"/><child link="tip"/>
+  <origin xyz="0 0 0.3"/></joint></robot>"""
+
+
+def test_merged_links_are_frames_of_a_scene(tmp_path):
+    (tmp_path / "two.urdf").write_text(LINKS)
+    alone = dojo.load_urdf(tmp_path / "two.urdf")
+    q = np.array([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0])
+    tip = dojo.Kinematics(dojo.Simulator(alone, time_step=0.01)).pose("tip", q)[0]
+    both = np.concatenate([q, [0.0, 0.0, 5.0, 1.0, 0.0, 0.0, 0.0]])
+    wall = dojo.Collision(alone.body_names[0], shape_a=dojo.Sphere(0.1), shape_b=dojo.HalfSpace())
+    kin = dojo.Kinematics(dojo.Simulator(alone.add(ball(), prefix="b/").with_collisions(wall), time_step=0.01))
+    np.testing.assert_allclose(kin.pose("tip", both)[0], tip, atol=1e-12)
+    twice = alone.add(alone, prefix="r/")
+    kin = dojo.Kinematics(dojo.Simulator(ball().add(twice), time_step=0.01))
+    places = [
+        kin.pose(name, np.concatenate([both[7:], q, q + [1.0, 0, 0, 0, 0, 0, 0]]))[0] for name in ("tip", "r/tip")
+    ]
+    np.testing.assert_allclose(places, [tip, tip + [1.0, 0.0, 0.0]], atol=1e-12)

@@ -103,10 +103,24 @@ def test_quiet_says_nothing(clock: list[float], terminal: io.StringIO, monkeypat
     assert terminal.getvalue() == ""
 
 
-def test_a_file_is_told_nothing(clock: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_is_told_once(clock: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = watched(monkeypatch, io.StringIO())
+    progress.because("no code is shipped")
+    compile_for(clock, 0.4)
+    assert stream.getvalue() == ""
+    for _ in range(3):
+        compile_for(clock, 9.0)
+    assert stream.getvalue() == "dojo_opt: compiling, once: no code is shipped\n"
+
+
+def test_a_quiet_file_and_no_output_at_all(clock: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DOJO_OPT_QUIET", "1")
     stream = watched(monkeypatch, io.StringIO())
     compile_for(clock, 9.0)
     assert stream.getvalue() == ""
+    monkeypatch.setenv("DOJO_OPT_QUIET", "0")
+    monkeypatch.setattr(progress, "sys", SimpleNamespace(stderr=None, modules={}))
+    compile_for(clock, 9.0)
 
 
 def test_a_notebook_is_told(clock: list[float], monkeypatch: pytest.MonkeyPatch) -> None:

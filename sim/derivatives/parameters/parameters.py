@@ -30,6 +30,8 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.short_repr import short_repr
 from solvers.types import Floats, IntegerMatrix, Vector
 
+_FEW_NAMES = 6  # of a kind in a printed list
+
 __all__ = ["KINDS", "Parameter", "Parameters", "ParameterPlan", "all_parameters"]
 
 
@@ -70,6 +72,19 @@ class Parameters:
     rows: dict[str, slice]
 
     __repr__ = short_repr
+
+    def __str__(self) -> str:
+        """Kinds, how many there are of each, and the names of some."""
+        parts: dict[str, dict[str, int]] = {}
+        for name in self.names:
+            part = name.partition("[")[0]
+            of_kind = parts.setdefault(part.partition(":")[0], {})
+            of_kind[part] = of_kind.get(part, 0) + 1
+        lines = [f"{len(self.names)} parameters; kind, number, names (with [0], [1], ... one component)"]
+        for kind, found in parts.items():
+            rest = f", ... ({len(found)} parts)" if len(found) > _FEW_NAMES else ""
+            lines.append(f"  {kind:<15}{sum(found.values()):>6}  {', '.join(list(found)[:_FEW_NAMES])}{rest}")
+        return "\n".join(lines)
 
     def __getitem__(self, name: str) -> Floats:
         """Values of one name of the selection."""

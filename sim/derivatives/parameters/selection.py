@@ -36,8 +36,10 @@ def chosen(call: str, table: Table, name: str) -> list[Parameter]:
     else:
         found = table.get(name, [])
     if not found:
-        parts = ", ".join(dict.fromkeys(f"{p.kind}:{p.part}" if p.part else p.name for p in of_kind))
-        raise ValueError(f"{call}: no parameter {name!r}; parameters of this kind: {parts or 'none'}")
+        parts = list(dict.fromkeys(f"{p.kind}:{p.part}" if p.part else p.name for p in of_kind))
+        known = checks.listed(parts, name) if parts else "none"
+        hint = checks.nearest(name, [*parts, f"{kind}:{COMMON}"]) if parts else ""
+        raise ValueError(f"{call}: no parameter {name!r}; parameters of this kind: {known}{hint}")
     return found
 
 

@@ -80,7 +80,7 @@ def load_urdf(
         collisions: "self" lets all links collide but those that a joint connects; `report` lists pairs of shapes that
             overlap in the neutral state, which do not. None: the robot does not touch itself.
         meshes: replacement of a collision mesh: "hull", its convex hull reduced to `mesh_corners`; "decompose", several
-            such hulls, by CoACD; "sphere", "box" or "capsule", fitted ones, for feet and for speed; "none"; or a table
+            such hulls, by CoACD; "sphere", "box" or "capsule", fitted ones, for feet and for speed; "none"; or a dict
             of these by link, with "*" for all others. `report` has the largest distances from the meshes. Needs trimesh
             (`pip install "dojo-opt[meshes]"`).
         mesh_corners: largest number of corners of a convex hull. Each is a contact point with the ground, and costs
