@@ -61,7 +61,7 @@ from sim.simulator.results import (
     StepResult as StepResult,
     Trajectory as Trajectory,
 )
-from sim.simulator.row_batch import StepBatch as StepBatch
+from sim.simulator.step_batch import StepBatch as StepBatch
 from sim.mechanism.shapes import (
     Box as Box,
     Capsule as Capsule,

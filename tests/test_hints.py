@@ -69,6 +69,5 @@ def test_a_residual_that_is_no_number_is_named(constraint):
 
 def test_a_push_beyond_the_reach_names_the_goal():
     arm, box = dojo.models.panda(gripper=False), dojo.Body("box", 0.5, shape=dojo.Box(0.1, 0.1, 0.1))
-    check_refused(
-        lambda: dojo.problems.push(arm, box, (2.0, 0.0)), "problems.push(goal): out of reach", "Give a nearer"
-    )
+    words = "problems.push(goal, at=...): the hand cannot", "Give a nearer goal"
+    check_refused(lambda: dojo.problems.push(arm, box, (2.0, 0.0)), *words)

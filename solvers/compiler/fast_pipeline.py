@@ -180,7 +180,7 @@ _PASSES: dict[str, PassManager] = {}  # the same for all kernels
 
 
 def _chosen(name: str, default: PassManager) -> PassManager:
-    """Those of Numba's passes that are not idle."""
+    """Numba's passes that are not idle."""
     chosen = _Passes(name)
     chosen.passes = [(_REPLACED.get(kind, kind), said) for kind, said in default.passes if kind not in _IDLE]
     chosen.finalize()
@@ -203,7 +203,7 @@ class _Compiler(Compiler):
         return [_PASSES["kernel"]]
 
     def untyped_passes(self) -> PassManager:
-        """Those up to Numba's representation without types: of a function whose text becomes part of a kernel."""
+        """The passes up to Numba's representation without types: of a function whose text becomes part of a kernel."""
         if "text" not in _PASSES:
             state = StateDict(func_ir=None, flags=self.state.flags)
             _PASSES["text"] = _chosen("text", DefaultPassBuilder.define_untyped_pipeline(state))
