@@ -60,8 +60,8 @@ class Tracking(Spec):
 
     Attributes:
         reference: (nx,) state, or one row per knot.
-        weight: a number, (ndx,), or one row per knot [1 / square of the component's unit]; or a table by names as in
-            `Mechanism.components`, such as {"base": 10.0, "v": 0.1}. Components without a name in it weigh zero, and
+        weight: a number, (ndx,), or one row per knot [1 / square of the component's unit]; or a dict keyed by names as
+            in `Mechanism.components`, such as {"base": 10.0, "v": 0.1}. Components without a name in it weigh zero, and
             later names override earlier ones.
         knots: numbers of the knots (default None: all T + 1).
         scale: factor of the whole cost (default 1).
@@ -87,7 +87,7 @@ class Effort(Spec):
     """Cost of inputs: scale * sum_t sum_i weight_ti (u_t - reference_t)_i^2.
 
     Attributes:
-        weight: a number, (nu,), (T, nu), or a table by names of inputs [1/N^2, 1/(N m)^2].
+        weight: a number, (nu,), (T, nu), or a dict keyed by names of inputs [1/N^2, 1/(N m)^2].
         reference: (nu,) or (T, nu) inputs [N, N m] (default 0).
         scale: factor of the whole cost (default 1).
     """

@@ -44,7 +44,7 @@ class Legs:
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator.
         feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
-            radii [m] in a table by name (default None: found).
+            radii [m] in a dict keyed by name (default None: found).
         damping: least damper of the joints, as of a motor's controller [N m s/rad] (default None: 0.5 for a robot of
             the weight and height of the A1, in proportion for others; 0 leaves the joints as they are).
         stance: coordinates by joint (default None: found).

@@ -50,7 +50,7 @@ def _numbers(call: str, chosen: Any, count: int) -> Integers:
 
 
 def state_weight(call: str, weight: Any, sim: Simulator) -> Any:
-    """(ndx,) weights from a table by name, zero where none is given; anything else unchanged."""
+    """(ndx,) weights from a dict keyed by name, zero where none is given; anything else unchanged."""
     if not isinstance(weight, Mapping):
         return weight
     out = np.zeros(sim.ndx)
@@ -61,7 +61,7 @@ def state_weight(call: str, weight: Any, sim: Simulator) -> Any:
 
 
 def input_weight(call: str, weight: Any, sim: Simulator) -> Any:
-    """(nu,) weights from a table by the names of inputs, zero where none is given; anything else unchanged."""
+    """(nu,) weights from a dict keyed by names of inputs, zero where none is given; anything else unchanged."""
     if not isinstance(weight, Mapping):
         return weight
     out = np.zeros(sim.nu)

@@ -61,7 +61,7 @@ def trot(
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
         feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
-            radii [m] in a table by name (default None: found).
+            radii [m] in a dict keyed by name (default None: found).
         stance: coordinates of the stance by joint (default None: found).
         **settings: speed [m/s], or distance [m] of all cycles together (speed x period x cycles), step_height [m],
             damping (least damper of the joints [N m s/rad], 0.5 for the quadruped, in proportion for others), further
@@ -98,7 +98,7 @@ def walk(
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
         feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
-            radii [m] in a table by name (default None: found, see `dojo_opt.gaits.legs.Legs`).
+            radii [m] in a dict keyed by name (default None: found, see `dojo_opt.gaits.legs.Legs`).
         stance: coordinates of the stance by joint (default None: found).
         **settings: as for `trot`.
 
@@ -155,7 +155,7 @@ def jump(
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
         feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
-            radii [m] in a table by name (default None: found, see `dojo_opt.gaits.legs.Legs`).
+            radii [m] in a dict keyed by name (default None: found, see `dojo_opt.gaits.legs.Legs`).
         stance: coordinates of the stance by joint (default None: found).
         **settings: distance [m], height [m], damping (least damper of the joints [N m s/rad]), refinement (parts of
             every time step in the second half of `ilqr`, 5; 1 for none), further arguments of `gaits.jump` (crouch,
@@ -230,7 +230,7 @@ def stand_up(
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator.
         feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
-            radii [m] in a table by name (default None: found, as `dojo_opt.gaits.legs.Legs` says).
+            radii [m] in a dict keyed by name (default None: found, as `dojo_opt.gaits.legs.Legs` says).
         low: height of the base at the beginning over that of the stance, between 0 and 1 (default None: 0.55, or the
             least above it for which flat feet stay on the ground under the centre of mass).
         duration: of the rise and the rest [s] (default None: 1 s for a robot as high as the A1, for others in

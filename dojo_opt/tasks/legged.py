@@ -60,7 +60,7 @@ def legged_mpc(
             function of the time [s] that returns it; it is called once per plan (default None: forward at 0.2 m/s for a
             robot of the A1's height, for others in proportion to the root of the height).
         feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
-            radii [m] in a table by name (default None: found).
+            radii [m] in a dict keyed by name (default None: found).
         stance: coordinates of the stance by joint (default None: found).
         period: duration of a cycle of the gait [s] (default None: 12 knots).
         step_height: lift of a swinging foot [m] (default None: 0.05 m for the A1's height).

@@ -206,7 +206,7 @@ class TorqueRate(Spec):
     uses exact gradients and a bound of the curvature.
 
     Attributes:
-        weight: a number, (nu,), one row per knot, or a table by names of inputs [1/N^2, 1/(N m)^2] (default 1).
+        weight: a number, (nu,), one row per knot, or a dict keyed by names of inputs [1/N^2, 1/(N m)^2] (default 1).
         limit: largest change, a number or (nu,) [N, N m] (default None: no limit, but a cost on every change).
         before: (nu,) input before the first knot [N, N m] (default None: the first input is free).
         components: numbers or names of inputs (default None: all).

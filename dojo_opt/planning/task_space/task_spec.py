@@ -30,7 +30,7 @@ class TaskSpec(Spec):
     Attributes:
         lower: least value, a number, one per entry, or one row per knot; infinite where free (default None: none).
         upper: largest value, likewise.
-        weight: a number, one per entry, one row per knot, or a table by names of entries, each a number or one per
+        weight: a number, one per entry, one row per knot, or a dict keyed by names of entries, each a number or one per
             knot; entries without a name in it weigh zero [1 / square of the entry's unit] (default 1).
         knots: numbers of the knots; negative ones count from the end (default None: all of them).
         scale: factor of the whole cost (default 1).
