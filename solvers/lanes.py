@@ -33,7 +33,6 @@ __all__ = [
     "at_least",
     "dot_lanes",
     "keep",
-    "least",
     "load",
     "minus_outer",
     "plus",
@@ -135,21 +134,6 @@ def _total(typing: Any, x: Any) -> Any:
     return types.float64(_LANES), lower
 
 
-def _smaller(builder: Any, x: Any, y: Any) -> Any:
-    return builder.select(builder.fcmp_ordered("<", x, y), x, y)
-
-
-@intrinsic
-def _least(typing: Any, x: Any) -> Any:
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        lanes = [builder.extract_element(args[0], ir.Constant(ir.IntType(32), k)) for k in range(LANES)]
-        while len(lanes) > 1:
-            lanes = [_smaller(builder, a, b) for a, b in zip(lanes[::2], lanes[1::2], strict=True)]
-        return lanes[0]
-
-    return types.float64(_LANES), lower
-
-
 @intrinsic
 def _at_least(typing: Any, x: Any, number: Any) -> Any:
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -205,12 +189,6 @@ def spread(number: float) -> Lanes:
 def total(x: Lanes) -> float:
     """The sum of the lanes, in pairs."""
     return float(x.reshape(-1, 2).sum(axis=1).reshape(-1, 2).sum(axis=1).sum())
-
-
-@compiled_as(_least)
-def least(x: Lanes) -> float:
-    """The smallest lane; not defined where one is NaN."""
-    return float(x.min())
 
 
 @compiled_as(_at_least)
