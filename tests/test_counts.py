@@ -21,6 +21,18 @@ def still(time, x):
     return ZERO
 
 
+def observed(x, out):
+    out[0], out[1] = x[0], x[1]
+
+
+def paid(x, a, after):
+    return 0.0
+
+
+def never(x):
+    return False
+
+
 def study(**given):
     run = {"controller": still, "plant": PLANT, "sampler": lambda rng: dojo.Perturbation(), "duration": 0.05, "runs": 1}
     return dojo.monte_carlo(**{**run, **given})
@@ -65,8 +77,8 @@ COUNTS = {
 
 
 def task():
-    """Hold the pendulum; its functions are not called."""
-    return dojo.learn.Task(SIM, 2, still, 2, still, -ZERO - 1.0, ZERO + 1.0, still, still, steps=5)
+    """Hold the pendulum."""
+    return dojo.learn.Task(SIM, 2, observed, 2, paid, -ZERO - 1.0, ZERO + 1.0, still, never, steps=5)
 
 
 def policy():

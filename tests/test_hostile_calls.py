@@ -38,7 +38,19 @@ def still(time: float, x: Any) -> Any:
     return np.ones(1)
 
 
-TASK = dojo.learn.Task(SIM, 1, still, 2, still, -np.ones(1), np.ones(1), still, still, steps=5)
+def observed(x: Any, out: Any) -> None:
+    out[0], out[1] = x[0], x[1]
+
+
+def paid(x: Any, a: Any, after: Any) -> float:
+    return 0.0
+
+
+def never(x: Any) -> bool:
+    return False
+
+
+TASK = dojo.learn.Task(SIM, 1, observed, 2, paid, -np.ones(1), np.ones(1), still, never, steps=5)
 
 
 @pytest.fixture(scope="module")

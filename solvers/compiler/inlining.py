@@ -23,7 +23,7 @@ class _OwnBlock(ir.Block):
         return self
 
 
-class _Worker(InlineWorker):
+class _Inliner(InlineWorker):
     """Numba's, by the passes of kernels."""
 
     def __init__(self, state: Any, passes: Callable[[], Any]) -> None:
@@ -47,7 +47,7 @@ class Inlining(untyped_passes.InlineInlinables):
 
     def run_pass(self, state: Any) -> bool:
         """Replace each call of such a function by its text; calls in that text, too."""
-        func_ir, worker = state.func_ir, _Worker(state, state.pipeline.untyped_passes)
+        func_ir, worker = state.func_ir, _Inliner(state, state.pipeline.untyped_passes)
         left = list(func_ir.blocks.items())
         changed = False
         while left:
