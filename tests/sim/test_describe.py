@@ -23,7 +23,7 @@ def test_collisions_are_contacts_of_a_step() -> None:
     assert "1 cones, 0 pyramids, 8 without friction" in text
     assert "interior point" in text and "omitted" in text and "Newton" not in text
     assert "\ncontacts\n" not in text
-    assert re.search(r"beyond a gap of 0\.\d+ m, ball-box 0\.\d+ m;", text), text
+    assert re.search(r"beyond a gap of 0\.\d+ m \(ball-box: 0\.\d+ m\);", text), text
 
 
 def test_strings_are_always_active() -> None:
