@@ -193,7 +193,7 @@ class Plan:
         """
         if sim.order > 2 or sim.accuracy is not None:
             return self.x[0]
-        after = sim.step_batch(self.x[:1], self.u[:1]).x[0, sim.nq :]
+        after = sim.step(self.x[0], self.u[0]).x[sim.nq :]
         return np.concatenate([self.x[0, : sim.nq], 0.5 * (self.x[0, sim.nq :] + after)])
 
     def summary(self) -> str:
