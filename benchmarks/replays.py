@@ -19,10 +19,10 @@ import numpy as np
 from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
-from dojo_opt.planning.refinement import replay_error
+from dojo_opt.planning.problem import REPLAY_ACCURACY
+from dojo_opt.planning.refinement import coordinate_error
 from dojo_opt.report.result import Cell, Report, Row, Table
 
-ACCURACY = 1e-5  # [m/s, rad/s] of replays
 ASKED = 0.03  # [m, rad]
 PROBLEMS = ("hop", "block", "trot", "jump", "leap", "humanoid_leap")
 
@@ -31,12 +31,12 @@ def compared(problem: dojo.Problem) -> tuple[list[Cell], bool]:
     """(cells of the plan of a problem, whether its replay comes to the end)."""
     plan = dojo.ilqr(problem)
     begin = time.process_time()
-    replay = plan.replay(accuracy=ACCURACY)
+    replay = plan.replay(accuracy=REPLAY_ACCURACY)
     seconds = time.process_time() - begin
     ended = replay.status == dojo.Status.SOLVED
     off = float(np.abs(replay.x[-1, :3] - plan.x[-1, :3]).max()) if ended else None
     parts = plan.substeps // problem.substeps
-    return [parts, plan.nit, plan.success, off, replay_error(plan), 1e3 * seconds], ended
+    return [parts, plan.nit, plan.success, off, coordinate_error(plan, replay), 1e3 * seconds], ended
 
 
 def run(args: argparse.Namespace) -> Report:

@@ -10,10 +10,10 @@ import numpy as np
 from dojo_opt.planning.options import Options
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import REPLAY_ACCURACY, Problem
-from sim.simulator.results import Interrupted
+from sim.simulator.results import FeedbackRollout, Interrupted
 from solvers.status import MESSAGES, Status
 
-__all__ = ["refine", "replay_error"]
+__all__ = ["coordinate_error", "refine", "replay_error"]
 
 _MOST = 32  # parts of a time step
 
@@ -61,8 +61,12 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
 
 
 def replay_error(plan: Plan) -> float:
+    """`coordinate_error` of the replay of a plan."""
+    return coordinate_error(plan, plan.replay(accuracy=REPLAY_ACCURACY))
+
+
+def coordinate_error(plan: Plan, replay: FeedbackRollout) -> float:
     """Largest difference of a coordinate between a plan and its replay, at any knot [m, rad]; infinite if it ends."""
-    replay = plan.replay(accuracy=REPLAY_ACCURACY)
     if replay.status != Status.SOLVED:
         return np.inf
     sim = plan.simulator
