@@ -14,7 +14,8 @@ from sim.mechanism import checks
 from sim.mechanism.contact import Contact
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.model.state_columns import BodyState
+from sim.mechanism.shapes import rotation_matrix
+from sim.model.state_columns import BaseState, BodyState
 from sim.simulator.inverse_kinematics import ik
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
@@ -24,10 +25,13 @@ __all__ = ["Legs"]
 
 _LOW = 0.3  # of the height of the base: contacts no higher than this above the lowest one may be feet
 _FLAT = 0.01  # [m] contacts this near to the lowest one of a foot carry together
+_ROUND, _OFF_BALL = 0.1, 0.1  # [m] largest radius of a round foot; its error over that
+_THIN = 0.05  # height over width of points below which they tell no radius
 _STRETCH = 0.8  # length of a standing leg over that of a stretched one
 _UPRIGHT = 0.93  # the same on flat feet: bent further, ankles are near their stops, and nothing is left for a crouch
 _BEND = 0.9  # [rad] of the knees where the search for a stance begins
 _PITCH = 0.7  # cosine between the axis of a hinge that bends a leg and y
+_TIPPED = 0.7  # cosine between the z axes of the base and the world below which a robot does not stand
 _TRIES = 4  # starts of each search
 _A1 = (0.29, 118.0)  # height [m] and weight [N] of the robot whose weights the problems have
 
@@ -36,10 +40,11 @@ class Legs:
     """A robot that stands on the feet at the ends of its legs.
 
     The feet are found: the bodies at the ends of the tree that reach down to the ground, with their points that are
-    farthest from the knee, or lowest where there is an ankle. Points within 1 cm of such a one are one ball in their
-    middle, so that a foot from a mesh costs as much as a ball; two feet keep all these points, on which the robot
-    balances. The stance is found, too: hinges about y bend the legs to 0.8 of their length, 0.93 on ankles, with the
-    feet below the hips and the knees to the back where the joint limits allow it.
+    farthest from the knee, or lowest where there is an ankle. Points within 1 cm of such a one are one ball, so that a
+    foot from a mesh costs as much as a ball: the one on which they lie where the mesh is round, else one in their
+    middle. Two feet keep all these points, on which the robot balances. The stance is found, too: hinges about y bend
+    the legs to 0.8 of their length, 0.93 on ankles, with the feet below the hips and the knees to the back where the
+    joint limits allow it.
 
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator.
@@ -70,9 +75,17 @@ class Legs:
         if mech.joints[0].kind != "floating" or mech.nv == 6:
             raise ValueError(f"Legs(robot): expected a robot with legs on a floating base, got {mech!r}")
         if stance is not None:
-            mech = replace(mech, neutral=stance)
+            try:
+                mech = replace(mech, neutral=stance)
+            except ValueError as error:  # of the mechanism, which the user has not made
+                raise ValueError(f"Legs(stance=...): {str(error).partition('): ')[2]}") from error
         mech = replace(mech, contacts=_feet_of(mech, feet), collisions=())
         sim = Simulator(mech, time_step=0.01)
+        if rotation_matrix(sim.neutral()[BaseState.QUATERNION])[2, 2] < _TIPPED:
+            raise ValueError(
+                f"Legs(robot): the base of {mech.name!r} is not upright in the neutral state, z up, from which the "
+                "problems of legs begin; turn it with neutral=..."
+            )
         x = Feet(sim).put_down(sim.neutral() if stance is not None else _stance(sim))
         self.mass = sum(body.mass for body in mech.bodies)
         self.height = float(x[2] - Feet(sim).positions(x)[:, 2].min())
@@ -156,10 +169,27 @@ def _feet_of(mech: Mechanism, given: Any) -> list[Contact]:
             far = [float(np.linalg.norm(np.asarray(c.point) - knee)) + c.radius for c, _ in parts]
         carrying = [c for (c, _), reach in zip(parts, far, strict=True) if reach >= max(far) - _FLAT]
         if len(carrying) > 1 and len(soles) > 2:
-            middle = np.mean([np.asarray(c.point) for c in carrying], axis=0)
-            carrying = [replace(carrying[0], point=middle, radius=max(c.radius for c in carrying), name=body)]
+            middle, radius = _ball(np.array([c.point for c in carrying]), max(c.radius for c in carrying))
+            carrying = [replace(carrying[0], point=middle, radius=radius, name=body)]
         out += carrying
     return out
+
+
+def _ball(points: Floats, radius: float) -> tuple[Floats, float]:
+    """The ball on which points (n, 3) lie, as the corners of a round mesh do; else their middle with a given radius.
+
+    |p|^2 = 2 c.p + r^2 - |c|^2 in the mean of squares.
+    """
+    middle = np.mean(points, axis=0)
+    arms = points - middle
+    if radius == 0.0 and np.linalg.matrix_rank(arms, tol=_THIN * float(np.abs(arms).max(initial=0.0))) == 3:
+        rows = np.concatenate([2.0 * arms, np.ones((len(arms), 1))], axis=1)
+        *center, rest = np.linalg.lstsq(rows, (arms**2).sum(axis=1), rcond=None)[0]
+        size = float(np.sqrt(max(rest + np.dot(center, center), 0.0)))
+        away = np.abs(np.linalg.norm(arms - center, axis=1) - size).max()
+        if size <= _ROUND and away <= _OFF_BALL * size:
+            return middle + center, size
+    return middle, radius
 
 
 def _named(mech: Mechanism, kin: Kinematics, name: str, given: Any) -> list[Contact]:

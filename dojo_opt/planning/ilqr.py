@@ -27,6 +27,7 @@ from dojo_opt.planning.iterate import Iterate, Iteration
 from dojo_opt.planning.multi_start import multi_start
 from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import RENAMED, Options, Stage
+from dojo_opt.planning.overload import overload
 from dojo_opt.planning.plan import History, Plan
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.refinement import refine
@@ -547,6 +548,8 @@ class Solver:
         if status != Status.SOLVED and violation > options.violation_tolerance:
             detail += "" if status == Status.INFEASIBLE else " Constraints are not met."
             detail += f" Largest violation: {violation:.2g}, {culprit}."
+        if status in FAILED or status == Status.MAX_ITERATIONS:
+            detail += overload(self.problem, now.u) + f" {self.problem.advice}".rstrip()
         plan = Plan(
             success=status == Status.SOLVED,
             status=status,

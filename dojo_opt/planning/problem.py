@@ -97,6 +97,10 @@ class Problem:
             knot, at least 1e-4 [m, rad]: `ilqr` ends by planning with 2, 4, ..., 32 times as many time steps, or as
             many times `refinement`, until the plan is as accurate as this (default None: without replay).
         refined_constraints: one constraint or several of that problem only, which do not help from a distant guess.
+        advice: what to change where no plan is found: a sentence for the message of such a plan (default none).
+
+    Attributes:
+        wanted: (T, nu) `controls0` before it was clipped [N, N m].
 
     Raises:
         TypeError: `sim` is not a Simulator, or an entry of `cost` or `constraints` is not a term.
@@ -119,9 +123,11 @@ class Problem:
         refinement: int = 1,
         refined_accuracy: float | None = None,
         refined_constraints: Spec | Sequence[Spec] = (),
+        advice: str = "",
     ) -> None:
         _check_simulator("Problem(sim)", sim)
         self.sim = sim
+        self.advice = advice
         self.horizon = whole_number("Problem(horizon=...)", horizon)
         self.substeps = whole_number("Problem(substeps=...)", substeps)
         self.refinement = whole_number("Problem(refinement=...)", refinement)
@@ -148,8 +154,9 @@ class Problem:
         self.bind()
         self.control_limits = control_limits_of(control_limits, sim)
         self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)
+        self.wanted = self.controls0
         if self.control_limits is not None:
-            self.controls0 = np.clip(self.controls0, *self.control_limits)
+            self.controls0 = np.clip(self.wanted, *self.control_limits)
         self.states0 = None if states0 is None else self.check_states("Problem(states0=...)", states0)
 
     def __repr__(self) -> str:

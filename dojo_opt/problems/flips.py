@@ -91,6 +91,7 @@ def backflip(
         controls0=torques,
         states0=states,
         refinement=refinement,
+        advice="Try another height, or a deeper crouch.",
     )
 
 

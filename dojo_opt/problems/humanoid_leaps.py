@@ -85,6 +85,7 @@ def humanoid_leap(
         controls0=np.clip(held, *sim.mechanism.input_limits),
         states0=np.tile(start, (_KNOTS + 1, 1)),
         refinement=whole_number(f"{call}(refinement=...)", refinement),
+        advice="Try a smaller distance or height.",
     )
 
 

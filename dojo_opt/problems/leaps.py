@@ -93,6 +93,7 @@ def leap(
         states0=np.tile(still, (horizon + 1, 1)),
         refinement=refinement,
         refined_constraints=Goal(apex, components=[2], knots=down + up // 2),
+        advice="Try a smaller distance or height, a longer duration, or a deeper crouch.",
     )
 
 

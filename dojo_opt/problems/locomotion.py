@@ -28,6 +28,9 @@ __all__ = ["bound", "follow", "jump", "pace", "trot", "turn", "walk"]
 TORQUE_LIMIT = 33.5  # of every hinge of the A1 [N m]
 # weights of squares per second: base place (x, y, z), its rotation vector, angles, base velocities, joint rates
 PLACE, ATTITUDE, ANGLE, VELOCITY, RATE = (0.3, 0.05, 0.05), 0.01, 0.2, 0.01, 0.001
+GAIT_ADVICE = "Try a lower speed, a longer period, or a lower step_height."
+RISE_ADVICE = "Try a longer duration, or a base that is less low."
+JUMP_ADVICE = "Try a smaller height or distance, a deeper crouch, or more time before and after."
 EFFORT = 2.5e-5  # per second and (N m)^2
 # feet FR, FL, RR, RL of the trot of Dojo's examples, from the centre of mass of the trunk [m]
 TROT_FOOTHOLDS = ((0.19, -0.13205), (0.19, 0.13205), (-0.27, -0.13205), (-0.27, 0.13205))
@@ -105,6 +108,7 @@ def follow(
         substeps=substeps,
         controls0=controls,
         states0=states,
+        advice={"jump": JUMP_ADVICE, "stand": "", "stand up": RISE_ADVICE}.get(gait.name, GAIT_ADVICE),
     )
 
 

@@ -123,6 +123,7 @@ def push(
         constraints=[Goal(states[-1], components=_ends(alone.nv))],
         controls0=held,
         states0=states,
+        advice="Try a longer duration, a nearer goal, or an object that is lighter or has less friction.",
     )
 
 

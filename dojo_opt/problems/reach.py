@@ -83,8 +83,7 @@ def reach(
     B = input_map(sim)
     held = np.linalg.lstsq(B, potential_gradient(sim, states[:-1]).T, rcond=None)[0].T
     low, high = sim.mechanism.input_limits
-    held = np.clip(held, low, high)
-    unit = np.maximum(np.abs(held).max(initial=0.0), 1e-3)
+    unit = np.maximum(np.abs(np.clip(held, low, high)).max(initial=0.0), 1e-3)
     knot = time_step * substeps
     more = tuple(constraints) if isinstance(constraints, list | tuple) else (constraints,)
     limited = any(i.joint is not None and np.isfinite(i.speed) for i in sim.mechanism.inputs or ())
@@ -94,7 +93,7 @@ def reach(
         horizon,
         cost=[
             Tracking(states, {"v": knot}),
-            Effort(knot * _EFFORT / unit**2, reference=held),
+            Effort(knot * _EFFORT / unit**2, reference=np.clip(held, low, high)),
         ],
         constraints=[
             Frame(frame, place, turn, knots=-1, offset=point),
@@ -105,6 +104,7 @@ def reach(
         substeps=substeps,
         controls0=held,
         states0=states,
+        advice="Try a longer duration, or a nearer target.",
     )
 
 

@@ -11,6 +11,7 @@ from dojo_opt import models
 from dojo_opt.cost import Effort, ResidualCost, Slip, Tracking
 from dojo_opt.gaits.equilibrium import equilibrium
 from dojo_opt.gaits.feet import Feet
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
@@ -113,6 +114,7 @@ class Lead:
         return np.tile(row, (np.size(times), 1))
 
 
+@checked_numbers("tasks")
 def free_gait_mpc(
     velocity: ArrayLike = (0.3, 0.0, 0.0),
     *,

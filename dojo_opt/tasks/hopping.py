@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt import models
 from dojo_opt.cost import Effort, Tracking
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.mpc.settings import OPTIONS
 from dojo_opt.planning.options import PLANNED
@@ -100,6 +101,7 @@ class Hopping:
         return np.stack([ahead, (12.0 * first * s * (s - 1.0) + swing * (1.0 + 6.0 * s * (s - 1.0))) / length])
 
 
+@checked_numbers("tasks")
 def hopper_mpc(
     velocity: ArrayLike = (0.2, 0.0), height: float = 0.25, stance: float = 0.2, *, substeps: int = 5, **settings: Any
 ) -> MPC:

@@ -13,6 +13,7 @@ from dojo_opt import gaits
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.gaits.gait import Gait
 from dojo_opt.gaits.legs import Legs
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
@@ -32,6 +33,7 @@ _BASE, _ANGLE, _VELOCITY, _RATE, _EFFORT = 10.0, 1.0, 0.1, 0.01, 1e-4
 _CAREFUL = 0.5  # share of the friction that plans assume
 
 
+@checked_numbers("tasks")
 def legged_mpc(
     robot: Any,
     gait: str = "trot",

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from dojo_opt import gaits, models
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.gaits.feet import Feet
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.mpc.moving_reference import SampledReference
 from dojo_opt.planning.options import PLANNED
@@ -24,6 +25,7 @@ __all__ = ["quadruped_mpc"]
 _QUADRUPED = {"learn_ground": True, "kappa": 1e-3, "friction": 0.4}
 
 
+@checked_numbers("tasks")
 def quadruped_mpc(
     speed: float = 0.2,
     period: float = 0.48,

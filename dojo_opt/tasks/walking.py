@@ -13,6 +13,7 @@ from dojo_opt.cost import Effort, Slip, Tracking
 from dojo_opt.gaits.biped import over_its_feet
 from dojo_opt.gaits.equilibrium import equilibrium
 from dojo_opt.gaits.legs import Legs
+from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
@@ -94,6 +95,7 @@ class SteppingPose(Lead):
         return out
 
 
+@checked_numbers("tasks")
 def humanoid_mpc(
     velocity: ArrayLike = (0.3, 0.0, 0.0),
     *,

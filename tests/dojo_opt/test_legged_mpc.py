@@ -53,6 +53,22 @@ def test_an_unknown_gait_or_command_is_refused():
         dojo.tasks.legged_mpc(dojo.models.quadruped(), velocity=(0.1, 0.2))
 
 
+@pytest.mark.parametrize(
+    "settings, text",
+    [
+        ({"feet": ["FL_toe"]}, r"feet=\.\.\.\).*FL_toe"),
+        ({"damping": -1.0}, r"damping=\.\.\.\)"),
+        ({"stance": {"FL_knee": 1.0}}, r"stance=\.\.\.\).*FL_knee"),
+        ({"duty": 1.5}, r"duty=\.\.\.\)"),
+        ({"step_height": 3.0}, "reach|nearer"),
+    ],
+)
+def test_a_refused_argument_names_the_call_of_the_user(settings, text):
+    """Not that of `Legs` or of the gait, which the controller calls."""
+    with pytest.raises(ValueError, match=rf"^tasks\.legged_mpc\(.*{text}"):
+        dojo.tasks.legged_mpc(dojo.models.quadruped(), **settings)
+
+
 def test_an_arm_that_is_folded_finds_a_place_to_push_from():
     """Below the hand of straight links that stand on end is the base, where no hand reaches."""
     names, link = ("a", "b", "c"), dojo.Capsule(0.02, 0.3)

@@ -40,6 +40,36 @@ def test_a_robot_stands_on_its_feet_with_its_knees_to_the_back(straight):
     )
 
 
+def test_a_foot_of_a_round_mesh_is_its_ball(straight):
+    """Its hull has corners alone: a point in the middle of the lowest ones lies inside the foot, or beside it."""
+    rng, radius = np.random.default_rng(0), 0.022
+    shell = rng.normal(size=(60, 3))
+    shell *= radius / np.linalg.norm(shell, axis=1, keepdims=True)
+    block = np.array([(x, y, z) for x in (-0.02, 0.02) for y in (-0.02, 0.02) for z in (-0.006, 0.006)])
+
+    def on(corners):
+        feet = [c for c in straight.contacts if c.name.endswith("_foot")]
+        spread = [
+            replace(c, point=np.asarray(c.point) + at, radius=0.0, name=f"{c.body}.{k}")
+            for c in feet
+            for k, at in enumerate(corners)
+        ]
+        return feet, Legs(replace(straight, contacts=spread)).mechanism.contacts
+
+    feet, found = on(shell)
+    for foot, ball in zip(feet, found, strict=True):
+        assert ball.radius == pytest.approx(radius, rel=1e-6)
+        np.testing.assert_allclose(ball.point, foot.point, atol=1e-9)
+    assert all(contact.radius == 0.0 for contact in on(block)[1])  # corners of no ball
+
+
+def test_a_robot_on_its_back_is_refused(straight):
+    q = np.array(straight.neutral)
+    q[3:7] = 0.0, 1.0, 0.0, 0.0
+    with pytest.raises(ValueError, match=r"problems\.stand_up\(robot\): the base .* not upright"):
+        dojo.problems.stand_up(replace(straight, neutral=q))
+
+
 def test_a_robot_stands_up_and_the_plan_holds_at_a_fifth_of_the_step(straight):
     problem = dojo.problems.stand_up(straight)
     plan = dojo.ilqr(problem)
