@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco import minimize, rollout
 
 import dojo_opt as dojo
+from benchmarks.engines.cube_motion import CubeMotion
 from solvers.types import Floats
 
-__all__ = ["MujocoCube", "fit"]
+__all__ = ["MujocoCube", "default_cube", "fit"]
 
 _SUBSTEPS = 7  # of a frame: about 1 ms
 # friction, half width [m], time constant [s] and damping ratio of contacts, moment of inertia [kg m^2]
 _START = np.array([0.3, 0.047, 0.02, 0.8, 8.1e-4])
 _NEAR = np.array([0.18, 0.0524, 0.01, 0.8, 8.1e-4])  # the published friction and half width
+_DEFAULT = (0.02, 1.0, 8.1e-4)  # MuJoCo's own time constant and damping ratio, and the moment of inertia
 _LOW, _HIGH = np.array([0.02, 0.04, 0.002, 0.05, 4e-4]), np.array([1.0, 0.065, 0.1, 2.0, 1.6e-3])
 _MODEL = """<mujoco>
   <option timestep="{step}" cone="elliptic" impratio="10"/>
@@ -31,13 +33,6 @@ _MODEL = """<mujoco>
 </mujoco>"""
 _WIDTH = 1e-2  # of the finite differences, in units of the start: with 1e-4, fits end where they begin
 _MOST = 1e3  # deviations: errors of predictions that are not finite
-
-
-class _Motion(NamedTuple):
-    """A prediction, as cube.py judges it."""
-
-    x: Floats  # (T + 1, 13)
-    success: bool
 
 
 class MujocoCube:
@@ -55,14 +50,19 @@ class MujocoCube:
         states, _ = rollout.rollout(self._model, self._data, first, nstep=steps * _SUBSTEPS)
         return np.concatenate([starts[:, None], states[:, _SUBSTEPS - 1 :: _SUBSTEPS, 1:14]], axis=1)
 
-    def rollout(self, x: Floats, us: Floats) -> _Motion:
+    def rollout(self, x: Floats, us: Floats) -> CubeMotion:
         """As Simulator.rollout."""
         found = self.paths(x[None], len(us))[0]
-        return _Motion(found, bool(np.isfinite(found).all()))
+        return CubeMotion(found, bool(np.isfinite(found).all()))
 
     def difference(self, a: Floats, b: Floats) -> Floats:
         """As Simulator.difference."""
         return self._sim.difference(a, b)
+
+
+def default_cube(friction: float, half: float, frame: float, sim: dojo.Simulator) -> MujocoCube:
+    """A cube of some friction and half width [m] with MuJoCo's default contacts."""
+    return MujocoCube(np.array([friction, half, *_DEFAULT]), frame, sim)
 
 
 def fit(

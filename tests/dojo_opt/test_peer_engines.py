@@ -107,3 +107,22 @@ def test_mujoco_has_no_screw() -> None:
     pytest.importorskip("mujoco")
     with pytest.raises(ValueError, match="no joint that turns and slides in one \\(body 1\\)"):
         mujoco_scene.load(dojo.Simulator(chain("screw", 1)).model, 0.01)
+
+
+@bullet
+def test_a_cube_slides_to_rest_in_bullet():
+    from benchmarks.engines.bullet_cube import BulletCube
+
+    half, friction, speed, frame = 0.05, 0.2, 1.0, 1.0 / 148.0
+    body, free = dojo.Body("cube", 0.37, (8.1e-4,) * 3), dojo.Joint("floating", None, "cube")
+    sim = dojo.Simulator(dojo.Mechanism([body], [free]), time_step=frame)
+    world = BulletCube(friction, 0.0, half, frame, sim)
+    start = sim.neutral()
+    start[2], start[7] = half, speed
+    motion = world.rollout(start, np.zeros((100, 0)))
+    world.close()
+    assert motion.success
+    gap = world.difference(motion.x[-1], start)
+    assert gap[0] == pytest.approx(speed**2 / (2.0 * friction * 9.81), rel=0.03)
+    assert np.abs(gap[1:6]).max() < 2e-3
+    assert np.abs(motion.x[-1, 7:]).max() < 1e-2
