@@ -14,6 +14,7 @@ from sim.mechanism.shapes import Solid, rotation_matrix
 from solvers.types import Floats
 
 _VIEW = np.radians((30.0, 18.0))  # azimuth and elevation of the camera
+_SHADOWS = ((1.35, "#f3f3f3"), (1.15, "#e9e9e9"), (0.95, "#dedede"))  # growth and colour of the layers of a shadow
 _FILL, _EDGE, _BONE, _CONTACT, _GROUND = "#b9cde4", "#33557a", "#8a8f99", "#c8442d", "#dddddd"
 
 
@@ -55,8 +56,22 @@ def thumbnail(mechanism: Mechanism, q: ArrayLike | None = None, *, size: float =
         ax.plot(*center, ".", color=_CONTACT, markersize=3, zorder=3)
     if mechanism.contacts:
         ax.axhline(0.0, color=_GROUND, linewidth=3, zorder=0)
+        _shadow(ax, [np.array([at[name].at(p) for p in _surface(shape)]) for name, shape in solids])
     _frame(ax, np.concatenate(drawn))
     return figure
+
+
+def _shadow(ax: Any, parts: list[Floats]) -> None:
+    """What lies below points (n, 3) of each part on level ground, soft at its edges."""
+    from matplotlib.patches import Polygon
+
+    right, up, _ = _camera()
+    below = [_hull((points * (1.0, 1.0, 0.0)) @ np.array([right, up]).T) for points in parts]
+    for layer, (growth, color) in enumerate(_SHADOWS):
+        for outline in below:
+            middle = outline.mean(axis=0)
+            spread = middle + growth * (outline - middle)
+            ax.add_patch(Polygon(spread, facecolor=color, edgecolor="none", zorder=0.1 * (1 + layer)))
 
 
 def _camera() -> tuple[Floats, Floats, Floats]:

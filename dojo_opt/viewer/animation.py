@@ -6,7 +6,7 @@ The drawing is MeshCat's: its scene commands and its viewer, put into the page.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,11 +43,14 @@ def save_html(
     forces: bool = False,
     traces: bool = False,
     goal: bool = True,
+    names: Sequence[str] = (),
+    together: bool = False,
 ) -> Path:
     """Write an animation that opens in a browser.
 
     The page has a clock, speeds, steps from knot to knot, and boxes that show and hide contact forces, the paths of the
-    base and of the ends of the limbs, and the goal of a plan, as a ghost. Several results move side by side.
+    base and of the ends of the limbs, and the goal of a plan, as a ghost. Several results move side by side, or in one
+    place, as a measured motion and its prediction: a robot that is there again has another colour.
 
     Args:
         result: Trajectory, Plan or ClosedLoop; a Mechanism, which stands in its neutral state; or a list of these.
@@ -56,13 +59,15 @@ def save_html(
         forces: whether the contact forces are shown at the beginning. A bar as long as the robot is its weight.
         traces: whether the paths are shown at the beginning.
         goal: whether the ghost is shown at the beginning.
+        names: names of the results, for the bar of the page (default none).
+        together: whether several results move in one place; one sees through all but the first.
 
     Returns:
         The path.
 
     Raises:
         TypeError: the result is none of these.
-        ValueError: the result does not know its simulator, or the list is empty.
+        ValueError: the result does not know its simulator, the list is empty, or there are not as many names.
         SimulationError: a step of a plan cannot be solved again, for its forces.
         OSError: the file cannot be written.
     """
@@ -70,10 +75,14 @@ def save_html(
     results = list(result) if isinstance(result, list | tuple) else [result]
     if not results:
         raise ValueError("save_html(result): expected one result or more, got an empty list")
+    labels = checks.names("save_html(names=...)", names)
+    if labels and len(labels) != len(results):
+        raise ValueError(f"save_html(names=...): expected {len(results)} names, got {len(labels)}")
+    checks.flag("save_html(together=...)", together)
     shown = {"forces": forces, "paths": traces, "ghost": goal}
     motions = [motion(one, simulator) for one in results]
     with whole_file(target) as file:
-        file.write_text(html_of(*motions, shown=shown), encoding="utf-8")
+        file.write_text(html_of(*motions, shown=shown, names=labels, together=together), encoding="utf-8")
     return target
 
 
@@ -86,13 +95,21 @@ def load_meshcat() -> None:
         import meshcat  # noqa: F401
 
 
-def html_of(*motions: Motion, moving: bool = True, shown: Mapping[str, bool] | None = None) -> str:
-    """The page of motions side by side.
+def html_of(
+    *motions: Motion,
+    moving: bool = True,
+    shown: Mapping[str, bool] | None = None,
+    names: Sequence[str] = (),
+    together: bool = False,
+) -> str:
+    """The page of motions side by side, or in one place.
 
     Args:
         *motions: the motions, the first one where it is, the others beside it.
         moving: whether they are played; otherwise the page has their first poses.
         shown: whether "forces", "paths" and the "ghost" of the goal are shown at the beginning (default None: none).
+        names: names of the motions (default none).
+        together: whether all of them are where they are.
 
     Returns:
         The text of an HTML file.
@@ -100,7 +117,7 @@ def html_of(*motions: Motion, moving: bool = True, shown: Mapping[str, bool] | N
     load_meshcat()
     commands = _ground(motions[0])
     clips: dict[Any, Any] = {}
-    away = spacing(motions)
+    away = 0.0 if together else spacing(motions)
     end = max(float(m.time[-1]) for m in motions)
     for k, m in enumerate(motions):
         at = group_of(k)
@@ -110,7 +127,7 @@ def html_of(*motions: Motion, moving: bool = True, shown: Mapping[str, bool] | N
             bars, lengths = overlays.forces(m, at, end)
             commands += bars
             clips |= {**_clips(m, at, end), **lengths}
-    return page(motions, [*commands, *([_animation(clips)] if moving else [])], shown or {})
+    return page(motions, [*commands, *([_animation(clips)] if moving else [])], shown or {}, names, away)
 
 
 def _beside(group: tuple[str, ...], offset: tuple[float, ...]) -> list[Any]:

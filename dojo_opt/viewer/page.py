@@ -23,6 +23,9 @@ _AWAY = 2.6  # its distance over the radius of the robot: with MeshCat's 75 degr
 _POINTS = 200  # of the path that the camera follows
 _ROOM = 0.3  # [m] between motions side by side
 _BOXES = {"forces": "forces", "paths": "paths", "ghost": "goal"}  # parts of MeshCat's scene, as the page calls them
+_TINTS = ("#d9822b", "#2b6cd9", "#3a9d4f", "#a23ba8")  # of a robot that is drawn more than once, from the second on
+_TINT, _THROUGH = 0.75, 0.5  # share of the tint in a colour, and opacity of robots that are drawn in one place
+_SHADE, _SHADED = 0.35, 3.0  # darkness of shadows, and half-width of the ground that has some over the robot's radius
 _SKY, _HORIZON = (1.0, 1.0, 1.0), (0.84, 0.88, 0.93)
 
 _PAGE = """<!DOCTYPE html>
@@ -35,12 +38,14 @@ body {{margin: 0; font: 14px system-ui, sans-serif; color: #223}}
 #bar {{position: absolute; left: 0; right: 0; bottom: 0; display: flex; gap: 12px; align-items: center;
       padding: 8px 16px; background: rgba(255, 255, 255, 0.8)}}
 #time {{flex: 1; min-width: 60px}} #bar > * {{white-space: nowrap}}
-#bar button {{min-width: 28px}} #play {{width: 64px}} #clock {{width: 110px; font-variant-numeric: tabular-nums}}
+#bar {{flex-wrap: wrap}} #bar button {{flex: none; min-width: 28px}} #bar #play {{width: 64px}}
+#clock {{width: 110px; font-variant-numeric: tabular-nums}}
 </style></head>
 <body><div id="meshcat-pane" title="drag to turn, scroll to zoom"></div>
-<div id="bar"><b>{title}</b><button id="play">pause</button><button id="back" title="one knot back">&lsaquo;</button>
-<button id="ahead" title="one knot ahead">&rsaquo;</button><input id="time" type="range" min="0" max="{duration}"
-step="0.001" value="0"><span id="clock"></span><select id="speed" title="speed"><option value="0.1">1/10</option>
+<div id="bar"><b>{title}</b>{legend}<button id="play">pause</button>
+<button id="back" title="one knot back">&lsaquo;</button><button id="ahead" title="one knot ahead">&rsaquo;</button>
+<input id="time" type="range" min="0" max="{duration}" step="0.001" value="0"><span id="clock"></span>
+<select id="speed" title="speed"><option value="0.1">1/10</option>
 <option value="0.25">1/4</option><option value="0.5">1/2</option><option value="1" selected>1 x</option>
 <option value="2">2 x</option></select>{boxes}
 <label><input id="follow" type="checkbox" checked> follow</label></div>
@@ -80,6 +85,7 @@ document.getElementById("speed").onchange = event => {{animator.mixer.timeScale 
 for (const [path, pose] of {ghosts}) {{  // the goal: a copy of every body, which one sees through
     const body = viewer.scene_tree.find(path).object, copy = body.clone(true);
     copy.traverse(part => {{
+        part.castShadow = false;
         if (!part.material) return;
         part.material = part.material.clone();
         Object.assign(part.material, {{transparent: true, opacity: 0.25, depthWrite: false}});
@@ -88,6 +94,36 @@ for (const [path, pose] of {ghosts}) {{  // the goal: a copy of every body, whic
     copy.quaternion.set(...pose.slice(3));
     viewer.scene_tree.find([...path.slice(0, -2), "ghost"]).object.add(copy);
 }}
+for (const [path, color, opacity] of {tints}) {{  // the same robot again
+    viewer.scene_tree.find(path).object.traverse(part => {{
+        if (!part.material) return;
+        part.material = part.material.clone();
+        part.material.color.lerp(new MeshCat.THREE.Color(color), {tint});
+        if (opacity < 1) Object.assign(part.material, {{transparent: true, opacity}});
+    }});
+}}
+for (const group of {groups}) for (const part of ["forces", "paths"])
+    viewer.scene_tree.find([...group, part]).object.traverse(mark => {{mark.castShadow = false;}});
+// a soft shadow on level ground, of a light from above that adds no light
+const sun = new MeshCat.THREE.DirectionalLight(0xffffff, 0), reach = {reach};
+const shade = new MeshCat.THREE.ShadowMaterial({{opacity: {shade}, depthWrite: false}});
+const ground = new MeshCat.THREE.Mesh(new MeshCat.THREE.PlaneGeometry(2 * reach, 2 * reach), shade);
+ground.receiveShadow = true;
+Object.assign(sun.shadow.camera, {{left: -reach, right: reach, bottom: -reach, top: reach, far: 8 * reach}});
+Object.assign(sun.shadow, {{radius: 5, blurSamples: 16, bias: -0.001}});  // else the ground has spots
+sun.castShadow = true;
+viewer.scene.traverse(part => {{part.receiveShadow = false;}});  // on a body it would darken every light
+viewer.scene_tree.find(["meshcat", "floor"]).object.traverse(line => {{line.castShadow = false;}});
+if ({level}) {{
+    viewer.renderer.shadowMap.type = MeshCat.THREE.VSMShadowMap;
+    viewer.scene.add(sun, sun.target, ground);
+}}
+const shadow = at => {{
+    const [x, y] = [at[0], -at[2]];  // the axes of the scene: z is up
+    sun.position.set(x + 0.5 * reach, y + reach, 5 * reach);
+    sun.target.position.set(x, y, 0);
+    ground.position.set(x, y, 0.001);
+}};
 for (const box of document.querySelectorAll("input[data-part]")) {{
     const show = () => {{
         for (const group of {groups}) viewer.set_property([...group, box.dataset.part], "visible", box.checked);
@@ -106,6 +142,7 @@ const place = () => {{
 }};
 const track = () => {{
     const at = place();
+    shadow(at);
     if (follow.checked) {{
         ["x", "y", "z"].forEach((axis, n) => {{
             viewer.camera.position[axis] += at[n] - seen[n];
@@ -140,6 +177,14 @@ def _path(m: Motion) -> tuple[Floats, float]:
     still = span < radius
     path[:, still] = 0.5 * (path[:, still].min(axis=0) + path[:, still].max(axis=0))
     return path, radius
+
+
+def has_level_ground(m: Motion) -> bool:
+    """Whether contacts touch level ground at height zero."""
+    return any(
+        c.terrain is None and c.height == 0.0 and np.allclose(np.asarray(c.normal), (0.0, 0.0, 1.0), atol=1e-9)
+        for c in m.mechanism.contacts
+    )
 
 
 def _ghosts(m: Motion, group: tuple[str, ...]) -> list[Any]:
@@ -195,23 +240,55 @@ def _content(drawn: dict[str, Any]) -> bytes:
     return bytes(packed)
 
 
-def page(motions: Sequence[Motion], commands: list[Any], shown: Mapping[str, bool]) -> str:
+def _tints(motions: Sequence[Motion], together: bool) -> list[Any]:
+    """Of every motion of a robot that is drawn before, its bodies in MeshCat's scene, its colour, and its opacity."""
+    robots = [(m.mechanism.name, m.mechanism.body_names) for m in motions]
+    return [
+        [[*group_of(k), "bodies"], color_of(k), _THROUGH if together else 1.0]
+        for k, robot in enumerate(robots)
+        if robot in robots[:k]
+    ]
+
+
+def color_of(number: int) -> str:
+    """The tint of a motion, from the second on."""
+    return _TINTS[(number - 1) % len(_TINTS)]
+
+
+def _legend(names: Sequence[str], tinted: list[Any]) -> str:
+    """The names of motions in the bar, with their tints."""
+    colors = {tuple(path): color for path, color, _ in tinted}
+    return "".join(
+        f'\n<span><b style="color: {colors.get((*group_of(k), "bodies"), "#556")}">&#9632;</b> {escape(name)}</span>'
+        for k, name in enumerate(names)
+    )
+
+
+def page(
+    motions: Sequence[Motion],
+    commands: list[Any],
+    shown: Mapping[str, bool],
+    names: Sequence[str] = (),
+    away: float = 0.0,
+) -> str:
     """The page that shows the commands, with the camera beside the motions.
 
     Args:
         motions: the motions, side by side.
         commands: MeshCat's commands that draw and move them.
         shown: whether "forces", "paths" and the "ghost" of the goal are shown at the beginning.
+        names: names of the motions (default none).
+        away: distance between the motions [m].
 
     Returns:
         The text of an HTML file.
     """
     encoded = ",".join(json.dumps(c).replace("<", "\\u003c") for c in _encoded(commands))
     viewer = files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8")
-    m, wide = motions[0], 0.5 * (len(motions) - 1) * spacing(motions)
+    m, wide = motions[0], 0.5 * (len(motions) - 1) * away
     path, radius = _path(m)
     path[:, 1] -= wide
-    side = _SIDE if len(motions) == 1 else _FRONT
+    side = _FRONT if wide else _SIDE
     eye = path[0] + _AWAY * (radius + _CLOSER * wide) * side / np.linalg.norm(side)
     # the axes of MeshCat's camera: y is up
     places = {name: f"{x:.3f}, {z:.3f}, {-y:.3f}" for name, (x, y, z) in (("eye", eye), ("target", path[0]))}
@@ -222,6 +299,7 @@ def page(motions: Sequence[Motion], commands: list[Any], shown: Mapping[str, boo
     ghosts = [ghost for each, group in zip(motions, groups, strict=True) for ghost in _ghosts(each, group)]
     there = {"forces": any(len(each.contact_time) and each.force.size for each in motions), "ghost": bool(ghosts)}
     there["paths"] = len(m.time) > 1
+    tints = _tints(motions, away == 0.0)
     boxes = "".join(
         f'\n<label><input data-part="{part}" type="checkbox"{" checked" * bool(shown.get(part))}> {word}</label>'
         for part, word in _BOXES.items()
@@ -235,6 +313,12 @@ def page(motions: Sequence[Motion], commands: list[Any], shown: Mapping[str, boo
         knot=f"{m.time[1] - m.time[0] if len(m.time) > 1 else 1.0:.6g}",
         boxes=boxes,
         ghosts=json.dumps(ghosts),
+        tints=json.dumps(tints),
+        tint=_TINT,
+        shade=_SHADE,
+        reach=f"{_SHADED * radius + wide:.3f}",
+        level=json.dumps(has_level_ground(m)),
+        legend=_legend(names, tints),
         groups=json.dumps(groups),
         **places,
     )

@@ -397,6 +397,33 @@ def test_motions_side_by_side_are_apart_and_end_together(quadruped, tmp_path):
 
 
 @pytest.mark.slow
+def test_a_robot_that_is_drawn_twice_has_two_colors_and_a_shadow(page, quadruped, tmp_path):
+    """As a measured motion and its prediction, which looked alike."""
+    file = dojo.viewer.save_html([quadruped] * 2, tmp_path / "fit.html", names=["measured", "<b>fit"], together=True)
+    assert opened(page, file) == []
+    looks = [
+        page.evaluate(
+            """group => {
+                const found = [];
+                viewer.scene_tree.find([...group, "bodies"]).object.traverse(part => {
+                    if (part.material) found.push([part.material.color.getHex(), part.material.opacity]);
+                });
+                return found;
+            }""",
+            group,
+        )
+        for group in (["meshcat"], ["meshcat", "motion1"])
+    ]
+    assert len(looks[0]) == len(looks[1]) > 12
+    assert all(a != b and (a[1], b[1]) == (1, 0.5) for a, b in zip(*looks, strict=True))
+    assert page.evaluate("[sun.castShadow, ground.parent === viewer.scene, viewer.scene_tree.find(['meshcat', "
+                         "'floor', 'lines', '<object>']).object.castShadow]") == [True, True, False]  # fmt: skip
+    assert "measured" in page.inner_text("#bar") and "<b>fit" in page.inner_text("#bar")
+    with pytest.raises(ValueError, match=r"save_html\(names=...\): expected 1 names, got 2"):
+        dojo.viewer.save_html(quadruped, tmp_path / "one.html", names=["a", "b"])
+
+
+@pytest.mark.slow
 def test_motions_of_the_same_robot_share_its_meshes(page, tmp_path):
     """The second robot adds its motion to the file, not its triangles, and is drawn nevertheless."""
     corners = np.random.default_rng(1).standard_normal((400, 3))
