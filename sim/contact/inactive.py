@@ -9,7 +9,7 @@ Of a cluster that is near, as the corners of a foot, those contacts are inactive
 body, is at most 1e-2: the matrix may omit it, as Newton's method converges all the same. Derivatives may not omit them;
 they take these contacts as active (stiff_contacts.py). Of a cluster of many points, as the corners of a mesh, e may be
 10 each: their stiffness is in the matrix and in the derivatives, as a sum (corner_laws.py). A Go2 that trots on feet of
-32 corners takes 3.0 iterations a step, with 9 to 13 active corners, and 2.6 where all 128 are active.
+32 corners with steps of 2 ms takes 2.5 iterations a step, with 9 to 13 active corners.
 
 As a whole, a cluster is inactive when its stiffness, relative to the inertia behind it, is below the tolerance of the
 step:
@@ -82,6 +82,15 @@ def sunk_contact(model: Model) -> int:
         if model.contact_hold[c] == SUNK:
             return c
     return -1
+
+
+@kernel
+def has_corners(model: Model) -> bool:
+    """Whether a cluster of contacts has so many points that they are summed, as the corners of a mesh."""
+    for c in range(model.cluster.shape[0]):
+        if model.cluster[c, Cluster.CORNERS] > 0.0:
+            return True
+    return False
 
 
 @optional(Slot.CHOOSE_ACTIVE)

@@ -145,6 +145,12 @@ def from_last_iterate(s: Strategy) -> Strategy:
 
 
 @kernel
+def led(s: Strategy) -> Strategy:
+    """The repetition of a strategy with its friction smoothing led down step by step."""
+    return Strategy(s.start, True, s.undamped, s.features, s.replace_features, s.overlap, s.velocity_fraction, s.growth)
+
+
+@kernel
 def known_start(
     model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], guess: Guess
 ) -> KnownStart:

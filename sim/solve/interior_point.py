@@ -14,6 +14,7 @@ It differs in these points (60,000 random extreme states, `benchmarks/robustness
 * The boundary of the cones stops no step: pairs that would leave return to the central path.
 * No body turns by more than .7 rad per iteration, beyond which the Jacobian of a gap does not predict it.
 * At folds of the path, the terms that can make the matrix indefinite count by 1/2, 1/4, ... (newton_direction.py).
+* On corners of meshes a known start from which friction jams is tried again, its smoothing led down step by step.
 * An attempt that ends in a fold is given up, and the next strategy starts elsewhere (globalization.py).
 * Equations of a step have several solutions. One in which shapes overlap in features that were not active, or which
   gains energy, is refused (pairs/active_features.py, energy_balance.py).
@@ -23,7 +24,7 @@ from __future__ import annotations
 
 from sim.contact.active_contacts import slip_error
 from sim.contact.contact_law import slip_noise
-from sim.contact.inactive import sunk_contact
+from sim.contact.inactive import has_corners, sunk_contact
 from sim.contact.pairs.active_features import overlapping
 from sim.contact.pairs.pair_energy import pairs_gained
 from sim.contact.restitution import find_impacts, impacts_gained
@@ -41,6 +42,7 @@ from sim.solve.globalization import (
     Strategy,
     from_last_iterate,
     known_start,
+    led,
     start_on_path,
     strategy,
 )
@@ -56,6 +58,7 @@ from solvers.types import Vector
 _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of positions over a time step
 # times the residual before: growth allowed for smaller violations, and during the continuation in friction
 _WORSE, _WORSE_LED = 10.0, 2.0
+_SMOOTHED = 1e3  # times kappa: smoothing of friction with which a known start is led
 _PATIENCE = 30  # iterations of an attempt
 _REPETITIONS = 3  # of an attempt, with other active features
 _FEW = 4  # halvings; an attempt that needs more is given up
@@ -110,6 +113,8 @@ def solve_from(
     scale = max(residual_scale(data), rounding(model, data, h) / options.tolerance)
     worse = _WORSE_LED if s.continuation else _WORSE
     smoothing, balance = known.kappa, known.balance
+    if s.continuation:
+        smoothing = max(smoothing, _SMOOTHED * kappa)
     if s.start != Start.KNOWN:
         smoothing = start_on_path(model, data, options, q, v, s)
         balance = residuals(model, data, h, q, v, u)
@@ -177,6 +182,30 @@ def attempt(
 
 
 @inlined
+def attempt_known(
+    model: Model,
+    data: Data,
+    options: StepOptions,
+    inputs: tuple[Vector, Vector, Vector],
+    guess: Guess,
+    s: Strategy,
+    iterations: int,
+    known: KnownStart,
+) -> tuple[Outcome, int]:
+    """The first strategy; where it makes no progress on corners, the same once more with continuation in friction.
+
+    Where a foot rocks from corner to corner, which of its corners stick changes within a step. Friction at kappa jams
+    on that; on a smoother law the impulses of the step before, or of this attempt, are still near the solution.
+    """
+    out, verdict = attempt(model, data, options, inputs, s, iterations, known)
+    if verdict == Verdict.VALID and out.status == Status.NO_PROGRESS and has_corners(model):
+        again = known_start(model, data, options, inputs, guess)
+        if again.found:
+            out, verdict = attempt(model, data, options, inputs, led(s), out.iterations, again)
+    return out, verdict
+
+
+@inlined
 def solve_active(
     model: Model,
     data: Data,
@@ -198,7 +227,10 @@ def solve_active(
         if gained and s.start != Start.FRACTION:  # other solutions beyond folds gain energy as well
             continue
         data.overlap_allowed[0] = 1 if s.overlap else 0
-        out, verdict = attempt(model, data, options, inputs, s, out.iterations, known)
+        if k == 0:
+            out, verdict = attempt_known(model, data, options, inputs, guess, s, out.iterations, known)
+        else:
+            out, verdict = attempt(model, data, options, inputs, s, out.iterations, known)
         if verdict == Verdict.VALID and (out.status == Status.SOLVED or out.status == Status.MAX_ITERATIONS):
             if out.status == Status.SOLVED:
                 data.strategy_solves[k] += 1
