@@ -6,6 +6,9 @@ interval becomes that over h/n which has the same momentum, and after n steps th
 
 A divided step depends on its state and input alone, never on the steps before it, and neither does the next one. Its
 derivatives are the products of those of its parts and of both conversions.
+
+Rescues, where none of 2 to LARGEST_DIVISION parts does: more parts for joints that turn fast (FASTEST_DIVISION), and
+the nearest state where none has the momentum of the last part (nearest_state.py).
 """
 
 from __future__ import annotations
@@ -21,9 +24,20 @@ from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.record_columns import StepReport
 from sim.simulator.engines.division import DIVISIBLE, Division
-from sim.simulator.engines.engine import REPORT, DividedStep, Engine, Floats, chained, knot_inputs, refuse
+from sim.simulator.engines.engine import (
+    REPORT,
+    DividedStep,
+    Engine,
+    Floats,
+    Rolled,
+    chained,
+    contacts_of_parts,
+    knot_inputs,
+    refuse,
+)
 from sim.simulator.engines.interval_states import IntervalStates
 from sim.simulator.engines.intervals import Intervals
+from sim.simulator.engines.nearest_state import nearest_state
 from sim.simulator.link_kernels import link_step
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
@@ -34,6 +48,9 @@ from solvers.types import Cube, Integers, Vector
 __all__ = ["LARGEST_DIVISION", "DividingEngine"]
 
 LARGEST_DIVISION = 1024  # parts of a step
+FASTEST_DIVISION = 262144  # of one in which a joint turns by _TURN in each of them
+
+_TURN = 0.02  # [rad]
 
 _LOSS = 0.1  # largest loss of energy in a whole step where nothing dissipates, of the energies that change
 _PART = 1e-3  # largest gain or loss in a part
@@ -97,16 +114,28 @@ class DividingEngine(Engine):
     ) -> DividedStep | None:
         """The step from x (nx,) under u (nu,) and external wrenches (1 or 0, nbody, 6) in as few parts as possible.
 
-        None where LARGEST_DIVISION parts are not enough; with derivatives also where the end loses momentum, which has
-        none. More parts might keep it, but they would be another step.
+        Where no division ends in a state with the momentum of its last part, the first that ends at all is taken, with
+        the state nearest to it. None where no division ends; with derivatives also where the end loses momentum, which
+        has none. More parts might keep it, but they would be another step.
         """
-        parts = 2
-        while parts <= LARGEST_DIVISION:
+        divisions = self._divisions(x, derivatives)
+        for parts in divisions:
             found = self.in_parts(parts, x, (u, wrench), kappa, derivatives=derivatives)
             if found is not None:
                 return None if derivatives and found.share < 1.0 else found
-            parts *= 2
+        for parts in [] if derivatives else divisions:
+            found = self.in_parts(parts, x, (u, wrench), kappa, nearest=True)
+            if found is not None:
+                return found
         return None
+
+    def _divisions(self, x: Vector, derivatives: bool) -> list[int]:
+        """Numbers of parts to try for a step from x (nx,): few with derivatives, many for joints that turn fast."""
+        parts = [2]
+        turn = 0.0 if derivatives else self.intervals.turn(x)
+        while 2 * parts[-1] <= LARGEST_DIVISION or (2 * parts[-1] <= FASTEST_DIVISION and turn > 2 * parts[-1] * _TURN):
+            parts.append(2 * parts[-1])
+        return parts
 
     def in_parts(
         self,
@@ -116,24 +145,48 @@ class DividingEngine(Engine):
         kappa: float | None = None,
         *,
         derivatives: bool = False,
+        nearest: bool = False,
     ) -> DividedStep | None:
-        """The step in the given number of parts; None if one of them is not solved. given: input, external wrenches."""
+        """The step in the given number of parts; None if one of them is not solved. given: input, external wrenches.
+
+        nearest: where the last part has a momentum that no state has, take the nearest one, nearest_state.py.
+        """
         engine = self.part(parts)
-        part, (u, wrench) = engine.settings.time_step, given
+        part = engine.settings.time_step
         first = self.intervals.to_part(x, part)
         if first is None:
             return None
-        us, wrenches = np.repeat(u[None], parts, axis=0), np.repeat(wrench, parts, axis=0)
         level = None if kappa is None else kappa / parts
-        rolled = engine.roll(first, us, wrenches, kappa=level, derivatives=derivatives)
+        rolled = self._roll_parts(engine, first, parts, given, level, derivatives=derivatives)
         if rolled.solved_steps < parts:
             return None
         last = rolled.xs[-1]
         end = self.intervals.from_part(last, part)
         if end is not None:
             return DividedStep(engine, rolled, end, 1.0)
-        slowed = self.intervals.slowed(last, part)
+        slowed = nearest_state(self.intervals, last, part) if nearest else self.intervals.slowed(last, part)
         return None if slowed is None else DividedStep(engine, rolled, *slowed)
+
+    @staticmethod
+    def _roll_parts(
+        engine: Engine, x: Vector, parts: int, given: tuple[Vector, Cube], kappa: float | None, *, derivatives: bool
+    ) -> Rolled:
+        """The parts of a step from x (nx,). If there are more than LARGEST_DIVISION, contacts are those of as many."""
+        at_once = min(parts, LARGEST_DIVISION)
+        us, wrenches = np.repeat(given[0][None], at_once, axis=0), np.repeat(given[1], at_once, axis=0)
+        rolled = engine.roll(x, us, wrenches, kappa=kappa, derivatives=derivatives)
+        if parts == at_once or rolled.solved_steps < at_once:
+            return rolled
+        xs, reports, contacts = [rolled.xs], [rolled.reports], [contacts_of_parts(rolled.contacts)]
+        for done in range(at_once, parts, at_once):
+            rolled = engine.roll(xs[-1][-1], us, wrenches, kappa=kappa)
+            if rolled.solved_steps < at_once:
+                return rolled._replace(solved_steps=done + rolled.solved_steps)
+            xs, reports = [*xs, rolled.xs[1:]], [*reports, rolled.reports]
+            contacts.append(contacts_of_parts(rolled.contacts))
+        return rolled._replace(
+            solved_steps=parts, xs=np.concatenate(xs), reports=np.concatenate(reports), contacts=np.stack(contacts)
+        )
 
     def conversions(self, x: Vector, divided: DividedStep) -> tuple[Floats, Floats]:
         """Derivatives of the conversions at both ends of a divided step from x, (ndx, ndx)."""

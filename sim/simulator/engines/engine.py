@@ -57,22 +57,27 @@ class DividedStep(NamedTuple):
         return np.asarray(out)
 
     def contacts(self) -> Floats:
-        """(ncontact, 11) of the whole: impulses add up and act at their mean point, along their mean normal.
+        """(ncontact, 11) of the whole."""
+        return contacts_of_parts(self.rolled.contacts)
 
-        Gap and slip are those of the end. A sum over cones that turned may lie outside that of the mean normal.
-        """
-        parts = self.rolled.contacts
-        out = parts[-1].copy()
-        out[:, IMPULSE] = parts[..., IMPULSE].sum(axis=0)
-        weight = np.linalg.norm(parts[..., IMPULSE], axis=2)
-        total = weight.sum(axis=0)
-        pressed = total > 0.0
-        points, normals = (np.einsum("tc,tcj->cj", weight, parts[..., part]) for part in (POINT, NORMAL))
-        out[pressed, POINT] = points[pressed] / total[pressed, None]
-        length = np.linalg.norm(normals, axis=1)
-        turned = (length > 0.0) & out[:, NORMAL].any(axis=1)  # without a normal, it is beyond its reach at the end
-        out[turned, NORMAL] = normals[turned] / length[turned, None]
-        return np.asarray(out)
+
+def contacts_of_parts(parts: Floats) -> Floats:
+    """(ncontact, 11) of a step in parts (n, ncontact, 11): impulses add up and act at their mean point.
+
+    Their normal is the mean one, and gap and slip are those of the end. A sum over cones that turned may lie outside
+    that of the mean normal.
+    """
+    out = parts[-1].copy()
+    out[:, IMPULSE] = parts[..., IMPULSE].sum(axis=0)
+    weight = np.linalg.norm(parts[..., IMPULSE], axis=2)
+    total = weight.sum(axis=0)
+    pressed = total > 0.0
+    points, normals = (np.einsum("tc,tcj->cj", weight, parts[..., part]) for part in (POINT, NORMAL))
+    out[pressed, POINT] = points[pressed] / total[pressed, None]
+    length = np.linalg.norm(normals, axis=1)
+    turned = (length > 0.0) & out[:, NORMAL].any(axis=1)  # without a normal, it is beyond its reach at the end
+    out[turned, NORMAL] = normals[turned] / length[turned, None]
+    return np.asarray(out)
 
 
 _UNDIVIDED = Division.none(0)

@@ -19,7 +19,7 @@ from sim.simulator.engines.linear_systems import solved
 from sim.simulator.link_kernels import link_gradient, link_step
 from sim.solve.start_velocity import SHORTEST, intervals, momenta_of_velocities, momentum_at, state_of_momentum
 from solvers.status import Status
-from solvers.types import Vector
+from solvers.types import Integers, Vector
 
 _FINEST = 1e-3  # tolerance of the share of a relative momentum
 _BRIEF = 3e-4  # of a step: its cube is small, and the rounding of displacements over it too
@@ -32,6 +32,27 @@ class Intervals:
     def __init__(self, engine: Engine) -> None:
         self._engine, self._h = engine, engine.settings.time_step
         self._damped = bool(np.any(engine.model.dof_damper))
+        self.closed = len(engine.model.loop_ntrans) + len(engine.model.gear_dof) > 0  # by loops or gears
+
+    @property
+    def time_step(self) -> float:
+        """Of the undivided steps [s]."""
+        return self._h
+
+    def floating(self) -> Integers:
+        """Degrees of freedom of the roots that float."""
+        model = self._engine.model
+        roots = np.flatnonzero((model.body_parent < 0) & (model.joint_ntrans == 3) & (model.joint_nrot == 3))
+        rows = [np.arange(model.body_vadr[i], model.body_vadr[i + 1]) for i in roots]
+        return np.concatenate(rows) if rows else np.zeros(0, dtype=np.int64)
+
+    def turn(self, x: Vector) -> float:
+        """Largest angle by which a joint would turn in a time step with its velocity at the node x (nx,) [rad]."""
+        model = self._engine.model
+        rates = np.abs(solved(self.mass(x), self.momentum(self.of_one(x), x)))
+        ends = model.body_vadr[1:]
+        turning = [rates[end - n : end].max() for end, n in zip(ends, model.joint_nrot, strict=True) if n]
+        return self._h * float(max(turning, default=0.0))
 
     def of(self, xs: Floats) -> Vector:
         """(n,) intervals of the states xs (n, nx) [s]."""
@@ -50,13 +71,13 @@ class Intervals:
         p = self._arriving(h, x)
         if self._damped:
             C = self._damping(h)
-            p -= C @ solved(self._mass(x) + C, p)
+            p -= C @ solved(self.mass(x) + C, p)
         return p
 
     def state(self, h: float, P: Vector, near: Vector) -> Vector | None:
         """The state with P(q, v; h) = P (nv,), sought from the velocity of `near` (nx,); None where there is none."""
         out = near.copy()
-        p = P + self._damping(h) @ solved(self._mass(near), P) if self._damped else P
+        p = P + self._damping(h) @ solved(self.mass(near), P) if self._damped else P
         status = state_of_momentum(self._engine.linked(link_step), self._engine.table(), h, p, out)
         return out if status == Status.SOLVED and np.isfinite(out).all() else None
 
@@ -72,8 +93,8 @@ class Intervals:
         node_dampings(self._engine.linked(link_step), h, out)
         return np.diag(out)
 
-    def _mass(self, x: Vector) -> Floats:
-        """M(q), (nv, nv)."""
+    def mass(self, x: Vector) -> Floats:
+        """M(q) of the state x (nx,), (nv, nv)."""
         nv = self._engine.sizes.nv
         out = np.zeros((nv, nv))
         momenta_of_velocities(self._engine.linked(link_step), self._engine.table(), x, np.eye(nv), out)
@@ -108,7 +129,7 @@ class Intervals:
         q = x.copy()
         q[-self._engine.sizes.nv :] = 0.0
         rest, P = self.momentum(self._h, q), self.momentum(part, x)
-        locked = self._locked(x, P - rest)
+        locked = self.locked(x, P - rest)
         state = self.state(self._h, rest + locked[0], np.concatenate([x[: -len(P)], locked[1]]))
         if state is None:
             return None
@@ -121,7 +142,7 @@ class Intervals:
                 found, share = ahead, share + step
         return found, share
 
-    def _locked(self, x: Vector, p: Vector) -> tuple[Vector, Vector]:
+    def locked(self, x: Vector, p: Vector) -> tuple[Vector, Vector]:
         """(M v_r, v_r): the roots that float move with the momentum p, everything else with them."""
         model, nv = self._engine.model, len(p)
         v, out = np.zeros(nv), np.zeros(nv)
@@ -143,14 +164,14 @@ class Intervals:
 
     def _between(self, one: tuple[float, Vector], other: tuple[float, Vector]) -> Floats:
         """Of states with equal momentum, each with its interval."""
-        by_q, by_v = self._momentum_slopes(*one)
-        by_q_there, by_v_there = self._momentum_slopes(*other)
+        by_q, by_v = self.momentum_slopes(*one)
+        by_q_there, by_v_there = self.momentum_slopes(*other)
         nv = len(by_q)
         out = np.eye(2 * nv)
         out[nv:] = solved(by_v_there, np.hstack([by_q - by_q_there, by_v]))
         return out
 
-    def _momentum_slopes(self, h: float, x: Vector) -> tuple[Floats, Floats]:
+    def momentum_slopes(self, h: float, x: Vector) -> tuple[Floats, Floats]:
         """dP/dq and dP/dv of P(q, v; h), (nv, nv).
 
         With the velocity w of the node, P = M w and (M + C) w = p:
@@ -161,7 +182,7 @@ class Intervals:
         """
         by_q, by_v = self._arriving_slopes(h, x)
         if self._damped:
-            M = self._mass(x)
+            M = self.mass(x)
             damped = M + self._damping(h)
             node = x.copy()
             node[-len(M) :] = solved(damped, self._arriving(h, x))
