@@ -124,12 +124,28 @@ def shorter(h: float, ratio: float, order: float) -> float:
 @kernel
 def _allows(clock: Vector, h: float, shortest: float, ratio: float) -> bool:
     """Whether a solved step of order 2 is kept. A step on a kink has a larger allowance, and so has one across lengths
-    that have no solution; after a rebound there is no kink, for the velocity stays wrong.
+    that have no solution: where none of these meets it, the first that is solved is kept. After a rebound there is no
+    kink, for the velocity stays wrong.
     """
     error = ratio * h  # in accuracies
     sudden = _SUDDEN * h < clock[Clock.RECENT] and clock[Clock.LEAST] > 0.0
     kink = sudden and error < _KINK and error + clock[Clock.KINKS] < _KINKS
-    return ratio <= 1.0 or kink or h <= shortest or (clock[Clock.BEYOND] > 0.0 and error < 1.0)
+    beyond = clock[Clock.BEYOND] > 0.0 and (error < 1.0 or clock[Clock.ANY] > 0.0)
+    return ratio <= 1.0 or kink or h <= shortest or beyond
+
+
+@kernel
+def _go_beyond(clock: Vector, h: float, rest: float, shortest: float, status: int) -> int:
+    """The next length after one beyond the shortest that was not kept; from the beginning, where none was, with any
+    error allowed. The Status.
+    """
+    clock[Clock.BEYOND] = 1.7 * h
+    if h < rest:
+        return _SOLVED
+    if clock[Clock.ANY] == 0.0:
+        clock[Clock.ANY], clock[Clock.BEYOND] = 1.0, 1.7 * shortest
+        return _SOLVED
+    return _TOLERANCE_STEP if status == _SOLVED or status == LANDS else status
 
 
 @kernel
@@ -138,7 +154,8 @@ def take_short(
 ) -> int:  # fmt: skip
     """One attempt of order 2, kept where its error is allowed; the Status.
 
-    Where the shortest step cannot be solved, ever longer ones are tried, with errors up to the accuracy times 1 s.
+    Where the shortest step cannot be solved, as its velocities are rounded, ever longer ones are tried, with errors up
+    to the accuracy times 1 s, then with any error, which `errors` of results reports.
     """
     clock, rest = line.clock, goal[AccuracyGoal.END] - line.clock[Clock.TIME]
     status, ratio = try_short(models, works, settings, goal, line, embedded, h)
@@ -159,9 +176,7 @@ def take_short(
     if status == _NOT_FINITE or status == _CONTACT_SUNK:
         return status
     if clock[Clock.BEYOND] > 0.0:
-        clock[Clock.BEYOND] = 1.7 * h
-        failed = _TOLERANCE_STEP if status == _SOLVED or status == LANDS else status
-        return _SOLVED if h < rest else failed
+        return _go_beyond(clock, h, rest, goal[AccuracyGoal.IMPACT], status)
     if status == _SOLVED and clock[Clock.HIT] > 0.0:  # its error is h times the rest of the accuracy for it
         shorten_impact(clock, h, max(h * min(0.5, max(0.01, 0.8 * _KINK / (ratio * h))), shortest))
     elif status == _SOLVED:

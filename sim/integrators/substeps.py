@@ -32,6 +32,7 @@ class Clock(Code):
     AHEAD = 13  # time until the first contact of that step [s]
     IMPACT = 14  # longest length of a step with an impact
     BEGUN = 15  # 0 before the first sub-step
+    ANY = 16  # 1 where no length beyond the shortest has an error that is allowed: whatever error is kept
 
 
 class AccuracyGoal(Code):
@@ -59,7 +60,7 @@ class SubstepState(NamedTuple):
     half: Vector
     node: Vector  # (nx,) scratch: the node after the undivided step
     ahead: Vector  # (nx,) scratch: mean state of a step from there
-    clock: Vector  # (16,) in place
+    clock: Vector  # (17,) in place
     report: Vector  # (6,)
     parts: Cube  # (2, ncontact, 11) scratch
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the step
@@ -106,7 +107,7 @@ def keep(line: SubstepState, h: float, order: int) -> None:
     copy_vector(line.trial, line.x)
     line.clock[Clock.TIME] += h
     line.clock[Clock.CUT] = line.clock[Clock.LEAST] = NEVER
-    line.clock[Clock.BEYOND] = 0.0
+    line.clock[Clock.BEYOND] = line.clock[Clock.ANY] = 0.0
     if order == 8 or line.clock[Clock.HIT] > 0.0:
         line.clock[Clock.IMPACT] = NEVER
     if order == 2:

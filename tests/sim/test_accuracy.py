@@ -12,6 +12,8 @@ from scipy.integrate import solve_ivp
 
 import dojo_opt as dojo
 from dojo_opt import models
+from sim.integrators.adaptive import _allows, _go_beyond
+from sim.integrators.substeps import Clock
 from sim.simulator.engines.adaptive_engine import AdaptiveEngine
 from support.scenes import ball, block
 
@@ -288,3 +290,18 @@ def test_estimated_errors_are_told() -> None:
     assert slide.success and slide.errors[worst] > 1.0
     assert slide.message.startswith(f"Solved, but the estimated error of step {worst} is ")
     assert soft.step(slide.x[worst], np.zeros(soft.nu)).error == pytest.approx(slide.errors[worst])
+
+
+def test_steps_whose_lengths_all_miss_the_accuracy_take_any_error() -> None:
+    """Where rounding refuses the shortest step of a hard impact, longer ones are tried, in the end with any error."""
+    clock, rest, shortest = np.zeros(len(Clock)), 0.5, 1e-7
+    missed = (1e-5, shortest, 1e9)  # length, shortest length, error over the one allowed
+    clock[Clock.BEYOND] = shortest
+    assert not _allows(clock, *missed)
+    assert _go_beyond(clock, 0.1, rest, shortest, dojo.Status.SOLVED) == dojo.Status.SOLVED
+    assert not _allows(clock, *missed)
+    assert _go_beyond(clock, rest, rest, shortest, dojo.Status.SOLVED) == dojo.Status.SOLVED
+    assert shortest < clock[Clock.BEYOND] < 2.0 * shortest
+    assert _allows(clock, *missed)
+    assert _go_beyond(clock, rest, rest, shortest, dojo.Status.SOLVED) == dojo.Status.ACCURACY_NOT_REACHED
+    assert _go_beyond(clock, rest, rest, shortest, dojo.Status.NO_PROGRESS) == dojo.Status.NO_PROGRESS
