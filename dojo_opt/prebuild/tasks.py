@@ -145,6 +145,13 @@ def _accurate(ground: bool) -> None:
     sim.rollout(sim.neutral(), steps=2).at([0.005])
 
 
+def _accurate_loops() -> None:
+    """Calls on a closed loop, with extrapolated steps of an accuracy."""
+    sim = dojo.Simulator(dojo.models.fourbar(), time_step=0.05, accuracy=1e-5)
+    motions(sim)
+    derivatives_of_order(sim)
+
+
 def derivatives_of_order(sim: Simulator) -> None:
     """Of steps and sweeps at the kappa of the simulator."""
     x, us = sim.neutral(), np.zeros((2, sim.nu))
@@ -282,6 +289,7 @@ _BEYOND = {  # needed neither by README's examples nor by the models
     "derivatives of a flight": lambda: _flight(derivatives, 8),
     "accuracy": lambda: _accurate(False),
     "accuracy on the ground": lambda: _accurate(True),
+    "accuracy through loops": _accurate_loops,
     "batches of environments": lambda: _environments(True),
 }
 _SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to compile for

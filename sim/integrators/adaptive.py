@@ -7,6 +7,7 @@ A sub-step of length h from a node is accepted where its estimate e of the error
 order 8    e from the embedded formulas of order 5 and 3 of Dormand and Prince (Hairer, Norsett, Wanner, II.10)
 order 2    e = |q - q'|/2 of two steps of h/2 and one of h, node_step.py; in contact eight times that, with an impact
            |v - v'| t besides, t the rest of the step, half a second at least
+order 6    that of order 2 along loops and gears, extrapolated_step.py: e of its last two columns, times four
 
 and the next one has the length h (e/allowed)^-1/k times a PI controller's share (Gustafsson, ACM TOMS 17, 1991).
 
@@ -122,6 +123,12 @@ def shorter(h: float, ratio: float, order: float) -> float:
 
 
 @kernel
+def _power(clock: Vector) -> float:
+    """The power of the length with which the error of the step just tried, over its length, grows."""
+    return 2.0 if clock[Clock.ORDER] == 2.0 else 4.0
+
+
+@kernel
 def _allows(clock: Vector, h: float, shortest: float, ratio: float) -> bool:
     """Whether a solved step of order 2 is kept. A step on a kink has a larger allowance, and so has one across lengths
     that have no solution: where none of these meets it, the first that is solved is kept. After a rebound there is no
@@ -163,13 +170,14 @@ def take_short(
     shortest = min(goal[AccuracyGoal.SETTLED], goal[AccuracyGoal.IMPACT] if rebounds else NEVER)
     if status == _SOLVED and _allows(clock, h, shortest, ratio):
         beyond, kink = clock[Clock.BEYOND] > 0.0, ratio > 1.0
-        keep(line, h, 2)
+        keep(line, h, int(clock[Clock.ORDER]))
+        clock[Clock.WAIT] = max(0.0, clock[Clock.WAIT] - 1.0)
         clock[Clock.ERROR] += ratio * h
         if kink:
             clock[Clock.KINKS] += ratio * h
             clock[Clock.SHORT] = 5.0 * h if beyond else max(clock[Clock.RECENT], 5.0 * h)
             return _SOLVED
-        length = next_length(h, ratio, clock[Clock.SHORT_RATIO], 2.0)
+        length = next_length(h, ratio, clock[Clock.SHORT_RATIO], _power(clock))
         clock[Clock.RECENT], clock[Clock.SHORT_RATIO] = h, max(ratio, 1e-4)
         clock[Clock.SHORT] = max(length, clock[Clock.SHORT] if h < 0.99 * clock[Clock.SHORT] else shortest)
         return _SOLVED
@@ -180,7 +188,7 @@ def take_short(
     if status == _SOLVED and clock[Clock.HIT] > 0.0:  # its error is h times the rest of the accuracy for it
         shorten_impact(clock, h, max(h * min(0.5, max(0.01, 0.8 * _KINK / (ratio * h))), shortest))
     elif status == _SOLVED:
-        clock[Clock.SHORT] = max(min(next_length(h, ratio, 1.0, 2.0), 0.9 * h), shortest)
+        clock[Clock.SHORT] = max(min(next_length(h, ratio, 1.0, _power(clock)), 0.9 * h), shortest)
     elif status == LANDS:
         return _SOLVED if h > _INSTANT else _TOLERANCE_STEP
     elif h <= shortest:

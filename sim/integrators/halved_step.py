@@ -1,16 +1,22 @@
-"""An attempt of order 2: one step of length h, its two halves, which are kept, and their difference."""
+"""An attempt of order 2: one step of length h, its two halves, which are kept, and their difference.
+
+Along loops and gears, without contacts and limits, the same step in three parts is extrapolated with both
+(extrapolated_step.py); the result is kept if its error is smaller.
+"""
 
 from __future__ import annotations
 
 from sim.contact.contact_report import report_contacts
 from sim.dynamics.state_manifold import configuration_difference
 from sim.integrators.contact_events import landing
+from sim.integrators.extrapolated_step import extrapolate
 from sim.integrators.node_step import begin_part, mean_of_node, node_of_mean, part_of, step_mean
 from sim.integrators.slip_stop import stopping_error
 from sim.integrators.substeps import AccuracyGoal, Clock, Embedded, SubstepState
 from sim.model.layout import data_view, model_view
 from sim.model.options import StepOptions
 from solvers.compiler import Table, kernel
+from solvers.dense import copy_vector
 from solvers.status import Status
 from solvers.types import Vector
 
@@ -23,6 +29,7 @@ _PRESSED, _HELD = 8.0, 4.0
 # [m, rad] invisible error: the gap of a contact on the central path is no more exact, nor that of a loop
 _NOISE, _CLOSED = 1e-10, 1e-12
 _OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes deeper ones, whatever its length
+_LITTLE, _WAIT = 0.01, 4.0  # least ratio of a step that is extrapolated; steps without that after one in vain
 _AHEAD = 1e-3  # [s] least length of the steps behind an impact whose velocities are compared
 
 
@@ -93,11 +100,41 @@ def _difference(
 
 
 @kernel
+def _extrapolated(
+    models: Table,
+    works: Table,
+    step: tuple[Vector, Vector, float],
+    line: SubstepState,
+    embedded: Embedded,
+    ratio: float,
+) -> float:
+    """Error over allowed of the better of two steps, which is in line.trial: that of order 2 in two halves, whose ratio
+    is given, and the extrapolated one, where it is tried.   step: (goal, settings, length).
+    """
+    model, clock = model_view(models[1]), line.clock
+    goal, settings, h = step
+    events = model.contact_body.shape[0] + model.limit_dof.shape[0]
+    if events > 0 or model.loop_ntrans.shape[0] + model.gear_dof.shape[0] == 0:
+        return ratio
+    if clock[Clock.BEYOND] + clock[Clock.WAIT] > 0.0 or not ratio > _LITTLE:
+        return ratio
+    error = max(extrapolate(models[1], works[0], settings, goal, line, embedded, h) - _CLOSED, 0.0)
+    better = _HELD * error / (goal[AccuracyGoal.ACCURACY] * h)
+    if better > 0.5 * ratio:
+        clock[Clock.WAIT] = _WAIT
+        return ratio
+    copy_vector(line.ahead, line.trial)
+    clock[Clock.ORDER] = 6.0
+    return better
+
+
+@kernel
 def try_short(
     models: Table, works: Table, settings: Vector, goal: Vector, line: SubstepState, embedded: Embedded, h: float
 ) -> tuple[int, float]:  # fmt: skip
     """line.trial = the node one step of order 2, in two halves, after line.x; (Status or LANDS, error over allowed)."""
     model, data, options = model_view(models[1]), data_view(works[0]), part_of(goal, settings, h, 2)
+    line.clock[Clock.ORDER] = 2.0
     begin_part(data, line.wrench)
     status = mean_of_node(models[1], works[0], h, line.u, line.x, line.mean)
     if status == _SOLVED:
@@ -126,4 +163,5 @@ def try_short(
     error = stopping_error(model, line.parts, line.slips, h)
     behind = part_of(goal, settings, max(0.5 * h, _AHEAD), 1)
     error = max(error, _difference(models[1], works[0], behind, goal, line, embedded))
-    return _SOLVED, error / (goal[AccuracyGoal.ACCURACY] * h)
+    ratio = error / (goal[AccuracyGoal.ACCURACY] * h)
+    return _SOLVED, _extrapolated(models, works, (goal, settings, h), line, embedded, ratio)

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from sim.dynamics.coordinates import node_poses
 from sim.dynamics.energy import factor_mass_matrix
-from sim.dynamics.loops.loop_velocity import closing_velocity
+from sim.dynamics.kinematics import displace
+from sim.dynamics.loops.loop_velocity import close_velocity, closing_velocity
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -39,3 +40,23 @@ def close_interval(model: Model, data: Data, h: float, x: Vector) -> int:
         if status != _SOLVED:
             return status
     return _SOLVED
+
+
+@optional(Slot.CLOSE_NODE, default=False)
+def close_node(model: Model, data: Data, x: Vector) -> bool:
+    """Close loops and gears at the node x = (q, v), by changes along M^-1 G^T; False where they are singular."""
+    nq = data.theta1.shape[0]
+    for _ in range(_CLOSINGS):
+        node_poses(model, data, 0.0, x)  # both configurations are that of the node
+        if not factor_mass_matrix(model, data, 0.0) or not closing_velocity(model, data, 1.0):
+            return False
+        displace(model, x[:nq], data.dnu, -1.0, x[:nq])
+    node_poses(model, data, 0.0, x)
+    if not factor_mass_matrix(model, data, 0.0):
+        return False
+    for d in range(data.dnu.shape[0]):
+        data.dnu[d] = x[nq + d]
+    close_velocity(model, data, 1.0, x[:nq], x[nq:], data.dnu)
+    for d in range(data.dnu.shape[0]):
+        x[nq + d] = data.dnu[d]
+    return True

@@ -33,6 +33,8 @@ class Clock(Code):
     IMPACT = 14  # longest length of a step with an impact
     BEGUN = 15  # 0 before the first sub-step
     ANY = 16  # 1 where no length beyond the shortest has an error that is allowed: whatever error is kept
+    ORDER = 17  # of the step in the trial: 2, or 6 where it is extrapolated
+    WAIT = 18  # steps of order 2 until the next extrapolation is tried
 
 
 class AccuracyGoal(Code):
@@ -60,7 +62,7 @@ class SubstepState(NamedTuple):
     half: Vector
     node: Vector  # (nx,) scratch: the node after the undivided step
     ahead: Vector  # (nx,) scratch: mean state of a step from there
-    clock: Vector  # (17,) in place
+    clock: Vector  # (19,) in place
     report: Vector  # (6,)
     parts: Cube  # (2, ncontact, 11) scratch
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the step
@@ -110,7 +112,7 @@ def keep(line: SubstepState, h: float, order: int) -> None:
     line.clock[Clock.BEYOND] = line.clock[Clock.ANY] = 0.0
     if order == 8 or line.clock[Clock.HIT] > 0.0:
         line.clock[Clock.IMPACT] = NEVER
-    if order == 2:
+    if order != 8:
         line.clock[Clock.READY] = 0.0
         add_contacts(line)
 

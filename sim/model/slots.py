@@ -230,3 +230,5 @@ class Slot(Code):
     # bounds of the distance of two polytopes, and of cylinders
     APART_POLYTOPES = 185
     CYLINDER_APART = 186
+    # nodes of extrapolated steps with closed loops and gears
+    CLOSE_NODE = 187

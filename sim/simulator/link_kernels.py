@@ -117,7 +117,7 @@ from sim.dynamics.loops.gears import (
 )
 from sim.dynamics.loops.loop_velocity import close_velocity
 from sim.dynamics.loops.loop_work import loop_slack, loops_gained
-from sim.integrators.mean_velocity import close_interval
+from sim.integrators.mean_velocity import close_interval, close_node
 from sim.model.model import Law, Model
 from sim.model.record_columns import Cluster
 from sim.model.shape_kinds import CHOSEN, SWAPPED, Pair
@@ -284,7 +284,7 @@ def link_poses(model: Model) -> None:
 def link_nodes(model: Model) -> None:
     """Link the kernels of velocities and energies at nodes: those of loops follow from their constraints."""
     if len(model.loop_ntrans) + len(model.gear_dof):
-        link(model.optional, *_COUPLING, add_loop_sizes, close_velocity)
+        link(model.optional, *_COUPLING, add_loop_sizes, close_velocity, close_node)
         if np.any(model.dof_damper):
             link(model.optional, close_interval)
     if len(model.gear_dof):

@@ -15,6 +15,7 @@ from dojo_opt import models
 from sim.integrators.adaptive import _allows, _go_beyond
 from sim.integrators.substeps import Clock
 from sim.simulator.engines.adaptive_engine import AdaptiveEngine
+from support.linkage import plain_fourbar
 from support.scenes import ball, block
 
 Floats = NDArray[np.float64]
@@ -200,15 +201,32 @@ def test_velocities_are_closed_along_gears() -> None:
 
 
 @pytest.mark.parametrize("name", ["gear", "four-bar"])
+def test_extrapolated_steps_are_of_sixth_order(name: str) -> None:
+    """Without dampers; with loops and gears closed where a step ends."""
+    undamped = [replace(joint, damper=0.0) for joint in GEARED.joints]
+    mech = replace(GEARED, joints=undamped) if name == "gear" else plain_fourbar()
+    sim = dojo.Simulator(mech, time_step=0.1, tolerance=1e-13, accuracy=1e-3)
+    rng = np.random.default_rng(5)
+    x = sim.close(sim.integrate(sim.neutral(), 0.3 * rng.normal(size=sim.ndx)))
+    u = rng.normal(size=sim.nu)
+    ends = [replayed(sim, x, u, (np.full(n, 0.1 / n), np.full(n, 6))) for n in (2, 4, 16)]
+    errors = [np.abs(sim.difference(end, ends[-1])).max() for end in ends[:-1]]
+    assert errors[1] < errors[0] / 40.0
+    for end in ends:
+        assert np.abs(sim.difference(end, sim.close(end))).max() < 1e-13
+
+
+@pytest.mark.parametrize("name", ["gear", "four-bar"])
 def test_derivatives_through_gears_and_loops(name: str) -> None:
     """Against differences along motions that keep them closed, with the division kept."""
     rng = np.random.default_rng(5)
     mech = GEARED if name == "gear" else models.fourbar()
-    sim = dojo.Simulator(mech, time_step=0.02, accuracy=1e-3)
+    sim = dojo.Simulator(mech, time_step=0.02, tolerance=1e-12, accuracy=1e-3)
     x = sim.close(sim.integrate(sim.neutral(), 0.3 * rng.normal(size=sim.ndx)))
     u, none = rng.normal(size=sim.nu), engine(sim).no_wrenches
     path = engine(sim).take(x, u, none)
     parts = path.lengths, path.orders
+    assert 6 in path.orders
     np.testing.assert_allclose(replayed(sim, x, u, parts), path.x, rtol=0.0, atol=1e-9)
     A, B = sim.linearize(x, u, throw=True)
     for _ in range(3):

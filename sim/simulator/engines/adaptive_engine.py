@@ -19,6 +19,7 @@ from sim.derivatives.momentum_gradient import momentum_jacobian
 from sim.dynamics.joints.damper import node_dampings
 from sim.integrators.adaptive import go_on
 from sim.integrators.adaptive_rollout import SubstepMotion, roll_substeps
+from sim.integrators.extrapolated_step import PARTS, combined_at
 from sim.integrators.hamilton_gradient import Slopes
 from sim.integrators.node_slopes import node_slopes
 from sim.integrators.node_step import begin_work, mean_of_node, node_at
@@ -53,6 +54,7 @@ _CONVERGED = 1e-6  # tolerance of steps with loops or gears, in accuracies
 _ROWS = 256  # sub-steps between two pauses
 _MOST = 1_000_000  # sub-steps of a step: an input is not held for ever
 
+_DIVISIONS = range(1, PARTS + 1)
 _NUDGE = 1e-3  # of states and inputs, in differences
 
 Held = tuple[Vector, Cube]  # input (nu,) and external wrenches (1 or 0, nbody, 6) of a step
@@ -153,29 +155,43 @@ class AdaptiveEngine(PythonLoopEngine):
 
     # -- sub-steps one by one ------------------------------------------------------------------------------------------
 
-    def _part_settings(self, h: float, kappa: float | None) -> Vector:
+    def _part_settings(self, h: float, kappa: float | None, parts: int = 1) -> Vector:
         """Settings of a step of order 2 of length h, as in `part_of` of node_step.py."""
         settings = self._second.settings.array(kappa)
         settings[StepSetting.TIME_STEP] = h
-        settings[StepSetting.KAPPA] = max(settings[StepSetting.KAPPA] * h / self.settings.time_step, _LEAST_KAPPA)
+        settings[StepSetting.KAPPA] = max(
+            settings[StepSetting.KAPPA] * h / self.settings.time_step, parts * _LEAST_KAPPA
+        )
         return settings
 
     def part(self, x: Vector, held: Held, h: float, order: int, kappa: float | None = None) -> Vector:
         """The node one sub-step of a length and order after x (nx,); NaN where it is not solved."""
         if order == 8:
             return self._long(x, held, h, False)[0]
-        for _ in range(2):
-            x = self._half(x, held, 0.5 * h, kappa)
+        if order == 6:
+            return self._combined(np.stack([self._equal(x, held, h, n, kappa) for n in _DIVISIONS]))
+        return self._equal(x, held, h, 2, kappa)
+
+    def _equal(self, x: Vector, held: Held, h: float, parts: int, kappa: float | None) -> Vector:
+        """The node a length h after x (nx,), in parts of order 2."""
+        for _ in range(parts):
+            x = self._short(x, held, h / parts, kappa, 2 if parts == 1 else 1)
         return x
 
-    def _half(self, x: Vector, held: Held, h: float, kappa: float | None) -> Vector:
-        """The node one step of order 2 after x (nx,)."""
+    def _combined(self, ends: Floats) -> Vector:
+        """The extrapolated node of those after one, two and three parts, (3, nx)."""
+        out, scratch = np.zeros(self.nx), np.zeros((2, self.sizes.nv))
+        combined_at(self._second.step_table(), self._scratch.table(), ends, out, scratch)
+        return out
+
+    def _short(self, x: Vector, held: Held, h: float, kappa: float | None, parts: int) -> Vector:
+        """The node one step of order 2 after x (nx,).   parts: as in `part_of` of node_step.py."""
         (u, wrench), xs = held, np.zeros((2, self.nx))
         xs[0] = self._mean(x, held, h)
         contacts = np.zeros((1, self.sizes.ncontact, CONTACT))
         line = MotionBuffers(xs, u[None], wrench, np.zeros((1, REPORT)), contacts, *self.no_predictions[:2])
         model, data = self._second.step_table(), self._scratch.table()
-        if roll(model, data, self._part_settings(h, kappa), line, 0, None, None) < 1:
+        if roll(model, data, self._part_settings(h, kappa, parts), line, 0, None, None) < 1:
             return np.full(self.nx, np.nan)
         return self._node(xs[1], held, h)
 
@@ -185,21 +201,46 @@ class AdaptiveEngine(PythonLoopEngine):
         """(node after a sub-step, its derivatives by x and by the input, report)."""
         if order == 8:
             return self._long(x, held, h, True)
+        if order == 2:
+            return self._equal_slopes(x, held, h, 2, kappa)
+        found = [self._equal_slopes(x, held, h, n, kappa) for n in _DIVISIONS]
+        ends = np.stack([end for end, *_ in found])
+        shares = np.split(self._combined_slopes(ends), len(ends), axis=1)
+        by_x = sum((C @ A for C, (_, A, _, _) in zip(shares, found, strict=True)), np.zeros((self.ndx, self.ndx)))
+        by_u = sum((C @ B for C, (_, _, B, _) in zip(shares, found, strict=True)), np.zeros((self.ndx, self.nu)))
+        return self._combined(ends), by_x, by_u, max((report for *_, report in found), key=_least_exact)
+
+    def _combined_slopes(self, ends: Floats) -> Floats:
+        """Derivatives (ndx, 3 ndx) of the extrapolated node by those it is combined of, by differences."""
+        end = self._combined(ends)
+
+        def moved(change: Floats) -> Floats:
+            starts = self.states.integrate(ends, change.reshape(len(ends), self.ndx))
+            return np.asarray(self.states.difference(end[None], self._combined(starts)[None])[0])
+
+        return central_differences(moved, len(ends) * self.ndx, _NUDGE)
+
+    def _equal_slopes(
+        self, x: Vector, held: Held, h: float, parts: int, kappa: float | None
+    ) -> tuple[Vector, Floats, Floats, Vector]:
+        """As part_slopes, of equal parts of order 2."""
         u, wrench = held
         by_x, by_u = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
         model, data = self._second.gradient_table(), self._scratch.table()
         A, B = np.zeros((1, self.ndx, self.ndx)), np.zeros((1, self.ndx, self.nu))
-        half, reports = 0.5 * h, np.zeros((1, REPORT))
-        for _ in range(2):
-            mean, x_next = self._mean(x, held, half), np.zeros((1, self.nx))
+        h, reports = h / parts, np.zeros((1, REPORT))
+        settings, worst = self._part_settings(h, kappa, 2 if parts == 1 else 1), np.zeros(REPORT)
+        for _ in range(parts):
+            mean, x_next = self._mean(x, held, h), np.zeros((1, self.nx))
             line = Linearized(mean[None], u[None], wrench, A, B, x_next, reports)
-            linearize(model, data, self._part_settings(half, kappa), (0, 0, 1), 1, line)
-            C, D = self._mean_slopes(x, held, half, mean)
-            x = self._node(x_next[0], held, half)
-            E, F = self._end_slopes(x_next[0], held, half, x)
+            linearize(model, data, settings, (0, 0, 1), 1, line)
+            worst = max(worst, reports[0].copy(), key=_least_exact)
+            C, D = self._mean_slopes(x, held, h, mean)
+            x = self._node(x_next[0], held, h)
+            E, F = self._end_slopes(x_next[0], held, h, x)
             by_u = E @ (A[0] @ (C @ by_u + D) + B[0]) + F
             by_x = E @ A[0] @ C @ by_x
-        return x, by_x, by_u, reports[0]
+        return x, by_x, by_u, worst
 
     def _long(self, x: Vector, held: Held, h: float, derivatives: bool) -> tuple[Vector, Floats, Floats, Vector]:
         """As part_slopes, of order 8; without derivatives these are empty."""
@@ -383,6 +424,11 @@ class AdaptiveEngine(PythonLoopEngine):
         carried: Floats = self._kept.contacts
         impulses = carried[:, ContactRow.IMPULSE : ContactRow.POINT]
         return np.asarray(np.linalg.norm(impulses, axis=1) <= self.settings.tolerance)
+
+
+def _least_exact(report: Vector) -> tuple[bool, float]:
+    """Order of reports of derivatives: unsolved ones last, then those with a larger error."""
+    return bool(report[StepReport.STATUS] != Status.SOLVED), float(report[StepReport.ACCURACY])
 
 
 def _lightest(model: Model) -> float:
