@@ -76,6 +76,9 @@ fi
 measure parameter_derivatives "$python" "$here/benchmarks/parameter_derivatives.py" $quick --out "$out"
 if "$python" -c 'import importlib.metadata as m; m.version("example-robot-data")' 2>/dev/null; then
     measure urdf_zoo "$python" "$here/benchmarks/urdf_zoo.py" $quick --out "$out"
+    if [ -z "$quick" ] && "$python" -c "import pinocchio" 2>/dev/null; then
+        measure urdf_kinematics "$python" "$here/benchmarks/urdf_kinematics.py" --out "$out"
+    fi
     measure robots "$python" "$here/benchmarks/robots.py" $quick --out "$out"
     measure shapes "$python" "$here/benchmarks/shapes.py" $quick --out "$out"
 else

@@ -28,7 +28,6 @@ from dojo_opt.report.result import Cell, Report, Table
 
 COLUMNS, WIDTH, HEIGHT = 8, 320, 240  # of the sheet, and of a picture in pixels
 WAIT = 1500  # [ms] until a page is drawn
-BAR = 50  # pixels at the bottom, which the controls cover
 LIMIT = 5e6  # bytes of a page
 ARGUMENTS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--no-sandbox"]
 
@@ -57,12 +56,13 @@ def pictures(robots: dict[str, Any]) -> dict[str, tuple[Any, int]]:
     path = next((p for p in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if p), None)
     with sync_playwright() as session, tempfile.TemporaryDirectory() as folder:
         browser = session.chromium.launch(executable_path=path, args=ARGUMENTS)
-        page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT + BAR})
+        page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
         for name, mech in progress()([(name, (name, mech)) for name, mech in robots.items()], "pictures"):
             file = dojo.viewer.save_html(mech, Path(folder) / "robot.html")
             page.goto(file.as_uri())
+            page.add_style_tag(content="#bar {display: none !important}")
             page.wait_for_timeout(WAIT)
-            image = imread(BytesIO(page.screenshot()))[:HEIGHT, :, :3]
+            image = imread(BytesIO(page.screenshot()))[..., :3]
             out[str(name)] = (image, file.stat().st_size)
         browser.close()
     return out

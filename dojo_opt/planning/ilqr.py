@@ -521,14 +521,14 @@ class Solver:
     def _finish(self, stage: Stage) -> None:
         """Close the gaps at the last smoothing, and compute the gains of the trajectory that is returned.
 
-        The gains have the least regularisation that every Q_uu needs: that of the last iterations only shortens their
-        steps, and would leave little feedback.
+        The gains have the regularisation of the problem, or the least one that every Q_uu needs: that of the last
+        iterations only shortens their steps, and would leave little feedback.
         """
         if self.now.gaps is not None or self.now.kappa != stage.kappa_eval:
             self._roll_out(stage.kappa_eval)
         local, now = self._subproblem, self.now
         if local.is_at(now) or local.linearize(now, stage.kappa_grad, stage.kappa_eval) == Status.SOLVED:
-            local.schedule.reset(0.0)
+            local.schedule.reset(self.problem.gain_regularization)
             local.gains(now)
 
     def _plan(self, status: Status, detail: str) -> Plan:

@@ -97,6 +97,9 @@ class Problem:
             knot, at least 1e-4 [m, rad]: `ilqr` ends by planning with 2, 4, ..., 32 times as many time steps, or as
             many times `refinement`, until the plan is as accurate as this (default None: without replay).
         refined_constraints: one constraint or several of that problem only, which do not help from a distant guess.
+        gain_regularization: weight of the controls in the gains of the plan, beyond that in the plan itself, in units
+            of the mean of their weights (default 0). Where the cost hardly weighs the controls, gains are so high that
+            the plan may not survive shorter time steps.
         advice: what to change where no plan is found: a sentence for the message of such a plan (default none).
 
     Attributes:
@@ -123,11 +126,14 @@ class Problem:
         refinement: int = 1,
         refined_accuracy: float | None = None,
         refined_constraints: Spec | Sequence[Spec] = (),
+        gain_regularization: float = 0.0,
         advice: str = "",
     ) -> None:
         _check_simulator("Problem(sim)", sim)
         self.sim = sim
         self.advice = advice
+        call = "Problem(gain_regularization=...)"
+        self.gain_regularization = checks.number(call, gain_regularization, at_least=0.0)
         self.horizon = whole_number("Problem(horizon=...)", horizon)
         self.substeps = whole_number("Problem(substeps=...)", substeps)
         self.refinement = whole_number("Problem(refinement=...)", refinement)

@@ -36,6 +36,7 @@ _LOOSE = 0.2  # of the usual damper, which takes much of the torque of ankles th
 _SHARES = (1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2)  # of the usual distance and height of a jump, from the most
 _STRAIN = 1.3  # times the torque limits: largest torques of the reference of a jump, which plans spread over more time
 _CROUCH = 0.8  # of the way down that the legs allow, at most, before a jump
+_CALM = 10.0  # regularisation of the gains of a jump on flat feet, which topple over where they are higher
 _LEAST = 1e-3  # [s] time steps are multiples of this
 
 
@@ -189,7 +190,9 @@ def jump(
     odd = -(len(gait.x) - 1) % substeps
     if odd:  # whole knots: the rest at the end takes longer
         gait = _strongest(legs, sim, usual, {**rest, "after": {**usual, **rest}["after"] + odd * step})
-    return locomotion.with_apex(_scaled(legs, gait, follows), refinement)
+    problem = locomotion.with_apex(_scaled(legs, gait, follows), refinement)
+    problem.gain_regularization = _CALM if Feet(sim).flat else 0.0
+    return problem
 
 
 def _strongest(legs: Legs, sim: Simulator, usual: dict[str, float], given: dict[str, Any]) -> Gait:

@@ -24,6 +24,7 @@ _POINTS = 200  # of the path that the camera follows
 _ROOM = 0.3  # [m] between motions side by side
 _BOXES = {"forces": "forces", "paths": "paths", "ghost": "goal"}  # parts of MeshCat's scene, as the page calls them
 _TINTS = ("#d9822b", "#2b6cd9", "#3a9d4f", "#a23ba8")  # of a robot that is drawn more than once, from the second on
+_PLAIN = "#556"  # of the mark beside the name of a motion without a tint
 _TINT, _THROUGH = 0.75, 0.5  # share of the tint in a colour, and opacity of robots that are drawn in one place
 _SHADE, _SHADED = 0.35, 3.0  # darkness of shadows, and half-width of the ground that has some over the robot's radius
 _SKY, _HORIZON = (1.0, 1.0, 1.0), (0.84, 0.88, 0.93)
@@ -38,7 +39,7 @@ body {{margin: 0; font: 14px system-ui, sans-serif; color: #223}}
 #bar {{position: absolute; left: 0; right: 0; bottom: 0; display: flex; gap: 12px; align-items: center;
       padding: 8px 16px; background: rgba(255, 255, 255, 0.8)}}
 #time {{flex: 1; min-width: 60px}} #bar > * {{white-space: nowrap}}
-#bar {{flex-wrap: wrap}} #bar button {{flex: none; min-width: 28px}} #bar #play {{width: 64px}}
+#bar:has(.name) {{flex-wrap: wrap}} #bar button {{flex: none; min-width: 28px}} #bar #play {{width: 64px}}
 #clock {{width: 110px; font-variant-numeric: tabular-nums}}
 </style></head>
 <body><div id="meshcat-pane" title="drag to turn, scroll to zoom"></div>
@@ -258,9 +259,10 @@ def color_of(number: int) -> str:
 def _legend(names: Sequence[str], tinted: list[Any]) -> str:
     """The names of motions in the bar, with their tints."""
     colors = {tuple(path): color for path, color, _ in tinted}
+    paint = [colors.get((*group_of(k), "bodies"), _PLAIN) for k in range(len(names))]
     return "".join(
-        f'\n<span><b style="color: {colors.get((*group_of(k), "bodies"), "#556")}">&#9632;</b> {escape(name)}</span>'
-        for k, name in enumerate(names)
+        f'\n<span class="name"><b style="color: {color}">&#9632;</b> {escape(name)}</span>'
+        for color, name in zip(paint, names, strict=True)
     )
 
 

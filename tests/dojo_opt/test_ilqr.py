@@ -225,3 +225,16 @@ def test_refined_keeps_knots_and_terms_and_cuts_the_steps():
     for count in (0, 1.5, True):
         with pytest.raises(ValueError, match="expected a whole number >= 1"):
             problem.refined(count)
+
+
+def test_regularized_gains_leave_the_plan_as_it_is():
+    """As if the controls weighed more: at the last knot, whose value is the cost of the end alone, exactly so."""
+    plain, problem = ilqr(lqr()), lqr()
+    problem.gain_regularization = 10.0
+    calm = ilqr(problem)
+    np.testing.assert_array_equal(calm.x, plain.x)
+    np.testing.assert_array_equal(calm.u, plain.u)
+    lin = problem.sim.linearize_trajectory(plain.x[-2:-1], plain.u[-1:])
+    A, B = lin.A[0], lin.B[0]
+    for plan, weight in ((plain, 0.1), (calm, 1.1)):
+        np.testing.assert_allclose(plan.K[-1], -np.linalg.solve(weight + B.T @ B, B.T @ A), rtol=1e-9)
