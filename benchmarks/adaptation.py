@@ -5,8 +5,9 @@
 `dojo.tasks.quadruped_mpc` trots at 0.2 m/s for 4 s on a plant with 2 ms and hard contact. Each run draws a payload of 0
 to 24 kg on a robot of 11.9 kg, a friction of 0.2 to 0.8, and a push of up to 8 N s between 1 and 2 s; half of the runs
 measure with noise (0.2 mm and mrad; 2 mm/s and mrad/s). The model has no payload and a friction of 0.8, of which plans
-count on 0.4 at most. The adapting controller estimates the mass of the trunk and the friction; friction is known where
-its standard deviation is below 0.1, which takes a foot that slides.
+count on 0.4 at most. The adapting controller estimates the mass of the trunk and the friction. Friction is known where
+its standard deviation is below 0.1, which takes a foot that slides; until then it has a lower bound, the friction that
+standing feet have used.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ ADAPT = ("mass:trunk", "friction:*")
 NOISE = (2e-4, 2e-3)  # [m, rad], [m/s, rad/s]
 SECONDS, KNOWN, CHECKED = 4.0, 0.1, 1.0  # [s], [1], [s]
 CLOSE = 0.05  # share of the mass
+SURE = 0.9  # share of the runs whose bounds hold, two standard deviations wide
 
 
 def perturbation(run: int) -> dict[str, Any]:
@@ -44,11 +46,13 @@ def perturbation(run: int) -> dict[str, Any]:
 
 
 class Watched:
-    """A controller whose estimates are kept: after `CHECKED` s, and as a history (time [s], values, deviations)."""
+    """A controller whose estimates are kept: after `CHECKED` s, and as a history (time [s], values, deviations, and the
+    bounds of the friction).
+    """
 
     def __init__(self, mpc: dojo.MPC) -> None:
         self.mpc, self.values, self.deviations = mpc, {}, {}
-        self.history: list[tuple[float, Any, Any]] = []
+        self.history: list[tuple[float, Any, Any, tuple[float, float]]] = []
 
     def reset(self) -> None:
         """As MPC.reset."""
@@ -58,19 +62,24 @@ class Watched:
         u = self.mpc(now, x)
         if self.mpc.estimator is not None:
             found = self.mpc.estimator.values, self.mpc.estimator.deviations
-            self.history.append((now, *found))
+            self.history.append((now, *found, self.mpc.estimator.bounds["friction:*"]))
             if abs(now - CHECKED) < 1e-9:
                 self.values, self.deviations = found
         return u
 
     def found(self, total: float) -> float:
         """Time from which on the mass of the loaded trunk, `total` [kg], is estimated to within `CLOSE` [s]."""
-        off = [now for now, values, _ in self.history if abs(values["mass:trunk"] - total) > CLOSE * total]
+        off = [now for now, values, *_ in self.history if abs(values["mass:trunk"] - total) > CLOSE * total]
         return max(off, default=0.0)
 
     def knows(self) -> float:
         """Time at which friction is known first [s]; infinite if never."""
-        return next((now for now, _, deviations in self.history if deviations["friction:*"] < KNOWN), float("inf"))
+        return next((now for now, _, deviations, _ in self.history if deviations["friction:*"] < KNOWN), float("inf"))
+
+    def bounded(self, friction: float, time: float) -> tuple[bool, float]:
+        """(whether the bounds of the friction held at a time [s], the lower one over the friction)."""
+        low, high = next(row[3] for row in reversed(self.history) if row[0] < time + 1e-9)
+        return low <= friction <= high, low / friction
 
 
 def trial(run: int, adapt: dojo.Adaptation | None) -> tuple[dojo.ClosedLoop, Watched, float]:
@@ -88,6 +97,7 @@ def run(args: argparse.Namespace) -> Report:
     lines: list[list[Cell]] = []
     payload, friction, costs, survivors = [], [], [], np.zeros(2, dtype=int)
     times: list[tuple[float, float]] = []
+    bounds: list[list[tuple[bool, float]]] = []
     count = 2 if args.quick else args.runs
     for k in progress()([(f"run {k}", partial(int, k)) for k in range(count)], "runs"):
         number_of_run = k()
@@ -98,6 +108,7 @@ def run(args: argparse.Namespace) -> Report:
         survivors += (fixed.survived, loop.survived)
         costs.append(adaptive / cost)
         times.append((watched.found(drawn["payload"] + 6.0), watched.knows()))
+        bounds.append([watched.bounded(drawn["friction"], time) for time in (CHECKED, SECONDS)])
         line: list[Cell] = [drawn["payload"], drawn["friction"], fixed.duration, loop.duration]
         if watched.values:
             total = drawn["payload"] + 6.0
@@ -105,7 +116,8 @@ def run(args: argparse.Namespace) -> Report:
             known = watched.deviations["friction:*"] < KNOWN
             friction += [abs(watched.values["friction:*"] - drawn["friction"])] if known else []
             line += [watched.values["mass:trunk"] - 6.0, watched.values["friction:*"], "yes" if known else "no"]
-        lines.append([*line, *([""] * (7 - len(line)))])
+        lines.append([*line, *([""] * (7 - len(line))), bounds[-1][0][1]])
+    hold, low = np.array(bounds).transpose(2, 1, 0)  # (2, runs) each
     report.rows = [
         number("runs", float(count)),
         Row("runs that the fixed model survives", float(survivors[0]), "", None),
@@ -123,6 +135,11 @@ def run(args: argparse.Namespace) -> Report:
         ),
         number("runs in which friction is known after 4 s", float(np.sum(np.isfinite(times), axis=0)[1])),
         number("runs in which friction is known after 1 s", float(len(friction))),
+        Row("runs whose bounds of the friction hold after 1 s", float(hold[0].sum()), "", SURE * count, True),
+        Row("runs whose bounds of the friction hold after 4 s", float(hold[1].sum()), "", SURE * count, True),
+        number("lower bound over the friction after 1 s, median", float(np.median(low[0]))),
+        number("lower bound over the friction after 4 s, median", float(np.median(low[1]))),
+        number("error of a known friction, largest", max(friction, default=float("nan"))),
         number("error of a known friction, median", float(np.median(friction)) if friction else float("nan"), 0.1),
         number("processor time over that of the fixed model, median", float(np.median(costs))),
     ]
@@ -134,6 +151,7 @@ def run(args: argparse.Namespace) -> Report:
         "payload after 1 s",
         "friction",
         "known",
+        "lower bound / friction",
     )
     report.tables = [Table("Runs", header, lines)]
     return report

@@ -27,26 +27,27 @@ def main():
         def controller(time, x, mpc=mpc, rows=rows):
             u = mpc(time, x)
             if mpc.estimator is not None:
-                rows.append((time, *mpc.estimator.values.values(), *mpc.estimator.deviations.values()))
+                rows.append((time, *mpc.estimator.values.values(), *sum(mpc.estimator.bounds.values(), ())))
             return u
 
         mpc.reset()
         loop = dojo.closed_loop(controller, plant, seconds)
         print(f"{'adaptive' if settings else 'fixed'} model: {loop.message}")
-    time, mass, friction, mass_deviation, friction_deviation = np.array(rows).T
+    time, mass, friction, *bounds = np.array(rows).T
     print(f"after {time[-1]:.1f} s: payload {mass[-1] - TRUNK:.2f} kg of {PAYLOAD:g}, friction {friction[-1]:.3f}")
     assert loop.survived, loop.message
     assert abs(mass[-1] - TRUNK - PAYLOAD) < 0.02 * PAYLOAD, mass[-1]
 
     figure, axes = plt.subplots(2, 1, sharex=True, figsize=(7, 5), layout="constrained")
-    for ax, value, deviation, true, label in (
-        (axes[0], mass - TRUNK, mass_deviation, PAYLOAD, "payload [kg]"),
-        (axes[1], friction, friction_deviation, FRICTION, "friction"),
+    for ax, value, (low, high), shift, true, label in (
+        (axes[0], mass, bounds[:2], TRUNK, PAYLOAD, "payload [kg]"),
+        (axes[1], friction, bounds[2:], 0.0, FRICTION, "friction"),
     ):
-        ax.fill_between(time, value - 2.0 * deviation, value + 2.0 * deviation, alpha=0.25, label="two deviations")
-        ax.plot(time, value, label="estimate")
+        top = 1.5 * max(true, 0.8)
+        ax.fill_between(time, low - shift, np.minimum(high - shift, top), alpha=0.25, label="bounds")
+        ax.plot(time, value - shift, label="estimate")
         ax.axhline(true, color="black", linestyle="--", label="true value")
-        ax.set_ylim(0.0, 1.5 * max(true, 0.8))
+        ax.set_ylim(0.0, top)
         ax.set_ylabel(label)
     axes[0].legend(loc="lower right")
     axes[1].set_xlabel("time [s]")

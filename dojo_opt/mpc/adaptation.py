@@ -8,8 +8,11 @@ interval:
 
 f: steps of the model with hard contact, each as long as a sample. J, A: derivatives of f by the parameters and by the
 state. R: noise of the measured state. An innovation r beyond two standard deviations counts less, as with Huber's
-loss. J is then the derivative of contact as smooth as that of the plans: a foot that slides, but sticks in the model,
-has no derivative by the friction where contact is hard. Intervals in which a contact lands are not used: the time of an
+loss. Where nothing fits, for a short time, that has fitted before, the robot was pushed, and theta stays.
+
+Feet that stand tell nothing of their friction but a lower bound (used_friction.py). J has therefore a column for a
+friction only where one of its feet slides. Where the foot sticks in the model, whose contact is hard, J is the
+derivative of contact as smooth as that of the plans. Intervals in which a contact lands are not used: the time of an
 impact depends on the height of the ground, which is not known as exactly as the states.
 """
 
@@ -24,15 +27,20 @@ from numpy.typing import ArrayLike
 from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.identification.windows import slopes_along
 from dojo_opt.mpc.ground_estimate import Ground
+from dojo_opt.mpc.used_friction import UsedFriction
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.adjustable_simulator import AdjustableSimulator
 from sim.simulator.simulator import Simulator
-from solvers.types import Matrix, Vector
+from solvers.types import Flags, Matrix, Vector
 
 _ROUNDING = 1e-9  # [s]
 _OUTLIER = 2.0  # standard deviations beyond which an innovation counts less, and a change of the estimate is shortened
 _CURVED = 0.25  # share of a change of the estimate that may be wrong, as the prediction is not linear in it
+_BRIEF = 0.2  # [s] in which an outlier is no error of parameters, if all was well before: these change for longer
+_SURE = 2.0  # standard deviations of the bounds
+_SEEN = 0.25  # share of its first variance that a friction has at most once a foot has slid
+_SLID = 2.0  # a foot that slides is off by so many heights of a contact that stands
 _MOVED = 0.02  # share of the spread: models are built anew when the estimate has moved by it, and linearised until then
 _NEAR = 3.0  # standard deviations of the height of a contact that stands
 _CLOSE = 1e-4  # [m] the same without noise
@@ -104,6 +112,7 @@ class ParameterEstimator:
         self._noise = np.maximum(noise, _ROUND_OFF) ** 2
         self._near = max(_CLOSE, _NEAR * float(noise[: nominal.nv].max()))
         self._prior = self._spread() ** 2
+        self._used = UsedFriction(nominal.mechanism, self.space.labels)
         self._fine: AdjustableSimulator | None = None  # with steps of the length of the samples
         self._written = self.space.values.copy()  # the values of the models
         self.forget()
@@ -133,9 +142,23 @@ class ParameterEstimator:
         """The standard deviations of the estimate, by label."""
         return dict(zip(self.space.labels, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
+    @property
+    def bounds(self) -> dict[str, tuple[float, float]]:
+        """Bounds by label: two standard deviations about the estimate. Those of a friction begin at what standing feet
+        have used, and have no end until a foot has slid: it takes that to tell more.
+        """
+        off = _SURE * np.sqrt(np.diag(self.covariance))
+        low, high = self.theta - off, self.theta + off
+        unseen = self._used.frictions & (off**2 > _SEEN * _SURE**2 * self._prior)
+        low = np.where(self._used.frictions, np.maximum(np.where(unseen, 0.0, low), self._used.least), low)
+        high = np.where(unseen, np.inf, high)
+        return {k: (float(a), float(b)) for k, a, b in zip(self.space.labels, low, high, strict=True)}
+
     def forget(self) -> None:
         """Back to the values of the robot, without measurements."""
         self.theta, self.covariance = self.space.values.copy(), np.diag(self._prior)
+        self._settled, self._disturbed = False, 0.0
+        self._used.forget()
         if not np.array_equal(self.theta, self._written):
             self._write()
         self._samples: list[tuple[float, Vector, Vector]] = []  # (time, state, input after it)
@@ -181,15 +204,24 @@ class ParameterEstimator:
         if found is None or self._lands(ground, gaps, self._samples[-1][1], found[0]):
             return
         end, A, J = found
+        stands, slides = self._feet(ground, gaps, self._samples[-1][1], end)
+        contacts = fine.rollout(x, us).contacts
+        J = J * self._used.tells(slides | self._used.sliding(contacts, stands))
         innovation, inflation = fine.difference(self._samples[-1][1], end), _CURVED
         size = self._normalized(innovation, A, J)
-        if size > _OUTLIER:  # a foot that sticks in the model says nothing of friction
+        if size > _OUTLIER and slides.any():  # in the model they stick, which has no derivative by friction
             smooth = self._planner.kappa * fine.time_step / self._planner.time_step
             found = self._predict(fine, x, us, smooth)
             if found is not None:
-                J, inflation = found[2], 1.0
+                J, inflation = found[2] * self._used.tells(slides), 1.0
                 size = self._normalized(innovation, A, J)
+        if self._is_disturbed(size, len(us) * fine.time_step):
+            J = J * self._used.frictions
+        elif size < _OUTLIER and not slides.any():
+            self._used.observe(contacts, stands, float(np.sqrt(np.mean(innovation[fine.nv :] ** 2))))
         self._correct(innovation, A, J, size, inflation)
+        self._used.bound(self.theta + _SURE * np.sqrt(np.diag(self.covariance)), slides)
+        self.theta = np.clip(self.theta, self._used.least, self.space.high)
         if np.any(np.abs(self.theta - self._written) > _MOVED * np.sqrt(self._prior)):
             self._write()
 
@@ -237,6 +269,28 @@ class ParameterEstimator:
         P = 0.5 * (P + P.T) + np.diag((inflation * change) ** 2)
         scale = np.sqrt(np.minimum(1.0, self._prior / np.diag(P)))  # no estimate is worse than none
         self.covariance = scale[:, None] * P * scale
+
+    def _feet(self, ground: Ground, gaps: Vector, measured: Vector, predicted: Vector) -> tuple[Flags, Flags]:
+        """Feet that stand at both ends of an interval, and those of them that moved along the ground and not so in the
+        model.
+        """
+        there, here = ground.points(np.stack([measured, predicted]))
+        stands = (np.abs(gaps) < self._near) & (ground.gaps(there) < self._near)
+        moved = np.linalg.norm(there - here, axis=1) > _SLID * self._near
+        return stands, stands & moved
+
+    def _is_disturbed(self, size: float, time: float) -> bool:
+        """Whether an interval was disturbed from outside: for a short time, nothing fits that has fitted before. It
+        tells nothing then but the friction of feet that slid.
+
+        size: `_normalized` of the innovation, of an interval of this time
+        """
+        if size <= _OUTLIER:
+            self._settled, self._disturbed = True, 0.0
+        elif self._settled and self._disturbed < _BRIEF:
+            self._disturbed += time
+            return True
+        return False
 
     def _lands(self, ground: Ground, gaps: Vector, *ends: Vector) -> bool:
         """Whether a contact that is in the air, by its gap at first, touches the ground at one of the ends."""

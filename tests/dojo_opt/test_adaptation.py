@@ -6,6 +6,7 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt.mpc.adaptation import ParameterEstimator
 from dojo_opt.mpc.ground_estimate import Ground
+from dojo_opt.mpc.used_friction import UsedFriction
 from sim.simulator.adjustable_simulator import AdjustableSimulator
 from support.scenes import ball, block
 
@@ -61,6 +62,50 @@ def test_friction_that_nothing_shows_stays_unknown():
     grip = dojo.Simulator(ball(), time_step=0.002).with_parameters({"mass:ball": 1.7, "friction:*": 5.0})  # rolls
     found = estimate(dojo.Adaptation(NAMES, noise=(1e-6, 1e-5)), grip, steps=200)
     assert found.deviations["mass:ball"] < 0.01 < 0.2 < found.deviations["friction:*"]
+    assert found.values["friction:*"] == pytest.approx(0.5, rel=1e-3)
+    low, high = found.bounds["friction:*"]
+    assert 0.01 < low < 0.5  # what the ball needs to roll
+    assert high == np.inf
+
+
+def test_a_friction_that_is_found_has_two_bounds(plant):
+    bounds = estimate(dojo.Adaptation(NAMES, noise=(1e-6, 1e-5)), plant).bounds
+    for name, true in zip(NAMES, (1.7, 0.2), strict=True):
+        low, high = bounds[name]
+        assert low < true < high < low + 0.05
+
+
+def test_only_frictions_have_the_bound_of_what_feet_used():
+    used = UsedFriction(ball(), ("com:ball[0]", "friction:*"))
+    assert used.frictions.tolist() == [False, True]
+    assert used.least.tolist() == [-np.inf, 0.0]
+    assert used.tells(np.array([False])).tolist() == [True, False]
+
+
+def one_after_another(*plants, push=0.0):
+    """The filter of exact samples of plants, 300 of each, and a push [m/s] before each but the first."""
+    nominal = dojo.Simulator(ball(friction=0.5), time_step=0.02)
+    made = ParameterEstimator(nominal, AdjustableSimulator.like(nominal), dojo.Adaptation(NAMES, noise=(1e-6, 1e-5)))
+    us = samples(plants[0], 300)[1]
+    x, now = plants[0].neutral(), 0.0
+    x[2] = 0.1
+    for k, each in enumerate(plants):
+        x[7] += push * (k > 0)
+        for u in us:
+            made.observe(now, x, u, Ground(nominal))
+            x, now = each.step(x, u, throw=True).x, now + each.time_step
+    return made
+
+
+def test_a_push_is_not_taken_for_a_parameter(plant):
+    found = one_after_another(plant, plant, push=0.5)
+    assert found.values["mass:ball"] == pytest.approx(1.7, rel=1e-3)
+    assert found.values["friction:*"] == pytest.approx(0.2, rel=0.02)
+
+
+def test_a_mass_that_changes_is_found_again(plant):
+    heavy = plant.with_parameters({"mass:ball": 2.5, "friction:*": 0.2})
+    assert one_after_another(plant, heavy).values["mass:ball"] == pytest.approx(2.5, rel=0.02)
 
 
 def test_the_models_take_the_estimate_and_forget_it(plant):
