@@ -1,7 +1,7 @@
 """Build backend: hatchling, with a hook that adds the compiled code of the kernels to a wheel that is not pure.
 
     DOJO_OPT_PURE=1                        the pure wheel, for any system and Python; compiles on the first use
-    DOJO_OPT_PREBUILD=all|examples|none    what is compiled: every entry, or those of README's examples (the default)
+    DOJO_OPT_PREBUILD=all|examples|none    what is compiled: every entry, or those of guide and models (the default)
     DOJO_OPT_TARGETS="x86-64-v3 ..."       for which processors; the best that this one can run by default
 
 The code runs with the version of Numba that compiled it. A build in isolation has the newest; `pip install

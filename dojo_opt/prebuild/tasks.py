@@ -273,6 +273,7 @@ def _mpc() -> None:
 
 
 _CALLS: dict[str, Callable[[], None]] = {  # the first one to reach an entry compiles it; those below are disjoint
+    "accuracy": lambda: _accurate(False),
     "parameters": lambda: _pendulum(parameters),
     "derivatives": lambda: _pendulum(derivatives),
     "plan": lambda: _swingup(),
@@ -283,12 +284,11 @@ _CALLS: dict[str, Callable[[], None]] = {  # the first one to reach an entry com
     "flight": lambda: _flight(motions, 8),
     "states of higher order": lambda: _pendulum(states, 4),
     "motions of higher order": lambda: _pendulum(motions, 4),
-}
-_BEYOND = {  # needed neither by README's examples nor by the models
-    "derivatives of higher order": lambda: _pendulum(derivatives, 4),
-    "derivatives of a flight": lambda: _flight(derivatives, 8),
-    "accuracy": lambda: _accurate(False),
     "accuracy on the ground": lambda: _accurate(True),
+    "derivatives of a flight": lambda: _flight(derivatives, 8),
+    "derivatives of higher order": lambda: _pendulum(derivatives, 4),
+}
+_BEYOND = {  # needed neither by the programs of README and guide nor by the models
     "accuracy through loops": _accurate_loops,
     "batches of environments": lambda: _environments(True),
 }
@@ -324,7 +324,7 @@ def tasks(content: str) -> list[str]:
     """Names of the tasks of a build, the longest first.
 
     Args:
-        content: "all", or "examples": those of README, and the models.
+        content: "all", or "examples": the programs of README and guide, and the models.
     """
     first = [next(name for name in _kernels() if name.endswith(f".{end}")) for end in _FIRST]
     others = [name for name in _kernels() if name not in first]
