@@ -245,6 +245,8 @@ def _reached(kin: Kinematics, q: Floats, tables: list[Floats], hand: Floats, cou
                 hands = _follow(kin, q, below + hand, posture, course.forward)
             except ValueError as error:
                 errors.append(error)
+                if posture is None:
+                    break  # nor is a hand there that has a posture
                 continue
             if course.is_clear(kin, below, hands):
                 return below, hands
@@ -271,7 +273,7 @@ def _follow(kin: Kinematics, q: Floats, tips: Floats, posture: tuple[float, floa
         length = float(np.linalg.norm(kin.place(_WRIST)[1] - kin.place(_TIP)[1]))
         wrist = length / float(np.linalg.norm(direction)) * direction
     for place in tips:
-        found = ik(kin, {_TIP: place} | ({} if posture is None else {_WRIST: place + wrist}), q)
+        found = ik(kin, {_TIP: place} | ({} if posture is None else {_WRIST: place + wrist}), q, attempts=8)
         if not found.success:
             where = "go on with the object to its goal" if out else "begin behind the object"
             raise ValueError(

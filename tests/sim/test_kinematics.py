@@ -114,6 +114,18 @@ def test_inverse_kinematics_meets_targets_in_reach(tmp_path: Path, rng: np.rando
         assert np.linalg.norm(kin.pose("hand", near)[0] - at - (5.0, 0.0, 0.0)) > far.error - 1e-9
 
 
+def test_inverse_kinematics_finds_most_postures_of_an_arm(rng: np.random.Generator) -> None:
+    """Of seven joints, from random starts."""
+    sim = dojo.Simulator(dojo.models.panda(gripper=False), 0.01)
+    kin = dojo.Kinematics(sim)
+    low, high = np.array([joint.limits[0] for joint in sim.mechanism.joints]).T
+    found = [
+        dojo.ik(kin, {"link7": kin.pose("link7", rng.uniform(low, high))}, rng.uniform(low, high)) for _ in range(12)
+    ]
+    assert sum(one.success for one in found) >= 10
+    assert all(np.all((one.q >= low) & (one.q <= high)) for one in found)
+
+
 def test_inverse_kinematics_of_a_floating_robot(tmp_path: Path) -> None:
     """A pose of the hand and the place of the centre of mass, the orientation of the base held."""
     sim = dojo.Simulator(robot(tmp_path), 0.01)
