@@ -24,6 +24,7 @@ class Footfall:
     velocity: complex  # of the base, forward + i sideways, in the axes of its heading [m/s]
     heading_rate: float  # [rad/s]
     foothold: Floats  # (k,) complex, forward + i sideways from the base, in the middle of a stance [m]
+    gravity: float = 9.81  # [m/s^2]
 
     def base(self, t: Any) -> tuple[Any, Any]:
         """(place x + i y, heading) at the times t."""
@@ -64,7 +65,7 @@ class Footfall:
         grid = self.period * np.arange(_GRID) / _GRID
         count = self.contact(grid)
         mass, roll, pitch = inertia
-        each = 9.81 * mass / (self.duty * len(self.offset))
+        each = self.gravity * mass / (self.duty * len(self.offset))
         force = each * count
         moments = [(force * self.foothold.imag).sum(1), -(force * self.foothold.real).sum(1)]
         second = np.stack([force.sum(1) / mass, moments[0] / roll, moments[1] / pitch], axis=1)
@@ -85,7 +86,7 @@ class Footfall:
         count = self.contact(self.period * np.arange(_GRID) / _GRID)
         side = self.foothold.imag - self.foothold.imag.mean()
         middle = (count * side).sum(axis=1) / np.maximum(count.sum(axis=1), 1)
-        rate, harmonic = 9.81 / height, 2.0 * np.pi * np.arange(_GRID // 2 + 1) / self.period
+        rate, harmonic = self.gravity / height, 2.0 * np.pi * np.arange(_GRID // 2 + 1) / self.period
         waves = np.fft.rfft(middle) * rate / (rate + harmonic**2)
         waves[0] = 0.0
         path = np.fft.irfft(waves, _GRID)

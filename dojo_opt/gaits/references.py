@@ -232,8 +232,8 @@ def jump(
 
     Raises:
         TypeError: `sim` is not a Simulator.
-        ValueError: for an argument out of range, a robot without legs, a foot that cannot reach its place, or a joint
-            that would exceed its limits.
+        ValueError: for an argument out of range, a robot without legs, a foot that cannot reach its place, a joint that
+            would exceed its limits, or a scene without gravity.
     """
     call = "gaits.jump"
     _check_legs(call, sim)
@@ -247,8 +247,11 @@ def jump(
             f"{call}(height=..., crouch=...): expected a rise of at most {_STRONGEST:,.0f} times the crouch, whose "
             f"push takes as many times the weight; got {height:g} m from {crouch:g} m"
         )
-    speed = float(np.sqrt(2.0 * 9.81 * height))
-    durations = before, 2.0 * crouch / speed, 2.0 * speed / 9.81, after
+    gravity = _gravity(sim)
+    if gravity == 0.0:
+        raise ValueError(f"{call}(sim): {sim.mechanism.name!r} has no gravity, so it never comes down")
+    speed = float(np.sqrt(2.0 * gravity * height))
+    durations = before, 2.0 * crouch / speed, 2.0 * speed / gravity, after
     sink, push, fly, rest = (max(1, round(min(d / h, 1e300))) for d in durations)
     check_length(f"{call}(...)", sim, sink + 2 * push + fly + rest, "jump in less time")
     ends = np.cumsum([0, sink, push, fly, push, rest]) * h
@@ -290,6 +293,11 @@ def _jump_path(t: Floats, ends: Floats, distance: float, crouch: float, height: 
     out = np.clip(t - ends[3], 0.0, push)
     forward = speed * (0.5 * into**2 / push + np.clip(t - ends[2], 0.0, fly) + out - 0.5 * out**2 / push)
     return forward, rise
+
+
+def _gravity(sim: Simulator) -> float:
+    """Acceleration of free fall [m/s^2]."""
+    return float(np.linalg.norm(sim.mechanism.gravity))
 
 
 def _check_legs(call: str, sim: Simulator) -> None:
@@ -363,9 +371,8 @@ def _periodic(
     if footholds is not None:
         places = checks.array(f"{call}(footholds=...)", footholds, places.shape)
     offset = _offsets(offsets, places, [contact.body for contact in feet.contacts])
-    pattern = Footfall(
-        offset, duty, period, step_height, complex(forward, lateral), heading_rate, places[:, 0] + 1j * places[:, 1]
-    )
+    velocity, steps_from = complex(forward, lateral), places[:, 0] + 1j * places[:, 1]
+    pattern = Footfall(offset, duty, period, step_height, velocity, heading_rate, steps_from, _gravity(sim))
     t = sim.time_step * np.arange(-1, steps + 1)
     spot, heading = pattern.base(t)
     sway = pattern.sway(t, _inertia(sim), tilt)

@@ -23,8 +23,8 @@ __all__ = ["multi_start", "of_problem", "planned"]
 
 _POINTS = 6  # of the splines that are added to a guess
 _SHARE = 0.25  # of the range of a limited input: standard deviation of a point
+_EARTH = 9.81  # [m/s^2] also where there is no gravity: the weight stands for the size of forces
 _INPUT_SHARE = 0.3  # times the largest input of a guess: it solves 10 of 12 hops, the whole of it 4 of 8
-_GRAVITY = 9.81  # [m/s^2]
 
 # controls, states and warm start
 Guess = tuple[ArrayLike | None, ArrayLike | None, Plan | None]
@@ -84,7 +84,7 @@ def _spread(problem: Problem, center: Matrix) -> Vector:
     For guesses that are zero it is a share of the robot's weight [N, N m].
     """
     limits, largest = problem.control_limits, float(np.abs(center).max(initial=0.0))
-    free = _INPUT_SHARE * (largest or _GRAVITY * sum(float(body.mass) for body in problem.sim.mechanism.bodies))
+    free = _INPUT_SHARE * (largest or _EARTH * sum(float(body.mass) for body in problem.sim.mechanism.bodies))
     if limits is None:
         return np.full(problem.sim.nu, free)
     wide = limits[1] - limits[0]

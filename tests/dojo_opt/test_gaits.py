@@ -1,5 +1,7 @@
 """Reference gaits: feet stay where they stand, velocities belong to positions, periods repeat."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -113,6 +115,18 @@ def test_jump_lands_where_it_should(sim):
     # its end is at rest, too: the mean velocity of the last step is of first order, and half with half the step
     finer = gaits.jump(sim.replace(time_step=sim.time_step / 2), distance=0.3, height=0.2)
     np.testing.assert_allclose(g.x[-1, sim.nq :], 2.0 * finer.x[-1, sim.nq :], atol=2e-3)
+
+
+def test_jump_and_trot_know_the_gravity_of_the_scene(sim):
+    """On the Moon a flight takes 2.5 times as long, and feet carry a sixth of the weight."""
+    moon = Simulator(replace(sim.mechanism, gravity=(0.0, 0.0, -1.62)), sim.time_step)
+    g = gaits.jump(moon, distance=0.3, height=0.2)
+    fall = np.diff(g.x[~g.contact.any(axis=1), 2], n=2) / moon.time_step**2
+    np.testing.assert_allclose(fall, -1.62, rtol=0.1)
+    here, there = (np.ptp(gaits.trot(s, speed=0.2, period=0.5).x[:, 2]) for s in (sim, moon))
+    assert there == pytest.approx(1.62 / 9.81 * here, rel=1e-6)
+    with pytest.raises(ValueError, match=r"gaits\.jump\(sim\): 'quadruped' has no gravity"):
+        gaits.jump(Simulator(replace(sim.mechanism, gravity=(0.0, 0.0, 0.0)), sim.time_step))
 
 
 def test_standing_takes_the_torques_of_equilibrium(sim):
