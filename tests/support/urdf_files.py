@@ -117,10 +117,17 @@ def compare_with_mujoco(path: Path, rng: np.random.Generator, states: int = 3) -
     for _ in range(states):
         q, v = np.zeros(mech.nq), rng.normal(size=mech.nv)
         for j in mech.joints:
-            at, dof = mech.q_slice(j.name), mech.v_slice(j.name)
+            at = mech.q_slice(j.name)
             q[at] = rng.normal(size=j.nq)
             if j.nrot == 3:
                 q[at.stop - 4 : at.stop] /= np.linalg.norm(q[at.stop - 4 : at.stop])
+        for gear in mech.gears:  # MuJoCo's states need not obey them, ours do
+            at, other = mech.v_slice(gear.joint).start + gear.dof, mech.v_slice(gear.other).start + gear.other_dof
+            v[at] = gear.ratio * v[other]
+            at, other = mech.q_slice(gear.joint).start + gear.dof, mech.q_slice(gear.other).start + gear.other_dof
+            q[at] = gear.ratio * q[other] + gear.offset
+        for j in mech.joints:
+            at, dof = mech.q_slice(j.name), mech.v_slice(j.name)
             k = model.jnt(j.name).id
             a, d = model.jnt_qposadr[k], model.jnt_dofadr[k]
             data.qpos[a : a + j.nq], data.qvel[d : d + j.nv] = q[at], v[dof]
