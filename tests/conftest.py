@@ -31,6 +31,12 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 100)
 
 
+def pytest_sessionfinish() -> None:
+    """Collect garbage once: pytest does so five times, for exceptions that only then are raised."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.hookimpl(tryfirst=True)  # before `-m` chooses
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Of the cases of a function marked `sweep(n)`, `-m "not slow"` takes every n-th."""

@@ -160,13 +160,13 @@ def test_a_quadruped_finds_payload_friction_and_damping_in_its_own_log():
     measured = sim.integrate(motion.x, noise * rng.standard_normal((len(motion.x), sim.ndx)))
     late = 1  # [steps] from what the log says to what acts
     log, limits = (measured[:-late], motion.u[late:]), (0.0, 4.0 * sim.time_step)
-    found = dojo.identify(sim, [log], tuple(truth), noise=noise, window=10, delay=limits, fits=4)
+    found = dojo.identify(sim, [log], tuple(truth), noise=noise, window=5, delay=limits)
     assert found.success and found.labels == (*truth, "delay")
     values = np.array([*truth.values(), late * sim.time_step])
     assert np.all(np.abs(found.start - values) > 0.1 * values)
     np.testing.assert_array_less(np.abs(found.values - values), 4.0 * found.deviation)
     np.testing.assert_array_less(found.deviation, 0.1 * values)
-    known = dojo.identify(sim, [log], tuple(truth), noise=noise, window=10, delay=late * sim.time_step)
+    known = dojo.identify(sim, [log], tuple(truth), noise=noise, window=5, delay=late * sim.time_step)
     np.testing.assert_array_less(np.abs(known.values - values[:-1]), 4.0 * known.deviation)
 
 

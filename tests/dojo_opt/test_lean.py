@@ -79,7 +79,6 @@ def test_the_report_of_a_robot():
         for what in ("friction", "contacts", "limits", "damper", "all of these")
     }
     assert all(np.isfinite(value) and value > -100.0 for value in changes.values())
-    assert changes["without all of these: change of step and gradient"] < 0.0
     assert any("inactive contacts" in note for note in report.notes)
     assert report.figure is not None and json.loads(report.as_json())["details"]["robot"]
 

@@ -47,7 +47,7 @@ def test_a_leap_that_is_too_high_is_no_success():
     """With motors of a seventh of the torque the robot cannot rise by .3 m, and the plan says that it misses something."""
     problem = problems.leap(height=0.3)
     problem.control_limits = (np.full(12, -5.0), np.full(12, 5.0))
-    plan = ilqr(problem, max_iterations=100)
+    plan = ilqr(problem, max_iterations=40)
     assert not plan.success
     assert "Largest violation: " in plan.message and "Goal of trunk" in plan.message
 

@@ -296,7 +296,7 @@ print((rss() - first) / COUNT)
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads the memory of a process as Linux says it")
 def test_memory_of_new_residuals_is_bounded():
     """Numba frees no code: a residual with a new value keeps some; a residual with a known value keeps none."""
-    again = float(python(MEMORY.replace("COUNT", "10").replace("VALUE", "never")))
+    again = float(python(MEMORY.replace("COUNT", "5").replace("VALUE", "never")))
     anew = float(python(MEMORY.replace("COUNT", "10").replace("VALUE", "never + 1.0 + i")))
     assert again < 0.1
     assert anew < 3.0

@@ -70,6 +70,17 @@ def changed(a, b):
     return int((np.abs(a - b).max(axis=2) > 0.1).sum())
 
 
+def settled(page, seconds=2.0):
+    """The screen once it has been the same, and not blank, for .3 s, or when time is up."""
+    end, image, same = time.monotonic() + seconds, shot(page), 0
+    while same < 3 and time.monotonic() < end:
+        time.sleep(0.1)
+        later = shot(page)
+        same = same + 1 if np.ptp(later) > 0.3 and changed(later, image) == 0 else 0
+        image = later
+    return image
+
+
 def shown(page, path, empty=None, seconds=20.0):
     """The screen after loading; given the empty scene, as soon as a robot is on it, or when time is up."""
     errors = []
@@ -89,8 +100,7 @@ def test_the_robot_is_drawn_and_moves(page, quadruped, tmp_path):
     path = dojo.viewer.save_html(quadruped, tmp_path / "fall.html")
     (tmp_path / "empty.html").write_text(page_of([motion(quadruped)], [], {}))
     shown(page, tmp_path / "empty.html")
-    time.sleep(2.0)
-    empty = shot(page)
+    empty = settled(page)
     assert np.ptp(empty) > 0.3, "not even the background"
     assert changed(empty, shot(page)) == 0, "the empty scene stands still"
 
@@ -111,8 +121,7 @@ def test_sloping_ground_is_drawn(page, tmp_path):
         plant = dojo.Plant(sim, slope=slope)
         loop = dojo.closed_loop(lambda t, x: np.array([0.0, 0.0, 41.0]), plant, 0.05)
         shown(page, dojo.viewer.save_html(loop, tmp_path / f"{name}.html"))
-        time.sleep(2.0)
-        images.append(shot(page))
+        images.append(settled(page))
     assert changed(*images) > 20_000
 
 
@@ -126,8 +135,7 @@ def test_a_robot_of_meshes_fills_a_third_of_the_picture_in_its_colors(page, tmp_
     body = dojo.Body("b", 1.0, (0.1, 0.1, 0.1), visuals=seen)
     mech = dojo.Mechanism([body], [dojo.Joint("floating", None, "b")], neutral={"b": (0, 0, 0.2, 1, 0, 0, 0)})
     page.goto(dojo.viewer.save_html(mech, tmp_path / "a.html").as_uri())
-    time.sleep(2.0)
-    r, g, b = np.moveaxis(shot(page), 2, 0)
+    r, g, b = np.moveaxis(settled(page), 2, 0)
     green, red = (g > 2 * r) & (g > 2 * b) & (g > 0.2), (r > 2 * g) & (r > 2 * b) & (r > 0.2)
     rows = np.flatnonzero((green | red).any(axis=1))
     assert 0.25 < np.ptp(rows) / 360 < 0.55 and red.sum() > 300 and green.sum() > 1000
@@ -308,7 +316,7 @@ def test_names_are_text_in_notebooks_reports_and_figures(page, hostile_motion, t
     body = f"<!DOCTYPE html><html><head><meta charset='utf-8'></head><body>{table}{result}</body></html>"
     (tmp_path / "notebook.html").write_text(body, encoding="utf-8")
     assert opened(page, tmp_path / "notebook.html") == []
-    page.wait_for_timeout(1500)
+    page.frames[1].wait_for_load_state()
     assert len(page.frames) == 2 and [frame.evaluate("window.hits") for frame in page.frames] == [[], []]
     assert page.frames[1].title() == " ".join(name.split()) and page.locator("th").first.inner_text() == name
 
@@ -443,7 +451,7 @@ def test_motions_of_the_same_robot_share_its_meshes(page, tmp_path):
 @pytest.mark.slow
 def test_a_page_steps_from_knot_to_knot_and_shows_its_overlays(page, quadruped, tmp_path):
     page.goto(dojo.viewer.save_html([quadruped, quadruped], tmp_path / "two.html", forces=True).as_uri())
-    time.sleep(2.0)
+    page.wait_for_function("typeof animator !== 'undefined'")
     page.evaluate("go(0.2)")
     page.click("#ahead")
     assert page.evaluate("now()") == pytest.approx(0.21, abs=1e-6)
@@ -453,9 +461,7 @@ def test_a_page_steps_from_knot_to_knot_and_shows_its_overlays(page, quadruped, 
     assert page.evaluate("animator.mixer.timeScale") == 0.25
     page.evaluate("go(0.45)")
     page.evaluate("follow.checked = false")
-    time.sleep(0.5)
-    before = shot(page)
+    before = settled(page)
     page.uncheck("input[data-part=forces]")
-    time.sleep(0.5)
     r, g, b = np.moveaxis(before, 2, 0)
-    assert changed(shot(page), before) > 50 and ((r > 2 * g) & (r > 2 * b) & (r > 0.3)).sum() > 50
+    assert changed(settled(page), before) > 50 and ((r > 2 * g) & (r > 2 * b) & (r > 0.3)).sum() > 50

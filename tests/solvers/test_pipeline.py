@@ -17,14 +17,19 @@ import json, numpy as np, dojo_opt as dojo
 from solvers.compiler.pipeline import FAST
 sim = dojo.Simulator(dojo.models.pendulum(), 0.02, divide=False)  # its momenta need no step
 x = sim.neutral() + 0.3
-print(json.dumps([FAST, sim.energy(x), sim.kinetic_energy(x), *sim.momentum(x)[0], *sim.maximal(x).ravel()]))
+found = [*sim.maximal(x).ravel(), *sim.integrate(x, x)]
+if {whole}:
+    found += [sim.energy(x), sim.kinetic_energy(x), *sim.momentum(x)[0]]
+print(json.dumps([FAST, *found]))
 """
+WHOLE = os.environ.get("WHOLE_PIPELINE", "0") == "1"  # with energies and momenta, which take three times as long
 
 
 @pytest.mark.slow
 def test_numbas_own_pipeline_gives_the_same_digits():
-    fast, *numbers = json.loads(python(SIMULATION, DOJO_OPT_PLAIN_NUMBA="0"))
-    plain, *others = json.loads(python(SIMULATION, DOJO_OPT_PLAIN_NUMBA="1"))
+    program = SIMULATION.format(whole=WHOLE)
+    fast, *numbers = json.loads(python(program, DOJO_OPT_PLAIN_NUMBA="0"))
+    plain, *others = json.loads(python(program, DOJO_OPT_PLAIN_NUMBA="1"))
     assert (fast, plain) == (True, False)
     np.testing.assert_allclose(numbers, others, rtol=1e-12, atol=1e-13)
 
