@@ -54,7 +54,9 @@ def moving(task: Task, sim: dojo.Simulator, substeps: int) -> tuple[Floats, Floa
 
 
 def stepped(name: str, rounds: int) -> list[Cell]:
-    """A row of the steps: task, time step, substeps, us per row and action in three ways, iterations in two."""
+    """A row of the steps: task, time step, substeps, us per row and action in three ways, those of the last that Python
+    takes, iterations in two.
+    """
     h, substeps, _ = STEPS[name]
     task = task_of(name)
     sim = task.sim.replace(time_step=h)
@@ -75,7 +77,18 @@ def stepped(name: str, rounds: int) -> list[Cell]:
     )
     costs = [1e6 * float(seconds[kind].min()) / ROWS for kind in ("step", "derivatives", "known")]
     iterations = [float(step(False, known, 1).iterations.mean()) for known in (False, True)]
-    return [name, h, substeps, *costs, *iterations]
+    return [name, h, substeps, *costs, _outside(lambda: step(True, True), rounds), *iterations]
+
+
+def _outside(step: Callable[[], Any], rounds: int) -> float:
+    """us per row of a step with derivatives that are not in the compiled loop: checks, tables, results; the least."""
+    found = []
+    for _ in range(rounds):
+        spent, began = {"loop": 0.0}, time.process_time()
+        with clocked(spent, (import_module("sim.simulator.step_batch"), "linearize_rows", "loop")):
+            step()
+        found.append(time.process_time() - began - spent["loop"])
+    return 1e6 * min(found) / ROWS
 
 
 @contextmanager
@@ -137,7 +150,7 @@ def run(args: argparse.Namespace) -> Report:
     steps = [stepped(name, rounds) for name in names]
     header = (
         "task", "time step [s]", "steps", "step [us]", "with A and B [us]", "from known impulses [us]",
-        "iterations of the first step", "iterations, known impulses",
+        "of it outside the compiled loop [us]", "iterations of the first step", "iterations, known impulses",
     )  # fmt: skip
     report.tables.append(Table(f"An action of {ROWS} rows, per row", header, steps))
     epochs_of = [epoch(name, epochs) for name in names if name in ("HalfCheetah", "Ant")]
