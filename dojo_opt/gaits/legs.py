@@ -250,8 +250,15 @@ def _bent(
         q = sim.mechanism.q_slice(joint.name)
         low, high = joint.limits[0] if joint.limits else (-np.inf, np.inf)
         start[q] = np.clip(start[q] + sign * _BEND, low, high)
-    base = sim.mechanism.joints[0].name
-    return ik(kin, places, start, fixed=(base,), tolerance=1e-6, attempts=_TRIES)
+    parts = {joint.child: joint for joint in sim.mechanism.joints[1:]}
+    moving: set[str] = set()
+    for contact in sim.mechanism.contacts:
+        body = contact.body
+        while body in parts:
+            moving.add(parts[body].name)
+            body = parts[body].parent or ""
+    still = [joint.name for joint in sim.mechanism.joints if joint.name not in moving]  # arms stay where they are
+    return ik(kin, places, start, fixed=still, tolerance=1e-6, attempts=_TRIES)
 
 
 def _origin_of(sim: Simulator, bodies: dict[str, Joint], knees: list[str], q: Floats) -> float:

@@ -125,6 +125,19 @@ def test_robots_of_files_walk(bench, name):
     assert sum(tick.fallback for tick in loop.log) < 3
 
 
+def test_the_search_for_a_stance_moves_the_legs_alone(legs):
+    """A search that begins anew from random coordinates once flung the arms of Atlas to their stops."""
+    before = dojo.models.atlas()
+    moved = [
+        joint.name
+        for joint in before.joints[1:]
+        if not np.allclose(*(np.asarray(m.neutral)[m.q_slice(joint.name)] for m in (before, legs.mechanism)), atol=1e-9)
+    ]
+    assert {name.partition("_leg")[0] for name in moved} <= {"l", "r"}, moved
+    left, right = (sorted(name[1:] for name in moved if name.startswith(side)) for side in "lr")
+    assert left == right and len(left) >= 3
+
+
 @pytest.mark.slow
 def test_atlas_leaps_and_lands():
     """From rest and a goal: it flies for .3 s, and under the gains of the plan it lands at the accuracy of 1e-5."""
