@@ -21,7 +21,8 @@ _ACCEPT, _LEAST, _MOST = 1e-12, 1e-12, 1e6  # damping where it begins, and its r
 _SMALL = 1e-12  # [rad, m] a step that ends the iterations
 _PROGRESS = 1e-4  # least relative decrease of the squared errors in an iteration that is not idle
 _IDLE = 3  # idle iterations in a row that end the search: the targets are out of reach, where progress is slow
-_NEAR, _FAR = 0.5, 2.0  # [rad, m] spread of the coordinates of the second start, and of those after it
+_NEAR, _FAR = 0.5, 2.0  # [rad, m] spread of the coordinates of further starts, the first ones near
+_NEARBY = 5  # number of these, after which joints that the targets do not need may end far from where they were
 _TURN = 1.0  # [rad] largest change of a coordinate in an iteration
 _SMALLEST_ROOM = 1e-9  # [rad, m] of a coordinate that a step may change
 _ORTHOGONAL = 1e-6  # error of R R^T of a rotation matrix
@@ -109,7 +110,7 @@ def ik(
         if max(_errors(wanted, r).values()) <= tolerance:
             break
         dq = np.zeros(kin.sim.nv)
-        dq[free] = (_FAR if attempt else _NEAR) * rng.normal(size=len(free))
+        dq[free] = (_NEAR if attempt < _NEARBY else _FAR) * rng.normal(size=len(free))
         other, r_other, more = search.descend(_inside(kin, kin.moved(q, dq), low, high))
         count += more
         if r_other @ r_other < r @ r:

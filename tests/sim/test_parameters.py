@@ -157,6 +157,7 @@ def test_names_stand_for_their_parameters() -> None:
     sim = case_of("sliding").sim
     found = sim.parameters(("friction", "com:body1", "gravity[2]", "mass:*"))
     assert found.names == ("friction:body1", "com:body1[0]", "com:body1[1]", "com:body1[2]", "gravity[2]", "mass:*")
+    assert list(found) == ["friction", "com:body1", "gravity[2]", "mass:*"] and "com:body1" in found
     np.testing.assert_allclose(found["gravity[2]"], -9.81)
     heavier = sim.with_parameters({"mass:*": found["mass:*"] + 1.0})
     np.testing.assert_allclose(heavier.parameters("mass").values, sim.parameters("mass").values + 1.0)

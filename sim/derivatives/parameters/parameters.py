@@ -8,6 +8,7 @@ parameter that adds the same to all parts: the height of the ground is `contact_
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -89,6 +90,10 @@ class Parameters:
     def __getitem__(self, name: str) -> Floats:
         """Values of one name of the selection."""
         return self.values[self.rows[name]]
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the selection, the keys of the values."""
+        return iter(self.rows)
 
 
 class ParameterPlan(NamedTuple):
