@@ -84,7 +84,7 @@ def sunk_contact(model: Model) -> int:
     return -1
 
 
-@kernel
+@optional(Slot.HAS_CORNERS, default=False, seldom=True)
 def has_corners(model: Model) -> bool:
     """Whether a cluster of contacts has so many points that they are summed, as the corners of a mesh."""
     for c in range(model.cluster.shape[0]):

@@ -227,6 +227,7 @@ class Slot(Code):
     ADD_CORNER_SLIPS = 182
     TAKE_CORNERS = 183
     REPORT_CORNERS = 184
+    HAS_CORNERS = 188
     # bounds of the distance of two polytopes, and of cylinders
     APART_POLYTOPES = 185
     CYLINDER_APART = 186

@@ -32,7 +32,7 @@ from sim.contact.contact_law import slip_noise
 from sim.contact.contact_report import report_ground, worst_contact
 from sim.contact.corner_laws import add_corner_laws, add_corner_slips
 from sim.contact.corners import evaluate_corners, report_corners
-from sim.contact.inactive import choose_active, has_activated, sunk_contact
+from sim.contact.inactive import choose_active, has_activated, has_corners, sunk_contact
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.contact.pairs.active_features import choose_pairs, choose_shapes, open_pairs, overlapping
 from sim.contact.pairs.clearance import measure_pairs, omitted_pairs, pairs_reached
@@ -330,7 +330,7 @@ def link_terms(model: Model) -> None:
     if len(model.contact_height):
         link(model.optional, *_GROUND, *_PREDICTION_OF_CONTACTS)
     if np.any(model.cluster[:, Cluster.CORNERS]):
-        link(model.optional, evaluate_corners, add_corner_laws, report_corners)
+        link(model.optional, evaluate_corners, add_corner_laws, report_corners, has_corners)
     if _is_predicted(model):
         link(model.optional, *_PREDICTION)
     if np.any(model.limit_cone):
