@@ -47,7 +47,9 @@ else
 fi
 measure source_statistics "$python" "$here/benchmarks/source_statistics.py" --out "$out"
 measure chaos "$python" "$here/benchmarks/chaos.py" $quick --out "$out"  # on all cores: loops over them are a part
-measure learning_scaling "$python" "$here/benchmarks/learning_scaling.py" $quick --out "$out"
+if [ "${NUMBA_NUM_THREADS:-$cores}" -ge 2 ]; then
+    measure learning_scaling "$python" "$here/benchmarks/learning_scaling.py" $quick --out "$out"
+fi
 export NUMBA_NUM_THREADS=1  # one core from here on, as the tables say
 measure cold_starts "$python" "$here/benchmarks/cold_starts.py" $quick --out "$out"
 measure robustness "$python" "$here/benchmarks/robustness.py" $quick --out "$out"
