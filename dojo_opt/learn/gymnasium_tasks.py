@@ -63,8 +63,14 @@ TRANSFER = Randomization(
 )
 
 # The same with small pushes in every action, about as large as the differences that an action makes here and in MuJoCo
-# with the time step of HalfCheetah-v5 (standard deviations by benchmarks/action_differences.py [m/s, rad/s]).
-DISTURBED = replace(TRANSFER, by_row=True, pushes=(0.05, (0.1, 0.2, 0.45, 0.8, 0.9, 2.0, 0.9, 1.5, 1.5)))
+# with the time step of HalfCheetah-v5 (standard deviations by benchmarks/action_differences.py [m/s, rad/s]); half
+# of the epochs have that time step.
+DISTURBED = replace(
+    TRANSFER,
+    substeps=(2, 3, 5, 5),
+    by_row=True,
+    pushes=(0.05, (0.1, 0.2, 0.45, 0.8, 0.9, 2.0, 0.9, 1.5, 1.5)),
+)
 
 # The same as TRANSFER for robots that fall: steps of milliseconds carry small impulses, which ask for a small kappa.
 BALANCE = Randomization(

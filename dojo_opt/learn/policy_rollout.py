@@ -34,13 +34,21 @@ class Noise:
 
     @classmethod
     def draw(
-        cls, rng: np.random.Generator, task: Task, shape: tuple[int, int], deviation: float, given: Randomization
+        cls,
+        rng: np.random.Generator,
+        task: Task,
+        shape: tuple[int, int],
+        deviation: float,
+        given: Randomization,
+        push_factor: float = 1.0,
     ) -> Noise:
-        """Normal noise of actions with a deviation, of observations and pushes with those of a randomisation."""
+        """Normal noise of actions with a deviation, of observations with that of a randomisation, and the pushes of the
+        latter times a factor.
+        """
         actions = deviation * rng.standard_normal((*shape, task.sim.nu))
         observations, pushes = given.noise * rng.standard_normal((*shape, task.observations)), None
         if given.pushes is not None:
-            pushes = draw_pushes(rng, task, shape, given.pushes)
+            pushes = push_factor * draw_pushes(rng, task, shape, given.pushes)
         return cls(actions, observations, pushes)
 
 

@@ -37,6 +37,7 @@ __all__ = ["ShacOptions", "shac"]
 
 _KNOWN = 1e4  # observations that the scaling of a given policy counts for
 _LOST = 0.1  # survival probability below which a row starts anew
+_GROWN = 0.7  # share of the epochs after which pushes grow no more
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,8 @@ class ShacOptions:
         batches: minibatches per pass (default 4).
         blend: share of the critic in its target network after an epoch (default 0.3).
         randomization: models that the policy learns on (default: that of the task).
+        push_factors: factors of the pushes of `randomization` in the first epoch and from 70 % of the epochs on, linear
+            in between (default 1, 1). Evaluations have the pushes as they are.
         robust: whether the best policy is the one with the largest sum of mean returns with and without the pushes of
             `randomization`, if it has any, instead of those without (default False).
         kappa_grad: smoothing of the derivatives [N s m] (default None: that of the motion).
@@ -96,6 +99,7 @@ class ShacOptions:
     batches: int = 4
     blend: float = 0.3
     randomization: Randomization = Randomization()
+    push_factors: tuple[float, float] = (1.0, 1.0)
     robust: bool = False
     kappa_grad: float | None = None
     start: LearnedPolicy | None = None
@@ -118,7 +122,7 @@ class ShacOptions:
         kappa = () if self.kappa_grad is None else ("kappa_grad",)
         for name in ("critic_rate", "norm", "costate", *kappa):
             checks.number(f"shac({name}=...)", getattr(self, name), above=0.0)
-        for name, most in (("deviation", float("inf")), ("betas", 1.0)):
+        for name, most in (("deviation", float("inf")), ("push_factors", float("inf")), ("betas", 1.0)):
             first, last = checks.vector(f"shac({name}=...)", getattr(self, name), 2)
             if min(first, last) < 0.0 or max(first, last) >= most:
                 raise ValueError(
@@ -201,7 +205,8 @@ class _Shac(Training):
         share = self.epoch / o.epochs
         deviation = o.deviation[0] + share * (o.deviation[1] - o.deviation[0])
         drawn = self.models.draw(self.rng, n)
-        noise = Noise.draw(self.rng, self.task, (o.horizon, n), deviation, o.randomization)
+        push = o.push_factors[0] + (o.push_factors[1] - o.push_factors[0]) * min(1.0, share / _GROWN)
+        noise = Noise.draw(self.rng, self.task, (o.horizon, n), deviation, o.randomization, push)
         roll = roll_policy_batch(
             self.policy, self.x, o.horizon, drawn=drawn, noise=noise, slopes=True,
             kappa_grad=o.kappa_grad, delays=self.delays, restart=self.restart,

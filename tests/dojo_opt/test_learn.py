@@ -292,6 +292,22 @@ def test_a_robust_policy_is_the_best_of_the_sums_with_and_without_pushes(task, t
         dojo.learn.shac(task, epochs=1, robust=3)
 
 
+def test_pushes_grow_from_the_first_to_the_last_factor(task):
+    few = {"environments": 4, "horizon": 5, "evaluations": 0, "episodes": 1, "rate": 0.02, "seed": 5}
+
+    def weights(size, factors, last):
+        models = dojo.learn.Randomization(pushes=(task.knot_time, [size]))
+        options = few | {"epochs": 10, "randomization": models, "push_factors": factors}
+        return dojo.learn.shac(task, **options, callback=lambda record: _stop(record, last)).state["weights"]
+
+    np.testing.assert_array_equal(weights(3.0, (0.5, 0.5), 3), weights(1.5, (1.0, 1.0), 3))
+    growing, calm = (0.0, 1.0), (0.0, 0.0)
+    np.testing.assert_array_equal(weights(3.0, growing, 1), weights(3.0, calm, 1))
+    assert np.abs(weights(3.0, growing, 2) - weights(3.0, calm, 2)).max() > 1e-9
+    with pytest.raises(ValueError, match=r"shac\(push_factors=...\): expected two numbers from 0"):
+        dojo.learn.shac(task, epochs=1, push_factors=(-1.0, 1.0))
+
+
 def _scaling(run):
     """(mean, deviation) of observations at the end of a run."""
     statistics = ObservationStatistics(len(run.policy.mean))
