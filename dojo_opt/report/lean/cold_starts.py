@@ -188,7 +188,9 @@ def _process(scene: ColdScene, cache: Path) -> tuple[float, int]:
     cache.mkdir(parents=True, exist_ok=True)
     program.write_text(_HEAD + scene.program + _TAIL, encoding="utf-8")
     settings = {"DOJO_OPT_SHIPPED": "0", "DOJO_OPT_JOBS": "1", "DOJO_OPT_CACHE": "1", "DOJO_OPT_QUIET": "1"}
+    # bytecode is kept, as on most machines: where images of containers forbid it, each process parses all modules
     paths = {"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    paths["PYTHONDONTWRITEBYTECODE"] = ""
     command = [sys.executable, str(program)]
     done = subprocess.run(command, env={**os.environ, **settings, **paths}, capture_output=True, text=True)
     if done.returncode != 0:
