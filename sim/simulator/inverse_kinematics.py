@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -264,13 +264,19 @@ def _bounds(kin: Kinematics, fixed: Sequence[str], limits: bool) -> tuple[Floats
     return low, high, np.flatnonzero(free)
 
 
+def _limitable(kin: Kinematics) -> Iterator[tuple[slice, slice]]:
+    """By joint, its coordinates without those of a quaternion, and their degrees of freedom."""
+    for joint in kin.mechanism.joints:
+        count = joint.ntrans if joint.nrot == 3 else joint.nv
+        first, v = kin.mechanism.q_slice(joint.name).start, kin.mechanism.v_slice(joint.name).start
+        yield slice(first, first + count), slice(v, v + count)
+
+
 def _coordinates(kin: Kinematics, q: Floats) -> Floats:
     """The coordinate of every degree of freedom, zero of those of quaternions, which have no limits."""
     out = np.zeros(kin.sim.nv)
-    for joint in kin.mechanism.joints:
-        count = joint.ntrans if joint.nrot == 3 else joint.nv
-        v, first = kin.mechanism.v_slice(joint.name).start, kin.mechanism.q_slice(joint.name).start
-        out[v : v + count] = q[first : first + count]
+    for at, dof in _limitable(kin):
+        out[dof] = q[at]
     return out
 
 
@@ -283,10 +289,8 @@ def _room(kin: Kinematics, q: Floats, low: Floats, high: Floats) -> tuple[Floats
 def _inside(kin: Kinematics, q: Floats, low: Floats, high: Floats) -> Floats:
     """q with coordinates beyond their limits at them."""
     q = np.array(q)
-    for joint in kin.mechanism.joints:
-        count = joint.ntrans if joint.nrot == 3 else joint.nv
-        v, first = kin.mechanism.v_slice(joint.name).start, kin.mechanism.q_slice(joint.name).start
-        q[first : first + count] = np.clip(q[first : first + count], low[v : v + count], high[v : v + count])
+    for at, dof in _limitable(kin):
+        q[at] = np.clip(q[at], low[dof], high[dof])
     return q
 
 
