@@ -337,4 +337,5 @@ def test_show_prints_one_json_object(tmp_path: Path, capsys: pytest.CaptureFixtu
 )
 def test_show_refuses_by_name(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["show", *arguments]) == 2
-    assert message in capsys.readouterr().err
+    shown = capsys.readouterr()
+    assert message in shown.err and not shown.out  # before any report

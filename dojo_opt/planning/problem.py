@@ -201,6 +201,17 @@ class Problem:
         finer.bind()
         return finer
 
+    def only_refined_constraints(self) -> Problem:
+        """The same problem, with the `refined_constraints` in place of its own constraints.
+
+        Returns:
+            The new problem, with its own time steps.
+        """
+        other = copy.copy(self)
+        other.specs, other.refined_constraints = (self.specs[0], self.refined_constraints), ()
+        other.bind()
+        return other
+
     def _motion(self, call: str, xs: ArrayLike, us: ArrayLike) -> tuple[Matrix, Matrix]:
         """Checked states (T + 1, nx) and inputs (T, nu)."""
         states = checks.array(f"{call}(xs)", xs, (self.horizon + 1, self.sim.nx))

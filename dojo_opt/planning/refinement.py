@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import Options
+from dojo_opt.planning.overload import overload
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import REPLAY_ACCURACY, Problem
 from sim.simulator.results import FeedbackRollout, Interrupted
@@ -27,6 +29,9 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
     until plan and replay are no further apart than that; more than 32 parts make
     problems that are hard to solve.
 
+    A plan that is no nearer to the `refined_constraints` than the start, such as a jump that stays on the ground, is
+    not refined: shorter steps have never lifted one.
+
     Args:
         problem: the problem, with its own time steps.
         plan: its solved plan.
@@ -34,7 +39,8 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
         solve: solves a problem with shorter steps, from a plan.
 
     Returns:
-        The last plan, with the iterations of all; ACCURACY_NOT_REACHED if the replay is still too far off.
+        The last plan, with the iterations of all; ACCURACY_NOT_REACHED if the replay is still too far off, INFEASIBLE
+        if the first plan is not refined.
 
     Raises:
         Interrupted: after Ctrl-C during a replay; its `result` is the plan so far.
@@ -44,6 +50,8 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
         count = 2  # these are constraints of a refined problem
     while True:
         if count > 1:
+            if len(plans) == 1 and (missed := _missed(problem, plan, options)) is not None:
+                return missed
             options.say(f"Refinement: every time step divided by {count}:")
             plans.append(solve(problem.refined(count), plans[-1]))
         if asked is None or not plans[-1].success:
@@ -58,6 +66,23 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
         if 2 * count > _MOST:
             return _ended(_joined(plans, options), Status.ACCURACY_NOT_REACHED, f" {apart:.1e} apart, asked {asked:g}.")
         count *= 2
+
+
+def _missed(problem: Problem, plan: Plan, options: Options) -> Plan | None:
+    """The plan as one that fails, if it is no nearer to the `refined_constraints` than the start; else None."""
+    if not problem.refined_constraints:
+        return None
+    still = np.tile(problem.start, (problem.horizon + 1, 1)), np.zeros_like(plan.u)
+    objective = Objective(problem.only_refined_constraints(), options)
+    (off, culprit), at_first = objective.worst(plan.x, plan.u), objective.worst(*still)[0]
+    if at_first <= options.violation_tolerance or off < at_first:
+        return None
+    message = MESSAGES[Status.INFEASIBLE] + (
+        f" With its own time steps the plan comes no nearer than the start to what the refined problem asks: {off:.2g} "
+        f"off, {culprit}.{overload(problem, plan.u)} {problem.advice}"
+    )
+    options.say(f"INFEASIBLE: {message.rstrip()}")
+    return replace(plan, success=False, status=Status.INFEASIBLE, message=message.rstrip(), violation=off)
 
 
 def replay_error(plan: Plan) -> float:

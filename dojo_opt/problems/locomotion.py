@@ -15,8 +15,10 @@ from dojo_opt.gaits.equilibrium import equilibrium
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.gait import Gait
 from dojo_opt.gaits.references import settings_of
+from dojo_opt.gaits.take_off import highest_rise
 from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import CONTINUATION, PLANNED
+from dojo_opt.planning.overload import demand
 from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
@@ -31,6 +33,8 @@ PLACE, ATTITUDE, ANGLE, VELOCITY, RATE = (0.3, 0.05, 0.05), 0.01, 0.2, 0.01, 0.0
 GAIT_ADVICE = "Try a lower speed, a longer period, or a lower step_height."
 RISE_ADVICE = "Try a longer duration, or a base that is less low."
 JUMP_ADVICE = "Try a smaller height or distance, a deeper crouch, or more time before and after."
+_WITHIN = 1.5  # times the limits: largest inputs of a reference that is not too high
+_LIGHT = 1.05  # a base whose legs have weight rises so much more, as this does not rise as far
 EFFORT = 2.5e-5  # per second and (N m)^2
 # feet FR, FL, RR, RL of the trot of Dojo's examples, from the centre of mass of the trunk [m]
 TROT_FOOTHOLDS = ((0.19, -0.13205), (0.19, 0.13205), (-0.27, -0.13205), (-0.27, 0.13205))
@@ -320,15 +324,29 @@ def with_apex(problem: Problem, refinement: int) -> Problem:
         The problem.
 
     Raises:
-        ValueError: `refinement` is not a whole number >= 1.
+        ValueError: `refinement` is not a whole number >= 1, or the jump is higher than the inputs can throw the robot.
     """
     tracking = problem.specs[0][0]
     assert isinstance(tracking, Tracking)
     path = np.asarray(tracking.reference)
     top = int(path[:, 2].argmax())
     problem.refinement = whole_number("problems.jump(refinement=...)", refinement)
+    _check_height(problem, float(path[top, 2] - path[0, 2]))
     problem.refined_constraints = (Goal(path[top], components=[2], knots=top),)
     return problem
+
+
+def _check_height(problem: Problem, height: float) -> None:
+    """Refuse jumps that inputs within their limits cannot reach; low ones that ask for little need no check."""
+    sim = problem.sim
+    if problem.control_limits is None or (demand(problem).max() <= _WITHIN and height <= sim.neutral()[2]):
+        return
+    most = _LIGHT * highest_rise(sim, problem.control_limits)
+    if height > most:
+        raise ValueError(
+            f"problems.jump(height=...): at the limits of its inputs {sim.mechanism.name!r} rises by {most:.2f} m at "
+            f"most, over the whole stroke of its legs; got {height:.2f} m"
+        )
 
 
 FOLLOW = ("guess", "periodic", "substeps", "control_limits", "place", "attitude", "effort")

@@ -127,6 +127,8 @@ def show(args: argparse.Namespace) -> int:
     if args.json and args.live:
         raise ValueError("--json, --live: expected one of them")
     mechanism = load(args)
+    if args.drop and mechanism.joints[0].kind != "floating":
+        raise ValueError(f"--drop requires a floating base; {mechanism.joints[0].name!r} is {mechanism.joints[0].kind}")
     sim = dojo.Simulator(mechanism, time_step=args.time_step)
     steps = max(1, round(min(args.seconds / args.time_step, 1e300)))
     check_room("--seconds, --time-step: steps", steps, 8.0 * (sim.nx + sim.nu), "take fewer seconds or longer steps")
@@ -135,8 +137,6 @@ def show(args: argparse.Namespace) -> int:
         if getattr(mechanism, "report", None) is not None:
             print(mechanism.report)  # type: ignore[attr-defined]
     x = sim.neutral()
-    if args.drop and mechanism.joints[0].kind != "floating":
-        raise ValueError(f"--drop requires a floating base; {mechanism.joints[0].name!r} is {mechanism.joints[0].kind}")
     if args.drop:
         x[2] += args.drop
     motion = sim.rollout(x, np.zeros((steps, sim.nu)))

@@ -131,6 +131,21 @@ def test_the_refined_problem_may_ask_for_more_and_the_table_tells_both():
     assert "Largest violation: " in plan.message and "Goal of " in plan.message  # of this one, or of one it upset
 
 
+@pytest.mark.slow
+def test_a_plan_that_goes_away_from_what_the_refined_problem_asks_is_not_refined():
+    """Jumps that stay on the ground used to be refined until the iteration limit."""
+    problem, stream = hop(), io.StringIO()
+    coarse = ilqr(problem)
+    deeper = problem.start - np.eye(15)[2]  # the body is higher at the tenth knot than at first
+    assert coarse.x[10, 2] > problem.start[2]
+    problem.refinement, problem.advice = 2, "Try less."
+    problem.refined_constraints = (Goal(deeper, components="body z", knots=10),)
+    plan = ilqr(problem, verbose=True, stream=stream)
+    assert plan.status == Status.INFEASIBLE and plan.nit == coarse.nit and plan.violation > 1.0
+    assert "no nearer than the start" in plan.message and "Goal of body z at knot 10" in plan.message
+    assert plan.message.endswith(" Try less.") and stream.getvalue().rstrip().endswith(plan.message)
+
+
 def test_save_and_load(tmp_path):
     plan = ilqr(swingup(constraints=[Goal([np.pi, 0.0])]))
     plan.save(tmp_path / "plan.npz")
