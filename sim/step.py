@@ -41,6 +41,7 @@ def step(
         else:
             r = solve_step(model, data, options, q, v, u, guess)
         r = _checked(model, data, options, (q, v, u), r)
+    _look_ahead(data, v)
     status = _write(data, r, out)
     report[StepReport.STATUS] = status
     report[StepReport.ITERATIONS] = r.iterations
@@ -70,6 +71,13 @@ def _checked(
     if r.status == Status.SOLVED and not ends_below_half(model, data, options.h):
         return Outcome(Status.TURN_TOO_LARGE.value, r.iterations, r.residual, r.violation)
     return r
+
+
+@inlined
+def _look_ahead(data: Data, v: Vector) -> None:
+    """Extrapolate the velocity from v and that of this step: where the next one looks first (globalization.py)."""
+    for d in range(v.shape[0]):
+        data.carry.next_velocity[d] = 2.0 * data.nu[d] - v[d]
 
 
 @inlined

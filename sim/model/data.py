@@ -18,6 +18,7 @@ class Carry(NamedTuple):
     bound_step: Matrix  # (nlimit, 2) and of limits
     dry_step: Matrix  # (ndry, 4) and of dry friction
     couple_force: Vector  # (nrow,) impulses of loops
+    next_velocity: Vector  # (nv,) v25 where the next step looks first: on a line through the last two
 
 
 class Data(NamedTuple):

@@ -60,7 +60,8 @@ MODEL_FLOATS = _shapes(
 CARRY_INTS = _shapes("steps 1, ways_known 1")
 CARRY_FLOATS = _shapes(
     """
-    external nbody 6, inactive_kappa 1, cone_step ncontact 12, bound_step nlimit 2, dry_step ndry 4, couple_force nrow
+    external nbody 6, inactive_kappa 1, cone_step ncontact 12, bound_step nlimit 2, dry_step ndry 4, couple_force nrow,
+    next_velocity nv
     """
 )
 

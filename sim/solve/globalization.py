@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim.contact.ground_contact import lands
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice, Guess, StepOptions
@@ -36,6 +37,7 @@ from solvers.types import Vector
 _AT_REST = 0.1  # residual at kappa, over that on the central path of kappa0, of a guess that may start at kappa
 _RESUMED = 3e-4  # [N s m] least kappa of a start near the impulses of the step before
 _BALANCED = 0.3  # residual with these impulses, over that near them, of a motion that may start at kappa
+_AHEAD = 1e-2  # share of the tolerance for the first iteration from a line: how fast errors fall is not known yet
 _GOES_ON = 0.1  # residual with these impulses, over their sum, of a motion that keeps them
 _GROWTH = 3.0  # of kappa0, from one strategy to the next
 _GROWTHS = 8  # strategies after which kappa0 is reset
@@ -121,6 +123,7 @@ class KnownStart(NamedTuple):
     found: bool  # otherwise the list begins with the second strategy
     kappa: float  # of the central path on which it is
     balance: tuple[float, float]  # residuals there
+    share: float  # of the tolerance, within which its first iteration has to end
 
 
 @kernel
@@ -156,6 +159,7 @@ def known_start(
 ) -> KnownStart:
     """The first of these that is near the solution, with its iterate in `data`:
 
+        ahead       on a line through the last two velocities, with the impulses of the step before
         warm        at the guess, with the impulses of the step before
         predicted   at the prediction of the linearised step (prediction.py)
         resumed     near these impulses, on the central path of a larger kappa
@@ -170,8 +174,8 @@ def known_start(
         data.active_count[0] + model.limit_dof.shape[0] + model.dry_dof.shape[0] == 0
     ):  # nothing to be on the central path of
         if set_trial_velocity(model, data, h, q, guess.velocity, 1.0):
-            return KnownStart(True, kappa, residuals(model, data, h, q, v, u))
-        return KnownStart(False, kappa, INFEASIBLE)
+            return KnownStart(True, kappa, residuals(model, data, h, q, v, u), 1.0)
+        return KnownStart(False, kappa, INFEASIBLE, 1.0)
     keep_inequalities(model, data)
     if (
         guess.impulses and data.active_count[0] == data.active_ground_count[0]
@@ -188,15 +192,43 @@ def known_start(
 def warm_or_predicted(
     model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], velocity: Vector
 ) -> KnownStart:
-    """At kappa: with the impulses of the step before where they all but balance, otherwise as predicted."""
+    """At kappa: with the impulses of the step before where they all but balance, otherwise as predicted.
+
+    While the same contacts press, velocities change smoothly: a line through the last two often saves an iteration,
+    or the prediction.
+    """
+    if goes_on(model, data, inputs[1], velocity):
+        balance = with_last_impulses(model, data, options, inputs, data.carry.next_velocity)
+        if balance[0] < _GOES_ON * total_impulse(model, data) and not lands(data):
+            return KnownStart(True, options.kappa, balance, _AHEAD)
+    balance = with_last_impulses(model, data, options, inputs, velocity)
+    if balance[0] < 1e300 and balance[0] > _GOES_ON * total_impulse(model, data):
+        balance = predict(model, data, options, inputs)
+    return KnownStart(balance[0] < 1e300, options.kappa, balance, 1.0)
+
+
+@inlined
+def goes_on(model: Model, data: Data, v: Vector, velocity: Vector) -> bool:
+    """Whether the step follows another one, touches the ground, and has no better guess than its incoming velocity v.
+
+    Next to pairs of bodies, a start further away might end in another solution.
+    """
+    same = data.carry.steps[0] > 0 and data.active_count[0] > 0 and model.pair_kind.shape[0] == 0
+    for d in range(v.shape[0]):
+        same = same and velocity[d] == v[d]
+    return same
+
+
+@inlined
+def with_last_impulses(
+    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], velocity: Vector
+) -> tuple[float, float]:
+    """Residuals at a velocity with the impulses of the step before."""
     q, v, u = inputs
     if not set_trial_velocity(model, data, options.h, q, velocity, 1.0):
-        return KnownStart(False, options.kappa, INFEASIBLE)
+        return INFEASIBLE
     move_inequalities(model, data, 0.0)
-    balance = residuals(model, data, options.h, q, v, u)
-    if balance[0] > _GOES_ON * total_impulse(model, data):
-        balance = predict(model, data, options, inputs)
-    return KnownStart(balance[0] < 1e300, options.kappa, balance)
+    return residuals(model, data, options.h, q, v, u)
 
 
 @inlined
@@ -210,16 +242,16 @@ def warm_or_resumed(
     q, v, u = inputs
     h = options.h
     if not set_trial_velocity(model, data, h, q, velocity, 1.0):
-        return KnownStart(False, options.kappa, INFEASIBLE)
+        return KnownStart(False, options.kappa, INFEASIBLE, 1.0)
     kappa = max(options.kappa, _RESUMED)
     resume_inequalities(model, data, h, kappa, False)
     away, _ = residuals(model, data, h, q, v, u)
     move_inequalities(model, data, 0.0)
     last = residuals(model, data, h, q, v, u)
     if last[0] < _BALANCED * away:
-        return KnownStart(True, options.kappa, last)
+        return KnownStart(True, options.kappa, last, 1.0)
     resume_inequalities(model, data, h, kappa, False)
-    return KnownStart(True, kappa, residuals(model, data, h, q, v, u))
+    return KnownStart(True, kappa, residuals(model, data, h, q, v, u), 1.0)
 
 
 @inlined
@@ -231,17 +263,17 @@ def at_kappa(
     h = options.h
     kappa = options.kappa
     if not set_trial_velocity(model, data, h, q, v, 1.0):
-        return KnownStart(False, kappa, INFEASIBLE)
+        return KnownStart(False, kappa, INFEASIBLE, 1.0)
     start_inequalities(model, data, h, kappa, 1.0)
     usual, _ = residuals(model, data, h, q, v, u)
     placed = True  # most guess the incoming velocity: there already
     for d in range(v.shape[0]):
         placed = placed and velocity[d] == v[d]
     if not placed and not set_trial_velocity(model, data, h, q, velocity, 1.0):
-        return KnownStart(False, kappa, INFEASIBLE)
+        return KnownStart(False, kappa, INFEASIBLE, 1.0)
     start_inequalities(model, data, h, kappa, 0.0)
     hard = residuals(model, data, h, q, v, u)
-    return KnownStart(hard[0] < _AT_REST * usual, kappa, hard)
+    return KnownStart(hard[0] < _AT_REST * usual, kappa, hard, 1.0)
 
 
 @inlined

@@ -127,9 +127,10 @@ def solve_from(
         smoothing, ratio, merit = lower_smoothing(model, data, kappa, s.continuation, smoothing, ratio, merit)
         if s.continuation and smoothing < before:
             patience = max(patience, iterations + _PATIENCE // 2)
-        solved = merit.residual < options.tolerance and smoothing <= kappa
+        share = known.share if iterations == 1 else 1.0
+        solved = merit.residual < share * options.tolerance and smoothing <= kappa
         # a guess within the tolerance gets one step, too: Newton's method squares its error
-        if solved and iterations > 0 and on_path(model, data, h, kappa, spread, merit.violation):
+        if solved and iterations > 0 and on_path(model, data, h, kappa, share**0.5 * spread, merit.violation):
             return Outcome(Status.SOLVED.value, iterations, merit.residual, merit.violation)
         if iterations >= options.max_iterations:
             return Outcome(Status.MAX_ITERATIONS.value, iterations, merit.residual, merit.violation)
