@@ -24,6 +24,7 @@ from solvers.types import Floats
 __all__ = ["backflip"]
 
 _CROUCHED, _PUSH, _LANDED = 0.25, 0.12, 0.53  # [s] before the push, until the feet leave, after the landing
+_STILL = 0.1  # [s] at the end, in which the base stands
 _RAISED = 0.3  # of the crouch that the push rises beyond the stance
 _LEAD = 0.3  # [rad] of the turn at take-off
 _ATTITUDE, _ANGLE = 10.0, 0.05  # weights of squares per second
@@ -48,6 +49,8 @@ def backflip(
     do, and when feet touch, is not given: joints have the small weight of `leap`. Squares of place weigh 1, 1, 20,
     attitude 10 per second. The pose of the base at the end is a constraint. The guess of the states has these poses
     with the legs as they stand, and its torques are those of standing: from a guess that stands still, plans fall over.
+    In the refined problem the base has this pose for the last tenth of a second, so that it stands: a pose at the end
+    alone may be met in passing, and the gains of the last knots jerk the robot there.
 
     Args:
         distance: displacement along x [m].
@@ -77,6 +80,7 @@ def backflip(
     still, torques = standing(sim)
     horizon = round(min((_CROUCHED + _PUSH + _flight(height) + _LANDED) / step, 1e300))
     check_room(f"{call}(height=..., time_step=...): knots", horizon, 8.0 * sim.nx, "flip lower, or with longer knots")
+    still_knots = np.arange(max(1, horizon - round(min(_STILL / step, 1e300))), horizon + 1)
     poses = _poses(start, np.linspace(0.0, step * horizon, horizon + 1), distance, height, crouch)
     states = np.tile(still, (horizon + 1, 1))
     states[:, BaseState.POSE] = poses[:, BaseState.POSE]
@@ -91,6 +95,7 @@ def backflip(
         controls0=torques,
         states0=states,
         refinement=refinement,
+        refined_constraints=Goal(poses[still_knots], components=np.arange(6), knots=still_knots),
         advice="Try another height, or a deeper crouch.",
     )
 

@@ -64,6 +64,7 @@ def test_a_backflip_is_found_and_lands():
     assert angle[-1] - angle[0] == pytest.approx(-2.0 * np.pi, abs=0.02)
     assert np.all(np.abs(plan.u) <= 33.5 + 1e-9)
     assert np.ptp(plan.x[:, 7:19], axis=0).max() > 0.5  # its legs push, and fold
+    assert np.abs(plan.x[-6:, :7] - plan.x[-1, :7]).max() < 2e-3  # its base stands for the last tenth of a second
     shot = plan.replay(accuracy=1e-5)
     assert shot.status == 0, shot.message
     assert np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < 5e-3
