@@ -30,6 +30,8 @@ _THIN = 0.05  # height over width of points below which they tell no radius
 _STRETCH = 0.8  # length of a standing leg over that of a stretched one
 _UPRIGHT = 0.93  # the same on flat feet: bent further, ankles are near their stops, and nothing is left for a crouch
 _BEND = 0.9  # [rad] of the knees where the search for a stance begins
+_THERE = 1e-4  # [m] error of a stance whose feet are at their places
+_MIRRORED = 0.1  # [rad] bends of front and hind knees in the neutral state beyond which they face each other
 _PITCH = 0.7  # cosine between the axis of a hinge that bends a leg and y
 _TIPPED = 0.7  # cosine between the z axes of the base and the world below which a robot does not stand
 _TRIES = 4  # starts of each search
@@ -44,7 +46,8 @@ class Legs:
     foot from a mesh costs as much as a ball: the one on which they lie where the mesh is round, else one in their
     middle. Two feet keep all these points, on which the robot balances. The stance is found, too: hinges about y bend
     the legs to 0.8 of their length, 0.93 on ankles, with the feet below the hips and the knees to the back where the
-    joint limits allow it.
+    joint limits allow it. Mirrored legs, some bent to the back and some to the front in the neutral state, bend further
+    to their own side.
 
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator.
@@ -212,7 +215,7 @@ def _stance(sim: Simulator) -> Floats:
     feet = Feet(sim)
     kin, bodies = Kinematics(sim), {joint.child: joint for joint in mech.joints}
     at = feet.positions(x)
-    places, knees = {}, []
+    places, knees, own = {}, [], {}
     for k, contact in enumerate(feet.contacts):
         hinges = _pitching(kin, bodies, contact.body, x[: sim.nq])
         if len(hinges) < 2:
@@ -229,24 +232,37 @@ def _stance(sim: Simulator) -> Floats:
         stretch = _STRETCH if len(hinges) == 2 else _UPRIGHT
         places[f"foot {k}"] = np.array([middle, at[k, 1], hip[2] - stretch * length - sole])
         knees.append(hinges[1])
-    joints = [bodies[name] for name in dict.fromkeys(knees)]
-    found = [_bent(sim, kin, places, joints, x, sign) for sign in (1.0, -1.0)]
-    errors = [float(r.error) for r in found]
-    if min(errors) > 1e-4:
+        axis = kin.jacobian(contact.body, x[: sim.nq])[4, mech.v_slice(bodies[hinges[1]].name).start]
+        own[hinges[1]] = float(np.sign(axis)) * _bend(knee - hip, foot - knee)
+    joints, bends = [bodies[name] for name in own], np.array(list(own.values()))
+    if bends.min() < -_MIRRORED and bends.max() > _MIRRORED:
+        mirrored = _bent(sim, kin, places, joints, x, np.sign(bends))
+        if mirrored.error <= _THERE:
+            return _with(x, mirrored.q)
+    found = [_bent(sim, kin, places, joints, x, np.full(len(joints), sign)) for sign in (1.0, -1.0)]
+    good = [r for r in found if r.error <= _THERE]
+    if not good:
         raise ValueError(f"Legs(robot): no stance of {mech.name!r} puts the feet below the hips; give stance=...")
-    good = [r for r in found if r.error <= 1e-4]
-    best = min(good, key=lambda r: _origin_of(sim, bodies, knees, r.q))
-    out = sim.neutral()
-    out[: sim.nq] = best.q
-    return out
+    return _with(x, min(good, key=lambda r: _origin_of(sim, bodies, knees, r.q)).q)
+
+
+def _with(x: Floats, q: Floats) -> Floats:
+    """The state (nx,) with other coordinates."""
+    return np.concatenate([q, x[len(q) :]])
+
+
+def _bend(thigh: Floats, shank: Floats) -> float:
+    """Angle about y from the thigh (3,) to the shank (3,) [rad]."""
+    (a, b), (c, d) = thigh[[0, 2]], shank[[0, 2]]
+    return float(np.arctan2(b * c - a * d, a * c + b * d))
 
 
 def _bent(
-    sim: Simulator, kin: Kinematics, places: dict[str, Floats], knees: list[Joint], x: Floats, sign: float
+    sim: Simulator, kin: Kinematics, places: dict[str, Floats], knees: list[Joint], x: Floats, signs: Floats
 ) -> Any:
-    """The search from knees that are bent to one side."""
+    """The search from knees (k,) that are bent to one side each."""
     start = x[: sim.nq].copy()
-    for joint in knees:
+    for joint, sign in zip(knees, signs, strict=True):
         q = sim.mechanism.q_slice(joint.name)
         low, high = joint.limits[0] if joint.limits else (-np.inf, np.inf)
         start[q] = np.clip(start[q] + sign * _BEND, low, high)

@@ -5,6 +5,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.gaits.feet import Feet
+from dojo_opt.mpc.settings import OPTIONS
 
 
 def steering(time):
@@ -44,6 +45,19 @@ def test_a_robot_is_steered_and_pushed(mpc):
     assert (1.0 - 2.0 * (loop.x[:, 4] ** 2 + loop.x[:, 5] ** 2)).min() > 0.95
     heading = 2.0 * np.arctan2(loop.x[:, 6], loop.x[:, 3])
     assert heading[-1] > 0.4 and loop.x[-1, 0] > 0.2
+
+
+def test_every_tick_after_a_push_has_a_new_plan():
+    """Line searches alone rejected up to four plans in a row, in which a Go2 drifted on, and fell."""
+    push = 6.0 * np.array([np.cos(np.radians(240.0)), np.sin(np.radians(240.0)), 0.0])
+
+    def rejected(**settings):
+        mpc = dojo.tasks.legged_mpc(dojo.models.quadruped(damper=0.0), **settings)
+        pushed = dojo.tasks.plant(mpc, 2e-3, pushes=[dojo.Push(0.5, push, duration=0.1)])
+        assert dojo.closed_loop(mpc, pushed, 1.2).survived
+        return sum(tick.fallback for tick in mpc.log)
+
+    assert rejected() == 0 and rejected(options=OPTIONS) > 1
 
 
 def test_an_unknown_gait_or_command_is_refused():

@@ -40,6 +40,20 @@ def test_a_robot_stands_on_its_feet_with_its_knees_to_the_back(straight):
     )
 
 
+def test_mirrored_legs_bend_to_their_own_sides(straight):
+    """As those of ANYmal, whose hind shanks bend to the front where all joints are zero; they used to go to the back."""
+    start = np.array(straight.neutral)
+    for leg in ("RR", "RL"):
+        start[straight.q_slice(f"{leg}_calf")] = 0.3
+    start[straight.q_slice("FR_calf")] = start[straight.q_slice("FL_calf")] = -0.3
+    joints = [replace(joint, limits=None) for joint in straight.joints]
+    found = Legs(replace(straight, joints=joints, neutral=start)).mechanism
+    q = np.array(found.neutral)
+    front, hind = ([float(q[found.q_slice(f"{leg}_{part}")][0]) for part in ("thigh", "calf")] for leg in ("FL", "RL"))
+    assert front[0] > 0.2 and front[1] < -0.5  # a positive thigh moves its knee back
+    assert hind[0] < -0.2 and hind[1] > 0.5
+
+
 def test_a_foot_of_a_round_mesh_is_its_ball(straight):
     """Its hull has corners alone: a point in the middle of the lowest ones lies inside the foot, or beside it."""
     rng, radius = np.random.default_rng(0), 0.022
