@@ -1,4 +1,4 @@
-"""A quadruped under an unknown payload on unknown ground: MPC with a fixed model, and with one that adapts.
+"""A quadruped under an unknown payload on unknown ground: MPC with a fixed model, and with models that adapt.
 
     NUMBA_NUM_THREADS=1 python benchmarks/adaptation.py [--runs N]
 
@@ -7,7 +7,8 @@ to 24 kg on a robot of 11.9 kg, a friction of 0.2 to 0.8, and a push of up to 8 
 measure with noise (0.2 mm and mrad; 2 mm/s and mrad/s). The model has no payload and a friction of 0.8, of which plans
 count on 0.4 at most. The adapting controller estimates the mass of the trunk and the friction. Friction is known where
 its standard deviation is below 0.1, which takes a foot that slides; until then it has a lower bound, the friction that
-standing feet have used.
+standing feet have used. A third controller adapts, too, and presses its feet apart until one of them slides
+(`Adaptation(shear=1.3)`).
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ ADAPT = ("mass:trunk", "friction:*")
 NOISE = (2e-4, 2e-3)  # [m, rad], [m/s, rad/s]
 SECONDS, KNOWN, CHECKED = 4.0, 0.1, 1.0  # [s], [1], [s]
 CLOSE = 0.05  # share of the mass
+SHEAR = 1.3  # [1/s]
 SURE = 0.9  # share of the runs whose bounds hold, two standard deviations wide
 
 
@@ -76,6 +78,11 @@ class Watched:
         """Time at which friction is known first [s]; infinite if never."""
         return next((now for now, _, deviations, _ in self.history if deviations["friction:*"] < KNOWN), float("inf"))
 
+    def error(self, friction: float) -> float:
+        """Error of the friction after `CHECKED` s; NaN where it is not known."""
+        known = self.deviations.get("friction:*", np.inf) < KNOWN
+        return abs(self.values["friction:*"] - friction) if known else float("nan")
+
     def bounded(self, friction: float, time: float) -> tuple[bool, float]:
         """(whether the bounds of the friction held at a time [s], the lower one over the friction)."""
         low, high = next(row[3] for row in reversed(self.history) if row[0] < time + 1e-9)
@@ -92,10 +99,11 @@ def trial(run: int, adapt: dojo.Adaptation | None) -> tuple[dojo.ClosedLoop, Wat
 
 
 def run(args: argparse.Namespace) -> Report:
-    """All runs, with both controllers."""
+    """All runs, with the three controllers."""
     report = Report("Adaptive control", "")
     lines: list[list[Cell]] = []
-    payload, friction, costs, survivors = [], [], [], np.zeros(2, dtype=int)
+    payload, friction, costs, survivors = [], [], [], np.zeros(3, dtype=int)
+    sheared: list[tuple[float, float, bool]] = []  # time until the friction is known, its error then, bounds hold
     times: list[tuple[float, float]] = []
     bounds: list[list[tuple[bool, float]]] = []
     count = 2 if args.quick else args.runs
@@ -105,7 +113,9 @@ def run(args: argparse.Namespace) -> Report:
         noise = NOISE if number_of_run % 2 else (1e-5, 1e-4)
         fixed, _, cost = trial(number_of_run, None)
         loop, watched, adaptive = trial(number_of_run, dojo.Adaptation(ADAPT, noise=noise))
-        survivors += (fixed.survived, loop.survived)
+        probed, prober, _ = trial(number_of_run, dojo.Adaptation(ADAPT, noise=noise, shear=SHEAR))
+        sheared.append((prober.knows(), prober.error(drawn["friction"]), prober.bounded(drawn["friction"], CHECKED)[0]))
+        survivors += (fixed.survived, loop.survived, probed.survived)
         costs.append(adaptive / cost)
         times.append((watched.found(drawn["payload"] + 6.0), watched.knows()))
         bounds.append([watched.bounded(drawn["friction"], time) for time in (CHECKED, SECONDS)])
@@ -116,8 +126,9 @@ def run(args: argparse.Namespace) -> Report:
             known = watched.deviations["friction:*"] < KNOWN
             friction += [abs(watched.values["friction:*"] - drawn["friction"])] if known else []
             line += [watched.values["mass:trunk"] - 6.0, watched.values["friction:*"], "yes" if known else "no"]
-        lines.append([*line, *([""] * (7 - len(line))), bounds[-1][0][1]])
+        lines.append([*line, *([""] * (7 - len(line))), bounds[-1][0][1], probed.duration, prober.knows()])
     sure = None if args.quick else SURE * count
+    soon, off, safe = np.array(sheared).T
     hold, low = np.array(bounds).transpose(2, 1, 0)  # (2, runs) each
     report.rows = [
         number("runs", float(count)),
@@ -146,6 +157,18 @@ def run(args: argparse.Namespace) -> Report:
             float(np.median(friction)) if friction else float("nan"),
             0.1 if friction else None,  # in two runs, no foot may have slid
         ),
+        Row("runs that the model with shear survives", float(survivors[2]), "", None),
+        number("runs in which friction is known after 1 s, with shear", float(np.isfinite(off).sum())),
+        number(
+            "time until friction is known with shear, median",
+            float(np.median(soon)),
+            None if args.quick else CHECKED,
+            unit="s",
+        ),
+        number("time until friction is known with shear, longest", float(soon.max()), unit="s"),
+        number("error of a friction known after 1 s with shear, median", float(np.nanmedian(off)), 0.1),
+        number("error of a friction known after 1 s with shear, largest", float(np.nanmax(off))),
+        Row("runs whose bounds of the friction hold after 1 s, with shear", float(safe.sum()), "", sure, True),
         number("processor time over that of the fixed model, median", float(np.median(costs))),
     ]
     header = (
@@ -157,6 +180,8 @@ def run(args: argparse.Namespace) -> Report:
         "friction",
         "known",
         "lower bound / friction",
+        "with shear lasts [s]",
+        "known from [s]",
     )
     report.tables = [Table("Runs", header, lines)]
     return report

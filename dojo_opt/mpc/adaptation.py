@@ -41,6 +41,7 @@ _BRIEF = 0.2  # [s] in which an outlier is no error of parameters, if all was we
 _SURE = 2.0  # standard deviations of the bounds
 _SEEN = 0.25  # share of its first variance that a friction has at most once a foot has slid
 _SLID = 2.0  # a foot that slides is off by so many heights of a contact that stands
+_KNOWN = 0.25  # share of its first deviation that a friction has when it is known
 _MOVED = 0.02  # share of the spread: models are built anew when the estimate has moved by it, and linearised until then
 _NEAR = 3.0  # standard deviations of the height of a contact that stands
 _CLOSE = 1e-4  # [m] the same without noise
@@ -62,6 +63,8 @@ class Adaptation:
         interval: time between the two measurements of an update [s] (default 0.02).
         memory: time in which the parameters may change by their spread [s] (default 20).
         bounds: as in `ParameterSpace` (default None).
+        shear: growth of a force between the standing feet, as a share of their load, until one of them slides and the
+            frictions are known; see `dojo_opt.mpc.foot_shear`. 1.3 takes less than a second [1/s] (default 0: none).
     """
 
     parameters: Sequence[str]
@@ -70,6 +73,7 @@ class Adaptation:
     interval: float = 0.02
     memory: float = 20.0
     bounds: Mapping[str, tuple[float, float]] | None = None
+    shear: float = 0.0
 
     __repr__ = short_repr
 
@@ -84,6 +88,7 @@ class Adaptation:
         checks.mapping(f"{call}(bounds=...)", self.bounds)
         for name in ("interval", "memory"):
             checks.number(f"{call}({name}=...)", getattr(self, name), above=0.0)
+        checks.number(f"{call}(shear=...)", self.shear, at_least=0.0)
 
 
 class ParameterEstimator:
@@ -113,6 +118,8 @@ class ParameterEstimator:
         self._near = max(_CLOSE, _NEAR * float(noise[: nominal.nv].max()))
         self._prior = self._spread() ** 2
         self._used = UsedFriction(nominal.mechanism, self.space.labels)
+        if settings.shear and not self._used.frictions.any():
+            raise ValueError("Adaptation(shear=...): it shows frictions, and there are none among the parameters")
         self._fine: AdjustableSimulator | None = None  # with steps of the length of the samples
         self._written = self.space.values.copy()  # the values of the models
         self.forget()
@@ -141,6 +148,12 @@ class ParameterEstimator:
     def deviations(self) -> dict[str, float]:
         """The standard deviations of the estimate, by label."""
         return dict(zip(self.space.labels, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @property
+    def knows_friction(self) -> bool:
+        """Whether the deviations of all frictions are below a quarter of those before the first measurement."""
+        frictions = self._used.frictions
+        return bool(np.all(np.diag(self.covariance)[frictions] < _KNOWN**2 * self._prior[frictions]))
 
     @property
     def bounds(self) -> dict[str, tuple[float, float]]:

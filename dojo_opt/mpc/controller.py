@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.mpc.adaptation import ParameterEstimator
 from dojo_opt.mpc.delay import Delay, Prediction
+from dojo_opt.mpc.foot_shear import FootShear
 from dojo_opt.mpc.ground_estimate import Ground
 from dojo_opt.mpc.measurement import Measurement
 from dojo_opt.mpc.moving_reference import References
@@ -102,6 +103,8 @@ class MPC:
         if self.settings.adapt is not None:
             most = np.inf if self.settings.friction is None else self.settings.friction
             self.estimator = ParameterEstimator(self.nominal, self.sim, self.settings.adapt, most)
+        shear = 0.0 if self.settings.adapt is None else self.settings.adapt.shear
+        self._shear = FootShear(self.sim, shear) if shear else None
         self.reset()
 
     def __reduce__(self) -> Any:
@@ -146,6 +149,8 @@ class MPC:
         self._ground.forget()
         if self.estimator is not None:
             self.estimator.forget()
+        if self._shear is not None:
+            self._shear.forget()
         self._solver.reset()
 
     def __call__(self, time: float, x: ArrayLike) -> Vector:
@@ -179,6 +184,8 @@ class MPC:
         elif now >= self._due - _ROUNDING:
             self._tick(now, self.policy)
         u = self._command(now, self._measured.state(), measured)
+        if self._shear is not None and self.estimator is not None:
+            u = self._limited(u + self._shear(now, measured, self._ground, self.estimator.knows_friction))
         self._delay.issue(now, u)
         if self.estimator is not None:
             self.estimator.observe(now, measured, self._delay.acting(now, u), self._ground)
@@ -197,6 +204,10 @@ class MPC:
             u += self._servo(policy, now, sample)
         elif scale > 0.0:
             u += scale * policy.feedback(now, x)
+        return self._limited(u)
+
+    def _limited(self, u: Vector) -> Vector:
+        """The input within its limits, in place."""
         limits = self.problem.control_limits
         if limits is not None:
             np.clip(u, *limits, out=u)

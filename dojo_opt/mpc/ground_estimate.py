@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.planning.manifold import cross
 from dojo_opt.plant.ground_plane import GroundPlane
+from sim.mechanism.shapes import rotation_matrices
 from sim.model.state_columns import BodyState
 from sim.simulator.adjustable_simulator import AdjustableSimulator
 from solvers.types import Matrix, Stack, Vector
@@ -119,6 +120,15 @@ class Ground:
         return np.asarray(
             z[..., BodyState.POSITION] + self._point + w * twice + cross(r, twice) - self._radius * self._normal
         )
+
+    def point_jacobian(self, x: ArrayLike) -> Stack:
+        """d(points)/d(coordinates) at the state x (nx,), as of the bodies there: (ncontact, 3, nv)."""
+        z = self._sim.maximal(x)[self._body]
+        R = rotation_matrices(z[:, BodyState.QUATERNION])
+        slopes = self._sim.maximal_jacobian(x).reshape(-1, 4, 3, self._sim.ndx)[self._body, ..., : self._sim.nv]
+        arms = (R @ self._point[..., None])[..., 0] - self._radius * self._normal
+        turns = R @ slopes[:, 2]  # about world axes
+        return np.asarray(slopes[:, 0] + np.cross(turns, arms[..., None], axis=1))
 
     def gaps(self, points: Stack) -> Matrix:
         """Distances of the points (..., ncontact, 3) of the contacts from their ground, (..., ncontact) [m]."""

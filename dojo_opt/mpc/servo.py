@@ -109,11 +109,12 @@ class ModelServo:
         return np.asarray(u - self.kp * (x[self.place] - self.rest) - self.kd * x[self.velocity])
 
 
-def driven(sim: Simulator) -> Integers:
+def driven(sim: Simulator, call: str = _CALL) -> Integers:
     """Numbers of the degrees of freedom that the inputs drive.
 
     Args:
         sim: the simulator.
+        call: of which the message tells.
 
     Returns:
         (nu,) numbers below nv.
@@ -123,7 +124,7 @@ def driven(sim: Simulator) -> Integers:
     """
     on_body = np.flatnonzero(np.asarray(sim.model.input_kind) != InputKind.JOINT)
     if on_body.size:
-        raise ValueError(f"{_CALL}: every input has to drive a joint; input {on_body[0]} acts on a body")
+        raise ValueError(f"{call}: every input has to drive a joint; input {on_body[0]} acts on a body")
     return np.asarray(sim.model.input_index)
 
 
