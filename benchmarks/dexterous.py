@@ -1,6 +1,6 @@
 """Dexterous manipulation by contact-implicit MPC: the given trials of Jin (arXiv 2408.07855), beside its figures.
 
-    NUMBA_NUM_THREADS=1 python benchmarks/dexterous.py [CASE ...] [--trials N]
+    NUMBA_NUM_THREADS=1 python benchmarks/dexterous.py [CASE ...] [--trials N] [--plant ours|mujoco]
 
 Objects, starts, goals, success and budgets are those of the publication, which has 20 trials per case; on two plants:
 ours, at 2 ms with kappa 1e-8, and MuJoCo's with its default contacts, where it is installed. What differs is in
@@ -36,6 +36,7 @@ CASES = {
         ("stick", "flip"),
     )
 } | {"trifinger_cube": ("trifinger", ("cube",))}
+CASES |= {f"allegro_{item}".replace(" ", "_"): ("allegro", (item,)) for item in ("cube", "foam brick", "stick")}
 TRIALS = 20
 SUCCESS, ANGLE, DISTANCE, RATE = 96.5, 11.0, 7.8, 50.0  # [%], [deg], [mm], [Hz] of the publication
 OURS, MUJOCO = "ours, 2 ms, kappa 1e-8", "MuJoCo, default contacts"
@@ -77,6 +78,7 @@ def run(args: argparse.Namespace) -> Report:
     """The requested cases."""
     report = Report("Dexterous manipulation", "")
     kinds = [OURS] + ([MUJOCO] if find_spec("mujoco") is not None else [])
+    kinds = {"ours": kinds[:1], "mujoco": kinds[1:]}.get(args.plant, kinds)
     trials, seconds = (1, QUICK) if args.quick else (args.trials, None)
     for kind in kinds:
         lines = []
@@ -107,6 +109,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser(__doc__)
     arguments.add_argument("cases", nargs="*", metavar="CASE", help="; ".join(CASES))
     arguments.add_argument("--trials", type=int, default=TRIALS, help="the first of them per case")
+    arguments.add_argument("--plant", choices=("ours", "mujoco"), help="one of the plants (default: both)")
     return deliver("dexterous", run, arguments, argv)
 
 

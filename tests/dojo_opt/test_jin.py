@@ -5,7 +5,9 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.plant.closed_loop import closed_loop
-from dojo_opt.tasks.jin import trifinger
+from dojo_opt.tasks.idto.assembly import from_com
+from dojo_opt.tasks.jin import allegro, palm_up, trifinger
+from dojo_opt.tasks.jin.allegro import trial_of as allegro_trial
 from dojo_opt.tasks.jin.fingertips import mechanism, trial_of
 from dojo_opt.tasks.jin.grasp import grasp, place_of_ball
 from dojo_opt.tasks.jin.placing import Placing
@@ -122,13 +124,63 @@ def test_tips_of_the_trifinger_are_where_its_links_end():
             np.testing.assert_allclose(at[3 + j :: 3], (sides[0] - sides[1]) / 2e-6, atol=1e-8)
 
 
+@pytest.mark.parametrize(
+    ("item", "start", "goal"),
+    [
+        (
+            "cube",
+            (-0.03874882737, -0.008286597983, 0.04, 0.9929791059, -0.1182898778),
+            (0.05, 0.6184986846, -0.7857858341),
+        ),
+        (
+            "stick",
+            (-0.01874882737, 0.001713402017, 0.03, 0.7477599474, 0.6639691718),
+            (0.03, 0.9982432334, -0.05924902562),
+        ),
+    ],
+)
+def test_trials_of_the_hand_are_those_of_the_publication(item, start, goal):
+    trial = allegro_trial(item, 0)
+    np.testing.assert_allclose(trial.start[[0, 1, 2, 3, 6]], start, atol=1e-9)
+    sign = np.sign(trial.goal[3] * goal[1])
+    np.testing.assert_allclose(trial.goal[[2, 3, 6]] * (1.0, sign, sign), goal, atol=1e-9)
+
+
+def test_tips_of_the_hand_are_where_its_links_end():
+    """The formula in the cost against the simulator's kinematics; its derivatives are those of the grasp, below."""
+    sim = dojo.Simulator(palm_up.mechanism("cube"), time_step=2e-3)
+    kin, x = dojo.Kinematics(sim), sim.neutral()
+    x[7:23] = np.random.default_rng(3).uniform(-0.4, 1.2, 16)
+    for k, name in enumerate(("first", "middle", "ring", "thumb")):
+        end = from_com(palm_up.links(), f"{name}_3", (0.0, 0.0, 0.054 if name == "thumb" else 0.0384))
+        place, turn = kin.pose(f"{name}_3", x[: sim.nq])[:2]
+        np.testing.assert_allclose(palm_up.place_of_tip(x, k)[:3], place + turn @ end, atol=1e-12)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("made", "place"), [(mechanism, place_of_ball), (trifinger_mechanism, place_of_tip)])
-def test_the_slope_of_a_grasp_is_that_of_its_residual(made, place):
+def test_a_hand_turns_a_cube():
+    """By three quarters of a quarter turn on its palm, within .9 s; it stays there for 2 s in the benchmark."""
+    task = allegro("cube", trial=3)
+    outcome = task.outcome(task.run(seconds=0.9))
+    assert outcome.measures["angle off [deg]"] < 23.1 and outcome.measures["off [mm]"] < 20.0
+    assert outcome.penetration < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("made", "tips", "joints", "place"),
+    [
+        (mechanism, 3, 3, place_of_ball),
+        (trifinger_mechanism, 3, 3, place_of_tip),
+        (palm_up.mechanism, 4, 4, palm_up.place_of_tip),
+    ],
+)
+def test_the_slope_of_a_grasp_is_that_of_its_residual(made, tips, joints, place):
     sim = dojo.Simulator(made("cube"), time_step=2e-3)
-    cost = grasp(3, 3, place, 1.0, 0.05, 5)
+    cost = grasp(tips, joints, place, 1.0, 0.05, 5)
     x = sim.integrate(sim.neutral(), np.random.default_rng(1).uniform(-0.05, 0.05, sim.ndx))
-    u, out, slope = np.zeros(9), np.zeros(12), np.zeros((12, sim.ndx + 9))
+    u, rows = np.zeros(sim.nu), 3 * tips + 3
+    out, slope = np.zeros(rows), np.zeros((rows, sim.ndx + sim.nu))
     cost.jacobian(x, u, slope)
     for j in range(sim.ndx):
         sides = []

@@ -12,11 +12,12 @@ lets a servo follow positions. Here the state has velocities, the inputs are for
 
 from typing import TYPE_CHECKING, Any
 
+from dojo_opt.tasks.jin.allegro import allegro
 from dojo_opt.tasks.jin.fingertips import fingertips
 from dojo_opt.tasks.jin.trifinger import trifinger
 from sim.mechanism.checks import no_attribute
 
-__all__ = ["fingertips", "trifinger"]
+__all__ = ["allegro", "fingertips", "trifinger"]
 
 
 if not TYPE_CHECKING:

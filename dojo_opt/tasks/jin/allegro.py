@@ -1,0 +1,113 @@
+"""The Allegro hand turns an object on its palm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from dojo_opt.cost import Effort
+from dojo_opt.tasks.jin.grasp import grasp
+from dojo_opt.tasks.jin.palm_up import FINGERS, JOINTS, NAMES, SHAPES, mechanism, place_of_tip
+from dojo_opt.tasks.jin.reposing import HORIZON, Aim, reposing
+from dojo_opt.tasks.jin.trial import Trial, draws, pose, turn
+from dojo_opt.tasks.suite import SuiteTask
+from sim.mechanism import checks
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.overlaps import overlaps
+from sim.model.state_columns import BaseState
+from solvers.types import Vector
+
+__all__ = ["allegro"]
+
+_CALL = "tasks.jin.allegro"
+_CENTER = {"cube": (-0.03, -0.01), "foam brick": (-0.01, 0.0), "stick": (-0.01, 0.0)}  # [m]
+_HEIGHT = {"cube": 0.04, "foam brick": 0.04, "stick": 0.03}  # [m]
+_LIFTED = {"cube": 0.05, "foam brick": 0.04, "stick": 0.03}  # [m] of goals
+_GOAL_X = -0.01  # [m]
+_SPREAD = 0.005  # [m] standard deviation of places
+_QUARTER = 0.5 * pi
+# until nothing overlaps at the start: lift [m], share of the bends of fingers that is kept, largest number of steps
+_BENDS = {"first": 3, "middle": 3, "ring": 3, "thumb": 2}  # last joints of fingers
+_LIFT, _UNBENT, _STEPS = 1e-3, 0.98, 100
+_KAPPA = 1e-4  # [N s m] of plans: at 1e-6 a tick takes twice as long, and as many runs succeed
+
+
+def trial_of(item: str, number: int) -> Trial:
+    """A trial of the publication: an object above the palm, and a quarter turn about the vertical from there.
+
+    Args:
+        item: name of the object.
+        number: number of the trial.
+
+    Returns:
+        The trial.
+
+    Raises:
+        ValueError: there is no such object or trial.
+    """
+    checks.one_of(f"{_CALL}(item)", item, SHAPES)
+    random, up = draws(_CALL, number), (0.0, 0.0, 1.0)
+    xy = np.asarray(_CENTER[item]) + _SPREAD * random.randn(2)
+    yaw = 0.25 * pi + _QUARTER * random.rand() if item == "stick" else pi * random.rand() - _QUARTER
+    sides = (-_QUARTER, _QUARTER) if item in ("cube", "stick") else (_QUARTER, -_QUARTER)
+    start = pose(xy, _HEIGHT[item], turn(up, yaw))
+    return Trial(start, pose((_GOAL_X, 0.0), _LIFTED[item], turn(up, yaw + random.choice(sides))))
+
+
+def _apart(start: Vector, hand: Mechanism) -> Vector:
+    """Coordinates (23,) of the start, parted: hard contact would throw objects that overlap off the hand.
+
+    Fingers that overlap the object are unbent step by step; an object that overlaps the palm or a base link is lifted.
+    """
+    q = np.array(hand.neutral)
+    q[BaseState.POSE] = start
+    for _ in range(_STEPS):
+        found = overlaps(hand, q)
+        if not found:
+            break
+        stiff = {name for name in found if name.startswith("palm") or name.endswith(":0")}
+        q[2] += _LIFT if stiff else 0.0
+        bent = {name.partition(":")[0] for name in found if name not in stiff}
+        for k, finger in enumerate(NAMES):
+            end = BaseState.JOINTS + JOINTS * (k + 1)
+            q[end - _BENDS[finger] : end] *= _UNBENT if finger in bent else 1.0
+    return q
+
+
+def allegro(item: str = "cube", trial: int = 0, **settings: Any) -> SuiteTask:
+    """Turn an object on the palm of the Allegro hand by a quarter turn: 10 knots of 40 ms at 50 Hz.
+
+    Costs are those of the publication: 50 sin^2(angle / 2) at the end, squared distances of the tips from the object,
+    and .1 of squared torques; the place of the object weighs 5000 at the end, five times as much as there. Angles are
+    weighed by a quarter of their squares, and velocities of the object a little. The publication moves targets of
+    servos of 1 N m/rad by up to .2 rad per tick of 100 ms; these are torques of up to .2 N m, held for 20 ms, on joints
+    with the damper of the hand, .1 N m s/rad. Plans take no time.
+
+    A run is a success, and ends, when the object is within 23 degrees of its goal for 2 s, wherever it is; it may take
+    50 s. Links are balls, and capsules at their tips, where those of the publication are boxes with the same tips; they
+    meet the object alone, and the palm is its box. Foam brick and stick are a box and a capsule of their sizes, without
+    torsional friction. At the start, fingers that overlap the object are unbent, or it is lifted.
+
+    Args:
+        item: "cube", "foam brick" or "stick".
+        trial: number of the trial, 0 to 19 (default 0).
+        **settings: settings of `dojo.MPC`, instead of the ones of the task.
+
+    Returns:
+        The task.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: there is no such object or trial, or an argument is out of range.
+    """
+    given, aim = trial_of(item, trial), Aim(near=np.inf, turned=0.04, period=0.1, budget=50.0)
+    terms = [Effort(0.1), grasp(FINGERS, JOINTS, place_of_tip, 1.0, 0.0, HORIZON)]
+    name, hand = f"jin.allegro {item} {trial}", mechanism(item)
+    start = _apart(given.start, hand)
+    given = given._replace(start=start[BaseState.POSE])
+    hand, planned = (replace(mech, neutral=start) for mech in (hand, mechanism(item, planned=True)))
+    usual = {"servo": None, "iterations": 1, "kappa": _KAPPA}
+    return reposing(name, given, planned, hand, terms, aim, {**usual, **settings})
