@@ -215,6 +215,17 @@ def test_hopper_and_walker_end_where_gymnasium_says():
         assert task.ends(x).tolist() == [False, True, True]
 
 
+def test_a_walker_pays_for_joints_near_their_limits():
+    plain, shaped = dojo.learn.walker2d(), dojo.learn.walker2d(limit_cost=3.0)
+    x, acts = np.tile(plain.sim.neutral(), (3, 1)), np.zeros((3, 6))
+    x[:, 3:9] = -0.5, -0.5, 0.0, -0.5, -0.5, 0.0  # bent legs, and ankles in the middle
+    x[1, 4], x[2, 5] = -0.05, 0.78  # a knee near its upper limit 0, an ankle at its upper limit of 45 degrees
+    paid = plain.rewards(x, acts, x)[0] - shaped.rewards(x, acts, x)[0]
+    assert paid == pytest.approx([0.0, 3.0 * 0.05, 3.0 * (0.78 - np.deg2rad(45.0) + 0.1)], abs=1e-9)
+    with pytest.raises(ValueError, match="limit_cost"):
+        dojo.learn.walker2d(limit_cost=-1.0)
+
+
 @pytest.mark.parametrize("make", ["half_cheetah", "hopper", "walker2d", "ant", "humanoid"])
 def test_first_states_are_within_the_limits_of_joints(make):
     """Hopper and walker stand with straight legs, on a limit: the noise of the start would bend half of them beyond."""
