@@ -211,9 +211,10 @@ def warm_or_predicted(
 def goes_on(model: Model, data: Data, v: Vector, velocity: Vector) -> bool:
     """Whether the step follows another one, touches the ground, and has no better guess than its incoming velocity v.
 
+    The first step of a motion has other inputs than the one before: its change of velocity says nothing of the next.
     Next to pairs of bodies, a start further away might end in another solution.
     """
-    same = data.carry.steps[0] > 0 and data.active_count[0] > 0 and model.pair_kind.shape[0] == 0
+    same = data.carry.steps[0] > 1 and data.active_count[0] > 0 and model.pair_kind.shape[0] == 0
     for d in range(v.shape[0]):
         same = same and velocity[d] == v[d]
     return same
