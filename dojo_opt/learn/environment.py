@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.learn.randomization import Drawn
 from dojo_opt.learn.task import Task
+from dojo_opt.planning.knot_costs import KnotCosts
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.monte_carlo import Sampler
 from dojo_opt.plant.plant import Plant
@@ -118,7 +119,7 @@ class _ProblemEpisode:
         self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
         self.edge, self.kind = np.where(bounded, 1.0, np.inf), np.float64
         self._xs, self._us = np.tile(problem.start, (problem.horizon + 1, 1)), np.zeros((problem.horizon, nu))
-        self._knot = problem.horizon
+        self._knot, self._cost = problem.horizon, KnotCosts(self.problem)
 
     def reset(self, rng: np.random.Generator) -> Vector:
         """Back to the start, under another perturbation when there is a sampler."""
@@ -132,34 +133,21 @@ class _ProblemEpisode:
     def step(self, action: Vector) -> Outcome:
         """One knot with the input held."""
         t = self._knot
-        info: dict[str, Any] = {}
         if t >= self.problem.horizon:
             raise RuntimeError("Environment.step: the episode is over, or has not begun; call reset()")
-        chosen = _numbers(action, self.problem.sim.nu)
-        self._us[t] = self._middle + self._half * chosen
-        for _ in range(self._substeps):
-            _, result = self.plant.step(self._us[t])
-            if not result.success:
-                info["message"] = result.message
-                break
+        us, plant = self._us, self.plant
+        us[t] = self._middle + self._half * _numbers(action, self.problem.sim.nu)
+        message = plant.hold(us[t], self._substeps)
         self._knot = t + 1
-        self._xs[t + 1 :] = self.plant.x
-        if self.plant.fallen(self.plant.x):
-            info["message"] = "The robot has fallen."
+        self._xs[t + 1] = plant.x
+        if plant.fallen(plant.x):
+            message = "The robot has fallen."
         over = self._knot == self.problem.horizon
-        reward = -self._cost(t) - (self._cost(t + 1) if over else 0.0)
+        reward = -self._cost(t, self._xs, us) - (self._cost(t + 1, self._xs, us) if over else 0.0)
+        info: dict[str, Any] = {"message": message} if message else {}
         if over:
-            info["violation"] = self.problem.violation(self._xs, self._us)
-        return self.plant.measure().copy(), reward, "message" in info, over, info
-
-    def _cost(self, knot: int) -> float:
-        """Cost of one knot."""
-        total = 0.0
-        for term in self.problem.costs:
-            term.update(self._xs, self._us)
-            rows = term.knots == knot
-            total += float(np.sum(term.weight[rows] * term.residual[rows] ** 2))
-        return total
+            info["violation"] = self.problem.violation(self._xs, us)
+        return plant.measure().copy(), reward, bool(message), over, info
 
     def state(self) -> Vector:
         """The present one."""

@@ -44,24 +44,29 @@ def tangent_layout(sim: Simulator, x: Vector) -> Integers:
 
 
 @kernel
-def state_residual(layout: Integers, xs: Matrix, knots: Integers, reference: Matrix, out: Matrix) -> None:
-    """out[i] = xs[knots[i]] (-) reference[i], in the tangent space at the reference: scalars by difference, quaternions
-    by log(reference^* q).
+def state_difference(layout: Integers, x: Vector, reference: Vector, out: Vector) -> None:
+    """out = x (-) reference, in the tangent space at the reference: scalars by difference, quaternions by
+    log(reference^* q).
     """
+    i = 0
+    while i < layout.shape[0]:
+        a = layout[i]
+        if a >= 0:
+            out[i] = x[a] - reference[a]
+            i += 1
+        else:
+            a = -a - 1
+            r0, r1, r2, r3 = reference[a], reference[a + 1], reference[a + 2], reference[a + 3]
+            q = quat_mul(r0, -r1, -r2, -r3, x[a], x[a + 1], x[a + 2], x[a + 3])
+            out[i], out[i + 1], out[i + 2] = quat_log(q[0], q[1], q[2], q[3])
+            i += 3
+
+
+@kernel
+def state_residual(layout: Integers, xs: Matrix, knots: Integers, reference: Matrix, out: Matrix) -> None:
+    """out[i] = xs[knots[i]] (-) reference[i]."""
     for row in range(knots.shape[0]):
-        t = knots[row]
-        i = 0
-        while i < layout.shape[0]:
-            a = layout[i]
-            if a >= 0:
-                out[row, i] = xs[t, a] - reference[row, a]
-                i += 1
-            else:
-                a = -a - 1
-                r0, r1, r2, r3 = reference[row, a], reference[row, a + 1], reference[row, a + 2], reference[row, a + 3]
-                w, x, y, z = quat_mul(r0, -r1, -r2, -r3, xs[t, a], xs[t, a + 1], xs[t, a + 2], xs[t, a + 3])
-                out[row, i], out[row, i + 1], out[row, i + 2] = quat_log(w, x, y, z)
-                i += 3
+        state_difference(layout, xs[knots[row]], reference[row], out[row])
 
 
 @users_callee

@@ -69,6 +69,14 @@ class Term:
         self.update(xs, us)
         return float(penalty(self.residual, self.weight, self.slope, self.one_sided))
 
+    def value_at(self, knot: int, xs: Matrix, us: Matrix) -> float:
+        """The part of `value` that belongs to a knot."""
+        rows = self.knots == knot
+        if not rows.any():
+            return 0.0
+        self.update(xs, us)
+        return float(penalty(self.residual[rows], self.weight[rows], self.slope[rows], self.one_sided))
+
     def expand(self, xs: Matrix, us: Matrix, g: Matrix, H: Stack) -> None:
         """Add gradient and Gauss-Newton Hessian at (xs, us) to g (T + 1, ndx + nu) and H."""
         self.update(xs, us)
@@ -166,19 +174,18 @@ class PickTerm(Term):
         self, name: str, knots: Integers, weight: Matrix, reference: Matrix, pick: Pick, one_sided: bool = False
     ) -> None:
         super().__init__(name, knots, weight, one_sided)
-        self.reference = reference
-        self._of_state, self._address, self._column, self._sign = pick
-        self.columns = self._column
-        self._whole = not self._of_state and np.array_equal(self._address, np.arange(weight.shape[1]))
+        self.reference, self.pick = reference, pick
+        self.columns = pick.column
+        self._whole = not pick.of_state and np.array_equal(pick.address, np.arange(weight.shape[1]))
 
     def update(self, xs: Matrix, us: Matrix) -> None:
-        source = xs if self._of_state else us
-        rows = source[self.knots] if self._whole else source[self.knots[:, None], self._address]
+        source = xs if self.pick.of_state else us
+        rows = source[self.knots] if self._whole else source[self.knots[:, None], self.pick.address]
         np.subtract(rows, self.reference, out=self.residual)
-        self.residual *= self._sign
+        self.residual *= self.pick.sign
 
     def _add(self, xs: Matrix, us: Matrix, g: Matrix, H: Stack) -> None:
-        add_expansion(self.residual, self._first, self._second, self.knots, self._column, self._sign, g, H)
+        add_expansion(self.residual, self._first, self._second, self.knots, self.pick.column, self.pick.sign, g, H)
 
 
 class ResidualTerm(Term):

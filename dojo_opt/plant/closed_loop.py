@@ -16,7 +16,8 @@ from dojo_opt.plant.tick import Tick
 from sim.mechanism import checks
 from sim.mechanism.memory_limit import check_room
 from sim.mechanism.short_repr import short_table
-from sim.simulator.results import Contacts, Interrupted
+from sim.simulator.engines.engine import CONTACT
+from sim.simulator.results import Contacts, Interrupted, contacts_of
 from sim.simulator.simulator import Simulator
 from solvers.status import MESSAGES, Status
 from solvers.types import Integers, Matrix, Vector
@@ -25,6 +26,7 @@ Controller = Callable[[float, Vector], ArrayLike]
 
 __all__ = ["ClosedLoop", "closed_loop", "steps_of"]
 
+_LEVEL = GroundPlane()
 _RECORD = 500.0  # bytes of the objects that keep a step
 
 
@@ -179,7 +181,7 @@ def closed_loop(
             raise TypeError(f"closed_loop({name}=...): expected a function, got {checks.shown(function)}")
     run = _LoopRecord([plant.x])
     try:
-        _drive(run, controller, plant, steps, every, plant.fallen if fallen is None else fallen, finished)
+        _drive(run, controller, plant, steps, every, plant.fallen if fallen is None else _test(fallen), finished)
     except KeyboardInterrupt:
         run.survived, run.message = False, MESSAGES[Status.INTERRUPTED]
         raise Interrupted(_closed_loop(run, controller, plant, reference)) from None
@@ -207,7 +209,11 @@ def _closed_loop(run: _LoopRecord, controller: Controller, plant: Plant, referen
         x=np.array(run.x[: count + 1]),
         u=np.array(run.u).reshape(count, plant.simulator.nu),
         status=np.array(run.status, dtype=np.int64),
-        contacts=_stacked(plant.simulator, run.contacts[:count]),
+        contacts=contacts_of(
+            plant.simulator.mechanism,
+            plant.simulator.time_step,
+            np.array(run.contacts[:count]).reshape(count, plant.simulator.ncontact, CONTACT),
+        ),
         survived=run.survived,
         message=run.message,
         softened=plant.softened,
@@ -240,7 +246,7 @@ class _LoopRecord:
 
     x: list[Vector]
     u: list[Vector] = field(default_factory=list)
-    contacts: list[Contacts] = field(default_factory=list)
+    contacts: list[Matrix] = field(default_factory=list)  # (ncontact, 11) of each step
     status: list[int] = field(default_factory=list)
     log: list[Tick] = field(default_factory=list)
     planes: list[GroundPlane] = field(default_factory=list)  # that the reference was carried onto
@@ -265,21 +271,26 @@ def _drive(
             answer = controller(plant.time, plant.measure().copy())  # a controller may write into its argument
             command = checks.array("closed_loop: controller's u", answer, (plant.nominal.nu,))
             run.log += [tick for tick in log[-1:] if not run.log or tick is not run.log[-1]]
-        run.planes.append(GroundPlane() if own is None else own.plane)
+        run.planes.append(_LEVEL if own is None else own.plane)
         u, result = plant.step(command)
         run.status.append(int(result.status))
         if result.status != Status.SOLVED:
             run.message, run.survived = f"Plant, step {k}: {MESSAGES[result.status]}", False
             break
-        run.contacts.append(result.contacts)
+        run.contacts.append(result.scene[2])
         run.x.append(plant.x)
         run.u.append(u)  # last: Ctrl-C may come between two of them, and counts the steps by this one
-        if _yes("closed_loop: the answer of fallen", has_fallen(plant.x.copy())):
+        if has_fallen(plant.x):
             run.message, run.survived = f"Fell at {plant.time:.3f} s.", False
             break
         if finished is not None and _yes("closed_loop: the answer of finished", finished(plant.time, plant.x.copy())):
             run.message = f"Achieved its aim at {plant.time:.3f} s."
             break
+
+
+def _test(fallen: Callable[[Vector], bool]) -> Callable[[Vector], bool]:
+    """A user's function of a state, which it may write into."""
+    return lambda x: _yes("closed_loop: the answer of fallen", fallen(x.copy()))
 
 
 def _yes(call: str, answer: Any) -> bool:
@@ -288,13 +299,3 @@ def _yes(call: str, answer: Any) -> bool:
         return bool(answer)
     except ValueError:
         raise ValueError(f"{call}: expected True or False, got {checks.shown(answer)}") from None
-
-
-def _stacked(sim: Simulator, steps: Sequence[Contacts]) -> Contacts:
-    """The contacts of single steps, one after the other."""
-    shapes = {"normals": (3,), "impulse": (3,), "point": (3,), "gap": (), "slip": ()}
-    arrays = {
-        name: np.array([getattr(c, name) for c in steps], dtype=np.float64).reshape(len(steps), sim.ncontact, *shape)
-        for name, shape in shapes.items()
-    }
-    return Contacts(sim.mechanism.contact_names, time_step=sim.time_step, **arrays)

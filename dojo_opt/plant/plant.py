@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.gaits.feet import Feet
+from dojo_opt.plant.fall import FallCheck
 from dojo_opt.plant.perturbation import Perturbation
 from sim.mechanism import checks
-from sim.mechanism.joint import Joint
-from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.shapes import rotation_matrix
-from sim.model.state_columns import BodyState
+from sim.simulator.arguments import is_plain
 from sim.simulator.results import StepResult
 from sim.simulator.simulator import Simulator
 from solvers.types import Vector
@@ -22,10 +20,6 @@ from solvers.types import Vector
 __all__ = ["Plant"]
 
 _SOFTER = (10.0, 100.0, 1000.0)  # times the smoothing of a step that is not solved at its own
-_LOW = 0.5  # a base below this share of its first height has fallen
-_TILTED = 0.5  # and so has one whose axis has a smaller cosine with the normal of the ground
-_FLOOR = 0.1  # a plane with a normal that points up by more than this can be the floor
-_LEVEL = 1e-6  # vertical part of a level axis
 
 
 class Plant:
@@ -65,11 +59,11 @@ class Plant:
         self.perturbation = p = Perturbation(**fields) if perturbation is None else perturbation
         self.simulator = sim.replace(mechanism=p.mechanism(sim.mechanism))
         self.normal = p.normal
-        contacts = self.simulator.mechanism.contacts
-        self._floor = next((c for c in contacts if c.terrain is not None or np.asarray(c.normal)[2] > _FLOOR), None)
         self._noise = _spread("Plant(noise=...)", p.noise, sim.ndx)
+        self._noisy = bool(self._noise.any())
         lo, hi = sim.mechanism.input_limits if p.control_limits is None else p.control_limits
         self._limits = tuple(_spread("Plant(control_limits=...)", b, sim.nu) for b in (lo, hi))
+        self._limited = bool(np.isfinite(self._limits).any())
         self._late = round(p.delay / sim.time_step)
         if abs(self._late * sim.time_step - p.delay) > 1e-9:
             raise ValueError(
@@ -81,6 +75,7 @@ class Plant:
         self._x0 = p.on_ground(sim.mechanism, x)
         if p.terrain is not None:
             self._x0 = Feet(self.simulator, self.simulator.mechanism.contact_names).put_down(x)
+        self._has_fallen = FallCheck(self.simulator.mechanism, self._x0, self.normal)
         self.reset()
 
     def perturbed(self, perturbation: Perturbation) -> Plant:
@@ -116,7 +111,7 @@ class Plant:
         Returns:
             (nx,) measured state; without noise, the array of the plant itself.
         """
-        if not self._noise.any():
+        if not self._noisy:
             return self.x
         return self.nominal.integrate(self.x, self._noise * self._random.standard_normal(self.nominal.ndx))
 
@@ -133,10 +128,7 @@ class Plant:
         Raises:
             ValueError: the shape of the command is wrong, or a number is not finite.
         """
-        given = checks.array("Plant.step(command)", command, (self.nominal.nu,))
-        lowest, highest = self._limits
-        u = np.maximum(given, lowest)  # a copy: its owner may write into the command meanwhile
-        np.minimum(u, highest, out=u)
+        u = self._within_limits(checks.array("Plant.step(command)", command, (self.nominal.nu,)))
         if self._late:
             self._waiting.append(u)
             late = len(self._waiting) > self._late
@@ -152,6 +144,38 @@ class Plant:
         self.x = result.x
         self.steps += 1
         return u, result
+
+    def hold(self, command: Vector, steps: int) -> str:
+        """Time steps with the same command; an unsolved one ends them.
+
+        Args:
+            command: (nu,) input that the controller commands [N, N m], as of `step`.
+            steps: number of time steps.
+
+        Returns:
+            Why a step was not solved; empty if all were.
+
+        Raises:
+            ValueError: the shape of the command is wrong, or a number is not finite.
+        """
+        if self.simulator.has_stepper and not self._late and not self.perturbation.pushes:
+            row = self.simulator.stepper(steps)
+            if is_plain(command, (self.nominal.nu,)) and row.advance(self.x, self._within_limits(command)):
+                self.x = row.end.copy()
+                self.steps += steps
+                return ""
+        for _ in range(steps):
+            _, result = self.step(command)
+            if not result.success:
+                return result.message
+        return ""
+
+    def _within_limits(self, command: Vector) -> Vector:
+        """A copy of the command within the limits of the actuators: its owner may write into it meanwhile."""
+        if not self._limited:
+            return command.copy()
+        u = np.maximum(command, self._limits[0])
+        return np.minimum(u, self._limits[1], out=u)
 
     def _soften(self, u: Vector, result: StepResult) -> StepResult:
         """The step with the hardest contact at which it can be solved."""
@@ -171,26 +195,7 @@ class Plant:
         Returns:
             True if it has fallen. Always False for a robot whose base neither floats nor moves in a vertical plane.
         """
-        if not stands_free(self.nominal.mechanism):
-            return False
-        now, first = self._base(x), self._base(self._x0)
-        low = self._above(now[:3]) < _LOW * self._above(first[:3])
-        up = rotation_matrix(now[BodyState.QUATERNION]) @ rotation_matrix(first[BodyState.QUATERNION]).T @ self.normal
-        return bool(low or up @ self.normal < _TILTED)
-
-    def _above(self, place: Vector) -> float:
-        """Height of a place (3,) above the ground below it [m]."""
-        contact, z = self._floor, float(place[2])
-        if contact is None:
-            return z
-        if contact.terrain is not None:
-            return z - contact.height - float(contact.terrain.height(place[0], place[1]))
-        normal = np.asarray(contact.normal)
-        return float((normal @ place - contact.height) / normal[2])
-
-    def _base(self, x: Vector) -> Vector:
-        """Maximal state (13,) of the first body."""
-        return np.asarray(self.nominal.maximal(x)[0])
+        return self._has_fallen(checks.array("Plant.fallen(x)", x, (self.nominal.nx,)))
 
 
 def _spread(call: str, value: ArrayLike, size: int) -> Vector:
@@ -199,14 +204,3 @@ def _spread(call: str, value: ArrayLike, size: int) -> Vector:
     if given.shape not in ((), (size,)):
         raise ValueError(f"{call}: expected a number or shape ({size},), got {given.shape}")
     return np.array(np.broadcast_to(given, (size,)))
-
-
-def stands_free(mechanism: Mechanism) -> bool:
-    """Whether the first joint lets its body move up and down and tip over: no pendulum and no arm."""
-    base = mechanism.joints[0]
-    return base.kind == "floating" or (base.kind == "planar_axis" and abs(_world_axis(base)[2]) < _LEVEL)
-
-
-def _world_axis(joint: Joint) -> Vector:
-    """Axis of a joint on the world, world axes."""
-    return np.asarray(rotation_matrix(joint.orientation) @ np.asarray(joint.axis))

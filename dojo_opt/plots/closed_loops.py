@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dojo_opt.plant.closed_loop import ClosedLoop
+from dojo_opt.plant.fall import stands_free
 from dojo_opt.plant.monte_carlo import MonteCarlo
-from dojo_opt.plant.plant import stands_free
 from dojo_opt.plant.tick import Tick, milliseconds
 from dojo_opt.plots.axes import finish, plain_ticks, units
 from dojo_opt.plots.trajectory import controls, state, velocities

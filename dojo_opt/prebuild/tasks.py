@@ -17,6 +17,7 @@ from dojo_opt.learn.gymnasium_tasks import FUNCTIONS
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.task import compile_functions
+from dojo_opt.planning.knot_costs import KnotCosts
 from sim.model.state_columns import BaseState
 from sim.simulator.contact_groups import ContactGroups
 from sim.simulator.simulator import Simulator
@@ -216,6 +217,8 @@ def _swingup() -> None:
 def _hop() -> None:
     plan = dojo.ilqr(dojo.problems.hop())
     dojo.tracking_gains(plan.problem, plan)
+    KnotCosts(plan.problem)(0, plan.x, plan.u)
+    dojo.Plant(plan.problem.sim).hold(plan.u[0], 1)
 
 
 def _plans() -> None:

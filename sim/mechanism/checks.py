@@ -21,6 +21,7 @@ _LONG = 8192  # numbers; OpenBLAS divides products of 10,000 and more among thre
 _LONGEST = 200  # characters of a value in a message
 UNIT = 1e-3  # by how much the length of a quaternion may be off, as one typed with four digits is
 LARGEST = 2**53  # up to which floats hold all whole numbers
+_FLOAT = np.dtype(np.float64)  # `is` takes a tenth of the time of ==
 
 
 def shown(value: Any) -> str:
@@ -37,7 +38,7 @@ def floats(call: str, value: Any) -> Floats:
 
     A read-only array is copied: kernels would be compiled again for it, because it is another type.
     """
-    if type(value) is np.ndarray and value.dtype == np.float64 and value.flags.carray:
+    if type(value) is np.ndarray and (value.dtype is _FLOAT or value.dtype == _FLOAT) and value.flags.carray:
         return value
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         raise ValueError(f"{call}: expected real numbers, got an array with masked entries")

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.integrators.rollout import REFUSED
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
@@ -160,16 +159,15 @@ class Simulator(BatchStepping):
             StepResult with the state after the step; for an unsolved step, the state before it.
         """
         check = self._arguments
-        control = self._no_input if u is None else u
-        plain = self._engine.in_one_kernel and is_plain(x, (self.nx,)) and is_plain(control, (self.nu,))
-        state: Any = x if plain else check.state("step", x)
-        us: Any = control if plain else check.inputs("step", "u", control, (self.nu,))
+        start: Any = x
+        control: Any = self._no_input if u is None else u
+        plain = self._engine.in_one_kernel and is_plain(start, (self.nx,)) and is_plain(control, (self.nu,))
+        if plain and wrenches is None and (row := self.stepper(1, True)).advance(start, control):
+            return checked(row.last_step(), throw)
+        state, us = check.state("step", x), check.inputs("step", "u", control, (self.nu,))
         external = None if wrenches is None else check.wrenches("step", wrenches, 1)
         rolled = self._engine.roll(state, us[None], external)
         status, iterations, residual, violation, _, _ = rolled.reports[0].tolist()
-        if status == REFUSED:
-            check.state("step", x)
-            check.inputs("step", "u", control, (self.nu,))
         scene, end = (self.mechanism, self.time_step, rolled.contacts[0]), rolled.xs[1 if rolled.solved_steps else 0]
         (parts, share, error), fraction = rolled.division, float(rolled.division.momentum_fractions[0])
         solved = STATUSES[int(status)], int(iterations), residual, violation

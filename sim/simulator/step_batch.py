@@ -24,7 +24,16 @@ from sim.model.interruptible_loops import pieces
 from sim.model.record_columns import Dry, StepReport, StepSetting
 from sim.simulator.engines.division import DIVISIBLE, Division
 from sim.simulator.engines.engine import BOUND, CONE, REPORT, Engine, finite_rows, refuse
-from sim.simulator.results import Contacts, Result, checked, contacts_of, status_message
+from sim.simulator.results import (
+    STATUSES,
+    Contacts,
+    Result,
+    StepResult,
+    checked,
+    contacts_of,
+    reservation,
+    status_message,
+)
 from sim.simulator.row_impulses import RowImpulses
 from sim.simulator.state_space import StateSpace
 from solvers.status import Status
@@ -33,6 +42,7 @@ from solvers.types import Integers
 Floats = NDArray[np.float64]
 
 _KEPT = 512  # models
+_UNDIVIDED = 1, 1.0, 0.0  # numbers of a Division
 
 
 @dataclass(frozen=True)
@@ -301,8 +311,21 @@ class KnotStepper:
         self._start[:], motion.us[:] = x, u
         motion.reports.fill(0.0)
         motion.contacts.fill(0.0)
+        for numbers, undivided in zip(self._division, _UNDIVIDED, strict=True):
+            numbers.fill(undivided)
         self._knot = self._engine.take_steps(self._engine.step_table(), motion, None, self._division)
         return self._knot == self._steps
+
+    def last_step(self) -> StepResult:
+        """The last step of a knot that was solved, with the contacts that are kept."""
+        (parts, fractions, errors), motion = self._division, self._motion
+        status, iterations, residual, violation, _, _ = motion.reports[-1].tolist()
+        scene = self._mechanism, self._engine.settings.time_step, motion.contacts[-1].copy()
+        solved = self.end.copy(), STATUSES[int(status)], int(iterations), residual, violation, scene
+        if parts[-1] == 1:
+            return StepResult(*solved)
+        division = int(parts[-1]), float(fractions[-1]), float(errors[-1])
+        return StepResult(*solved, *division, reservation(fractions[-1:], errors[-1:]))
 
     def step(self, states: Floats, inputs: Floats) -> StepBatch:
         """The knot of a row.

@@ -224,7 +224,7 @@ class DividingEngine(Engine):
         self._ended.parts = None
         done = super().take_steps(model, motion, kappa, division, following, first, max_iterations)
         if following is None:
-            return self._continue_after(model, motion, kappa, division, done)
+            return done if done == len(motion.us) else self._continue_after(model, motion, kappa, division, done)
         steps = len(motion.us) * following.substeps
         try:
             while done < steps and self._divide_feedback_step(motion, kappa, following, done):

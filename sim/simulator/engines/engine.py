@@ -228,8 +228,7 @@ class Engine(LinkedModel):
         max_iterations: of a step; None: that of the settings.
         """
         steps, knot = len(motion.us) * (following.substeps if following else 1), first
-        data = self._scratch.table()
-        settings = self._settings_of(steps, kappa, max_iterations)
+        data, settings = self._scratch.table(), self._settings_of(steps, kappa, max_iterations)
         try:
             for _ in pieces(settings, steps):
                 knot = int(rollout.roll(model, data, settings, motion, knot, None, following))
