@@ -62,11 +62,14 @@ def numbers_of(functions: Iterable[ast.FunctionDef]) -> list[tuple[str, str]]:
     found = []
     for function in functions:
         parts = list(ast.walk(function))
-        rows = _rows(parts)
+        rows, own = _rows(parts), {argument.arg for argument in function.args.args} & MATRICES
         for node in parts:
             if not isinstance(node, ast.Subscript):
                 continue
             name, last = _field(node.value), node.slice
+            passed = isinstance(node.value, ast.Name) and node.value.id in own and isinstance(last, ast.Tuple)
+            if passed:  # a matrix under its own name, as hull
+                name = ast.unparse(node.value)
             if name in MATRICES:
                 last = last.elts[-1] if isinstance(last, ast.Tuple) else ast.Name("a row")
             elif name is None and isinstance(node.value, ast.Name):
@@ -84,15 +87,18 @@ def test_no_column_with_a_name_is_a_number() -> None:
     named = _named()
     assert {"contact_kin", "cone", "bound", "D", "pair_sizes"} <= named
     source = (
-        "def f(data):\n    k = data.contact_kin[c]\n    return k[3] + k[Kin.GAP] + data.bound[c, 1] + data.cone[0, j]"
+        "def f(data, hull):\n    k = data.contact_kin[c]\n    return k[3] + k[Kin.GAP] + data.bound[c, 1] + data.cone[0, j]"
+        " + hull[o, 3]"
     )
     assert sorted(numbers_of(_nodes(source, ast.FunctionDef))) == [
         ("bound", "data.bound[c, 1]"),
         ("contact_kin", "k[3]"),
+        ("hull", "hull[o, 3]"),
     ]
     wrong, seen = [], 0
     for file in files_of("sim"):
-        for name, subscript in numbers_of(nodes_of(file, ast.FunctionDef)):
+        functions = (f for f in nodes_of(file, ast.FunctionDef) if f.name != "row")  # which reads vectors
+        for name, subscript in numbers_of(functions):
             seen += 1
             plain = WIDTHS[name] in COMPONENTS or name in SIDES + PADDED or not isinstance(WIDTHS[name], int)
             if name not in FRAMES and (name in named or not plain):

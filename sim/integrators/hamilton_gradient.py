@@ -17,6 +17,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from sim.dynamics.elimination import add_children, factor
 from sim.dynamics.elimination_panel import solve_panel
 from sim.dynamics.energy import armature_blocks, spatial_inertia
@@ -25,10 +27,13 @@ from sim.dynamics.joints.ball_spring import relative_to_rest
 from sim.integrators.hamilton import column_rate
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import ColumnVector
 from solvers.compiler import kernel
 from solvers.dense import dot
 from solvers.rotation import cross
-from solvers.types import Matrix, Vector
+from solvers.types import Cube, Matrix, Vector
+
+VECTORS = len(ColumnVector)  # of a column
 
 
 class Slopes(NamedTuple):
@@ -39,7 +44,13 @@ class Slopes(NamedTuple):
     f_q: Matrix  # (nv, nv)
     f_v: Matrix  # (nv, nv)
     f_u: Matrix  # (nv, nu)
-    column: Matrix  # (nv, 42) a_k, S_k', I S_k, S_k*P + I S_k', S_k*F + N^T S_k, G_k, N S_k
+    column: Cube  # (nv, 7, 6), see ColumnVector
+
+
+def empty_slopes(nv: int, nu: int) -> Slopes:
+    """Arrays for a call, of zeros."""
+    p_q, p_v, f_q, f_v = np.zeros((4, nv, nv))
+    return Slopes(p_q, p_v, f_q, f_v, np.zeros((nv, nu)), np.zeros((nv, VECTORS, 6)))
 
 
 @kernel
@@ -62,8 +73,8 @@ def _add_mul(A: Vector, x: Vector, sign: float, transposed: bool, out: Vector) -
 
 
 @kernel
-def _columns(model: Model, data: Data, out: Matrix) -> None:
-    """The vectors of every column, (nv, 42).   data.A1, A2: I and N of the subtrees; data.balance: F."""
+def _columns(model: Model, data: Data, out: Cube) -> None:
+    """The vectors of every column, (nv, 7, 6).   data.A1, A2: I and N of the subtrees; data.balance: F."""
     for i in range(model.body_parent.shape[0]):
         V, p = data.wrench[0], model.body_parent[i]
         for k in range(6):
@@ -72,19 +83,22 @@ def _columns(model: Model, data: Data, out: Matrix) -> None:
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
             S, c = data.S2[d], out[d]
             a, b = cross(S[3], S[4], S[5], V[0], V[1], V[2]), cross(S[0], S[1], S[2], V[3], V[4], V[5])
-            c[0], c[1], c[2] = a[0] + b[0], a[1] + b[1], a[2] + b[2]
-            c[3], c[4], c[5] = cross(S[3], S[4], S[5], V[3], V[4], V[5])
-            c[6], c[7], c[8], c[9], c[10], c[11] = column_rate(model, data, i, d)
-            for k in range(12, 42):
-                c[k] = 0.0
-            _add_mul(J, S, 1.0, False, c[12:18])
-            _star(S, P, c[18:24])
-            _star(S, P, c[30:36])
-            _add_mul(J, c[6:12], 1.0, False, c[18:24])
-            _star(S, F, c[24:30])
-            _add_mul(N, S, 1.0, True, c[24:30])
-            _add_mul(J, c[0:6], -1.0, False, c[30:36])
-            _add_mul(N, S, 1.0, False, c[36:42])
+            w = cross(S[3], S[4], S[5], V[3], V[4], V[5])
+            for k in range(3):
+                c[ColumnVector.CONVECTION, k], c[ColumnVector.CONVECTION, 3 + k] = a[k] + b[k], w[k]
+            rate = column_rate(model, data, i, d)
+            for k in range(6):
+                c[ColumnVector.RATE, k] = rate[k]
+                for n in range(ColumnVector.MOMENTUM.value, VECTORS):
+                    c[n, k] = 0.0
+            _add_mul(J, S, 1.0, False, c[ColumnVector.MOMENTUM])
+            _star(S, P, c[ColumnVector.MOMENTUM_RATE])
+            _star(S, P, c[ColumnVector.GYROSCOPIC])
+            _add_mul(J, c[ColumnVector.RATE], 1.0, False, c[ColumnVector.MOMENTUM_RATE])
+            _star(S, F, c[ColumnVector.FORCE])
+            _add_mul(N, S, 1.0, True, c[ColumnVector.FORCE])
+            _add_mul(J, c[ColumnVector.CONVECTION], -1.0, False, c[ColumnVector.GYROSCOPIC])
+            _add_mul(N, S, 1.0, False, c[ColumnVector.WRENCH])
             if d < model.body_vadr[i] + model.joint_ntrans[i]:  # columns before the rotations of a joint
                 for k in range(6):
                     V[k] += S[k] * data.nu[d]
@@ -95,15 +109,17 @@ def _pair(S: Matrix, slopes: Slopes, d: int, k: int, behind: bool) -> None:
     """Entry (d, k); behind: d moves with k."""
     a, b = slopes.column[d], slopes.column[k]
     if behind:
-        slopes.p_q[d, k] = -dot(a[12:18], b[0:6])
-        slopes.f_q[d, k] = dot(a[24:30], S[k]) - dot(a[18:24], b[0:6])
-        slopes.p_v[d, k] = dot(a[12:18], S[k])
-        slopes.f_v[d, k] = dot(a[18:24], S[k])
+        slopes.p_q[d, k] = -dot(a[ColumnVector.MOMENTUM], b[ColumnVector.CONVECTION])
+        slopes.f_q[d, k] = dot(a[ColumnVector.FORCE], S[k]) - dot(
+            a[ColumnVector.MOMENTUM_RATE], b[ColumnVector.CONVECTION]
+        )
+        slopes.p_v[d, k] = dot(a[ColumnVector.MOMENTUM], S[k])
+        slopes.f_v[d, k] = dot(a[ColumnVector.MOMENTUM_RATE], S[k])
     else:
-        slopes.p_q[d, k] = dot(S[d], b[30:36])
-        slopes.f_q[d, k] = dot(a[6:12], b[30:36]) + dot(S[d], b[36:42])
-        slopes.p_v[d, k] = dot(S[d], b[12:18])
-        slopes.f_v[d, k] = dot(a[6:12], b[12:18])
+        slopes.p_q[d, k] = dot(S[d], b[ColumnVector.GYROSCOPIC])
+        slopes.f_q[d, k] = dot(a[ColumnVector.RATE], b[ColumnVector.GYROSCOPIC]) + dot(S[d], b[ColumnVector.WRENCH])
+        slopes.p_v[d, k] = dot(S[d], b[ColumnVector.MOMENTUM])
+        slopes.f_v[d, k] = dot(a[ColumnVector.RATE], b[ColumnVector.MOMENTUM])
 
 
 @kernel
@@ -129,8 +145,8 @@ def _tree_pairs(model: Model, data: Data, slopes: Slopes) -> None:
             c = slopes.column[d]
             for r in range(6):
                 e = model.body_vadr[root] + r
-                slopes.p_q[e, d], slopes.p_v[e, d] = c[30 + r], c[12 + r]
-                slopes.f_q[e, d], slopes.f_v[e, d] = c[36 + r], 0.0
+                slopes.p_q[e, d], slopes.p_v[e, d] = c[ColumnVector.GYROSCOPIC, r], c[ColumnVector.MOMENTUM, r]
+                slopes.f_q[e, d], slopes.f_v[e, d] = c[ColumnVector.WRENCH, r], 0.0
 
 
 @kernel

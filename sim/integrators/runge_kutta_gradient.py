@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import cos, sqrt
 from typing import NamedTuple
 
-from sim.integrators.hamilton_gradient import Slopes, slopes_at, velocity_slopes
+from sim.integrators.hamilton_gradient import VECTORS, Slopes, slopes_at, velocity_slopes
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import inlined, kernel
@@ -40,7 +40,14 @@ class Tangents(NamedTuple):
 def tangents_of(data: Data) -> Tangents:
     """Tangents with the arrays of `data`."""
     return Tangents(
-        Slopes(data.slope_p_q, data.slope_p_v, data.slope_f_q, data.slope_f_v, data.slope_f_u, data.slope_column),
+        Slopes(
+            data.slope_p_q,
+            data.slope_p_v,
+            data.slope_f_q,
+            data.slope_f_v,
+            data.slope_f_u,
+            data.slope_column.reshape((-1, VECTORS, 6)),
+        ),
         data.tangent_q,
         data.tangent_p,
         data.tangent_shift,

@@ -175,6 +175,50 @@ class Bounce(Code):
     POINT2 = 19  # (3,)
 
 
+class Hull(Code):
+    """hull: first row of a convex polytope (collision/polytope_table.py); its corners, edges and faces follow."""
+
+    CORNERS = 0  # how many
+    EDGES = 1
+    FACES = 2
+
+
+class HullEdge(Code):
+    """Row of an edge."""
+
+    START = 0  # corner, counted from the first one
+    END = 1
+    LEFT = 2  # face, counted from the first one
+    RIGHT = 3
+
+
+class HullFace(Code):
+    """Row of a face: its outward unit normal (3,), and then"""
+
+    OFFSET = 3  # n.x of its points
+
+
+class DistanceGrid(Code):
+    """First row of a grid of signed distances (collision/level_set.py); its first corner (3,) and values follow."""
+
+    NX = 0  # number of values
+    NY = 1
+    NZ = 2
+    DENSITY = 3  # cells per length [1/m]
+
+
+class ColumnVector(Code):
+    """Vectors (6,) of a column S of a joint, in Slopes (integrators/hamilton_gradient.py)."""
+
+    CONVECTION = 0  # of S by the twist of the parent
+    RATE = 1  # S'
+    MOMENTUM = 2  # I S
+    MOMENTUM_RATE = 3  # S* P + I S'
+    FORCE = 4  # S* F + N^T S
+    GYROSCOPIC = 5  # S* P - I CONVECTION
+    WRENCH = 6  # N S
+
+
 class Witness(Code):
     """pair_out and pair_trial: the results of `collide`, in the frame of shape b."""
 
@@ -186,8 +230,9 @@ class Witness(Code):
 
 
 class RelativePose(Code):
-    """pair_before: rotation and centre of shape a in the frame of shape b at configuration 2, then"""
+    """pair_before, pair_relative: rotation (9,) and centre of shape a in the frame of shape b, before also with"""
 
+    CENTER = 9  # (3,)
     GAP = 12  # least gap of the features there
 
 

@@ -36,8 +36,9 @@ from sim.contact.collision.box_elements import (
 from sim.contact.collision.edge_axes import Arrangement, deepest, side_of
 from sim.contact.collision.edge_clipping import BORDER, PAST, clip, edge_normal, on_edges, side_edge
 from sim.contact.collision.witness import TIE, absent, axis, dot
+from sim.model.record_columns import Witness
 from solvers.compiler import inner_kernel
-from solvers.rotation import Vec3
+from solvers.rotation import Vec3, three
 from solvers.types import Vector
 
 
@@ -63,7 +64,7 @@ def choose_elements(
         if feature == 12:
             if code & 7 < VERTEX_BOX or separates(ha, hb, R, r, out):
                 return code
-        elif out[0] >= deepest(s, (min(ha[0], hb[0]), min(ha[1], hb[1]), min(ha[2], hb[2]))):
+        elif out[Witness.GAP] >= deepest(s, (min(ha[0], hb[0]), min(ha[1], hb[1]), min(ha[2], hb[2]))):
             return code
     absent(out)
     return 0
@@ -163,8 +164,8 @@ def nearest_corner(ha: Vec3, hb: Vec3, R: Vector, r: Vector) -> int:
 @inner_kernel
 def separates(ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector) -> bool:
     """Whether the normal in `out` separates the two boxes by the distance there: the two points are the nearest."""
-    n = (out[1], out[2], out[3])
+    n = three(out, Witness.NORMAL)
     w = to_a(R, n)
     reach = abs(w[0]) * ha[0] + abs(w[1]) * ha[1] + abs(w[2]) * ha[2]
     reach += abs(n[0]) * hb[0] + abs(n[1]) * hb[1] + abs(n[2]) * hb[2]
-    return dot(n, (r[0], r[1], r[2])) - reach >= out[0] - TIE * (hb[0] + hb[1] + hb[2])
+    return dot(n, (r[0], r[1], r[2])) - reach >= out[Witness.GAP] - TIE * (hb[0] + hb[1] + hb[2])

@@ -43,6 +43,7 @@ from sim.contact.collision.witness import (
     vertex_a,
     vertex_b,
 )
+from sim.model.record_columns import Witness
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
 from solvers.types import Vector
@@ -87,7 +88,7 @@ def choose_elements(
         put_elements(code, radius, half, h, R, r, out)
         if feature > 1:
             return code
-        elif out[0] + radius >= deepest(s, h):
+        elif out[Witness.GAP] + radius >= deepest(s, h):
             return code
     absent(out)
     return 0

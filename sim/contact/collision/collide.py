@@ -27,6 +27,7 @@ from sim.contact.collision.polytope_polytope import apart_polytopes
 from sim.contact.collision.swapped_shapes import exchange
 from sim.contact.collision.witness import ABSENT
 from sim.model.model import Model
+from sim.model.record_columns import Witness
 from sim.model.shape_kinds import SWAPPED, Pair
 from solvers.compiler import inner_kernel, kernel
 from solvers.types import Vector
@@ -118,7 +119,7 @@ def _choose(
     elif kind == Pair.CAPSULE_FIELD:
         code = choose_capsule_field(model, feature, sizes, R, r)
     put_contact(model, kind, feature, code, sizes, R, r, out)
-    return 0 if out[0] >= ABSENT else code  # NaN: the contact was not found, and the step fails
+    return 0 if out[Witness.GAP] >= ABSENT else code  # NaN: the contact was not found, and the step fails
 
 
 @kernel

@@ -22,7 +22,7 @@ from sim.contact.collision.rim import (
 from sim.contact.collision.rim_rim import point_of, rim_minimum, rim_rim
 from sim.contact.collision.swapped_shapes import exchange
 from sim.contact.collision.witness import Z, along, dot, edges
-from sim.model.record_columns import PairSize
+from sim.model.record_columns import PairSize, Witness
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, three
 from solvers.types import Vector
@@ -79,8 +79,8 @@ def axis_and_rim(x: Vec3, u: Vec3, l: float, rho: float, z: float, place: int, r
     if angle < 0.0:
         return 0
     line_rim(x, u, angle, rho, z, radius, out)
-    n = (out[1], out[2], out[3])
-    y = along((out[4], out[5], out[6]), -0.5 * out[0], n)
+    n = three(out, Witness.NORMAL)
+    y = along(three(out, Witness.POINT), -0.5 * out[Witness.GAP], n)
     e = (y[0] / rho, y[1] / rho, 0.0)
     up = (0.0, 0.0, 1.0 if z > 0.0 else -1.0)
     c = dot(u, across(Z, e))
@@ -181,6 +181,6 @@ def nearest_rim_point(sizes: Vector, R: Vector, r: Vector, turned: Vector, out: 
             where = nearest(x, sizes[PairSize.B], sizes[PairSize.B + 1])
             trial = code_of(POINT, True, rim, sector + SECTORS * where)
             put_crossing(trial, sizes, R, r, turned, out)
-            if out[0] < best:
-                best, code = out[0], trial
+            if out[Witness.GAP] < best:
+                best, code = out[Witness.GAP], trial
     return code

@@ -32,10 +32,10 @@ from sim.contact.collision.rim import (
 )
 from sim.contact.collision.swapped_shapes import exchange
 from sim.contact.collision.witness import TIE, absent, along, dot
-from sim.model.record_columns import PairSize
+from sim.model.record_columns import PairSize, Witness
 from sim.model.shape_kinds import CROSSINGS, RIM_POINTS
 from solvers.compiler import inner_kernel
-from solvers.rotation import Vec3
+from solvers.rotation import Vec3, three
 from solvers.types import Integers, Vector
 
 _PARTS = 17  # places where two cylinders may cross: 1 of the axes, 2 on every rim, 2 of every two rims
@@ -84,7 +84,7 @@ def survey(
         code = crossing(part, sizes, R, r, turned, out)
         if code == 0:
             continue
-        s = separation_along((out[1], out[2], out[3]), sizes, R, r)
+        s = separation_along(three(out, Witness.NORMAL), sizes, R, r)
         if s > best + TIE * sizes[PairSize.B]:
             best, which = s, code
         if found < room:
@@ -137,12 +137,12 @@ def choose_elements(
             codes[k] = 0
             continue
         put_crossing(codes[k], sizes, R, r, turned, out)
-        if out[0] < 0.0 and (s > 0.0 or out[0] < deepest):
+        if out[Witness.GAP] < 0.0 and (s > 0.0 or out[Witness.GAP] < deepest):
             codes[k] = 0
     least = 1e300
     for k in range(first, begin + CROSSINGS):
         put_elements(k - first, codes[k], sizes, R, r, turned, out)
-        least = min(least, out[0])
+        least = min(least, out[Witness.GAP])
     if least > s + MISSED * sizes[PairSize.B]:
         codes[begin] = nearest_rim_point(sizes, R, r, turned, out)
 

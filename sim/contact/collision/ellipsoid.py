@@ -32,7 +32,7 @@ from sim.contact.collision.support import (
     stiffness,
 )
 from sim.contact.collision.witness import NOWHERE, Z, along, axis, dot, put
-from sim.model.record_columns import PairSize
+from sim.model.record_columns import Hull, HullFace, PairSize
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, three
 from solvers.types import Matrix, Vector
@@ -189,7 +189,7 @@ def cylinder_ellipsoid(sizes: Vector, R: Vector, r: Vector, out: Vector) -> None
 def separation(n: Vec3, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> float:
     """s of a polytope a, without its radius."""
     o, m, least = int(sizes[0]), to_a(R, n), 1e300
-    for k in range(int(hull[o, 0])):
+    for k in range(int(hull[o, Hull.CORNERS])):
         least = min(least, dot(m, row(hull, o + 1 + k)))
     return least + dot(n, (r[0], r[1], r[2])) - farthest(n, three(sizes, PairSize.B))[0]
 
@@ -206,11 +206,11 @@ def best_face(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Found:
     """The face of a with the largest s; element 0 where there are none."""
     o = int(sizes[0])
     best, element, n = -1e300, 0, Z
-    first = 1 + int(hull[o, 0] + hull[o, 1])
-    for k in range(first, first + int(hull[o, 2])):
+    first = 1 + int(hull[o, Hull.CORNERS] + hull[o, Hull.EDGES])
+    for k in range(first, first + int(hull[o, Hull.FACES])):
         m = to_b(R, row(hull, o + k))
         m = (-m[0], -m[1], -m[2])
-        s = dot(m, (r[0], r[1], r[2])) - hull[o + k, 3] - farthest(m, three(sizes, PairSize.B))[0]
+        s = dot(m, (r[0], r[1], r[2])) - hull[o + k, HullFace.OFFSET] - farthest(m, three(sizes, PairSize.B))[0]
         if s > best:
             best, element, n = s, k, m
     return best, element, n
@@ -222,12 +222,12 @@ def along_element(k: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> 
     no corner is nearer, and the point of an edge is on it.
     """
     o, db = int(sizes[0]), three(sizes, PairSize.B)
-    if k <= int(hull[o, 0]):
+    if k <= int(hull[o, Hull.CORNERS]):
         x = placed(row(hull, o + k), R, r)
         n = farthest_apart(x, NOWHERE, R, db)
         inside = True
     else:
-        z, v, length = edge(hull, o, k - 1 - int(hull[o, 0]))
+        z, v, length = edge(hull, o, k - 1 - int(hull[o, Hull.CORNERS]))
         x, u = placed(z, R, r), to_b(R, v)
         n = farthest_across(x, u, R, db)
         t = dot(u, farthest(n, db)[1]) - dot(u, x)
@@ -250,7 +250,7 @@ def farthest_element(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Found
     if found[1] > 0 and above(hull, o, o + found[1], y) and highest_face(hull, o, over)[1] > 0.0:
         return found
     guess = nearest_element(hull, o, y)
-    first = 1 + int(hull[o, 0] + hull[o, 1])
+    first = 1 + int(hull[o, Hull.CORNERS] + hull[o, Hull.EDGES])
     if guess < first:
         other, nearest = along_element(guess, sizes, hull, R, r)
         if nearest and other[0] > 0.0:
@@ -269,10 +269,10 @@ def polytope_ellipsoid(sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: V
     """The element of a polytope a, with a radius around it, of the largest s."""
     o, db, radius = int(sizes[0]), three(sizes, PairSize.B), sizes[1]
     s, k, n = farthest_element(sizes, hull, R, r)
-    if k > int(hull[o, 0] + hull[o, 1]):
+    if k > int(hull[o, Hull.CORNERS] + hull[o, Hull.EDGES]):
         put_plane(n, s - radius, db, out)
-    elif k > int(hull[o, 0]):
-        x, u, _ = edge(hull, o, k - 1 - int(hull[o, 0]))
+    elif k > int(hull[o, Hull.CORNERS]):
+        x, u, _ = edge(hull, o, k - 1 - int(hull[o, Hull.CORNERS]))
         put_line(n, placed(x, R, r), to_b(R, u), radius, db, out)
     else:
         put_round(n, placed(row(hull, o + k), R, r), NOWHERE, R, radius, db, out)

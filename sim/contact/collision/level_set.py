@@ -18,8 +18,10 @@ from __future__ import annotations
 
 from math import floor, nan, sqrt
 
+from sim.contact.collision.polytope_table import row
 from sim.contact.collision.support import basis
 from sim.contact.collision.witness import along, dot
+from sim.model.record_columns import DistanceGrid
 from solvers.compiler import inner_kernel, kernel
 from solvers.rotation import Vec3
 from solvers.types import Matrix, Vector
@@ -59,12 +61,12 @@ def weights(t: float) -> tuple[Vec4, Vec4, Vec4]:
 @inner_kernel
 def inside(hull: Matrix, o: int, x: Vec3) -> Vec3:
     """x in the box of the grid, or the point of the box that is nearest to it."""
-    k = 1.0 / hull[o, 3]
-    a, b, c = hull[o + 1, 0], hull[o + 1, 1], hull[o + 1, 2]
+    k = 1.0 / hull[o, DistanceGrid.DENSITY]
+    a, b, c = row(hull, o + 1)
     return (
-        min(max(x[0], a), a + k * (hull[o, 0] - 3.0)),
-        min(max(x[1], b), b + k * (hull[o, 1] - 3.0)),
-        min(max(x[2], c), c + k * (hull[o, 2] - 3.0)),
+        min(max(x[0], a), a + k * (hull[o, DistanceGrid.NX] - 3.0)),
+        min(max(x[1], b), b + k * (hull[o, DistanceGrid.NY] - 3.0)),
+        min(max(x[2], c), c + k * (hull[o, DistanceGrid.NZ] - 3.0)),
     )
 
 
@@ -78,11 +80,12 @@ def cell(s: float, count: int) -> tuple[int, float]:
 @kernel
 def jet(hull: Matrix, o: int, x: Vec3) -> Jet:
     """phi and its derivatives at a place within the grid; beyond, the polynomial of the cell at the edge."""
-    k = hull[o, 3]
-    nx, ny, nz = int(hull[o, 0]), int(hull[o, 1]), int(hull[o, 2])
-    i, r = cell(k * (x[0] - hull[o + 1, 0]), nx)
-    j, s = cell(k * (x[1] - hull[o + 1, 1]), ny)
-    m, t = cell(k * (x[2] - hull[o + 1, 2]), nz)
+    k = hull[o, DistanceGrid.DENSITY]
+    nx, ny, nz = int(hull[o, DistanceGrid.NX]), int(hull[o, DistanceGrid.NY]), int(hull[o, DistanceGrid.NZ])
+    first = row(hull, o + 1)
+    i, r = cell(k * (x[0] - first[0]), nx)
+    j, s = cell(k * (x[1] - first[1]), ny)
+    m, t = cell(k * (x[2] - first[2]), nz)
     (w, dw, ddw), (v, dv, ddv), (u, du, ddu) = weights(r), weights(s), weights(t)
     f, fx, fy, fz = 0.0, 0.0, 0.0, 0.0
     fxx, fyy, fzz, fyz, fxz, fxy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -113,7 +116,7 @@ def product(F: Jet, x: Vec3) -> Vec3:
 @kernel
 def settled(hull: Matrix, o: int, x: Vec3) -> Place:
     """The level set from x along the gradient, in the box of the grid."""
-    cell_size = 1.0 / hull[o, 3]
+    cell_size = 1.0 / hull[o, DistanceGrid.DENSITY]
     F = jet(hull, o, x)
     done = False
     for _ in range(_RETURNS):
@@ -154,7 +157,7 @@ def stepped(hull: Matrix, o: int, c: Vec3, at: Place, z: tuple[float, float]) ->
     e = (c[0] - x[0], c[1] - x[1], c[2] - x[2])
     most = dot(e, e) * (1.0 + _ROUNDING)
     size = sqrt(z[0] * z[0] + z[1] * z[1])
-    k = min(1.0, _STRIDE / (hull[o, 3] * max(size, _NOTHING)))
+    k = min(1.0, _STRIDE / (hull[o, DistanceGrid.DENSITY] * max(size, _NOTHING)))
     for _ in range(_HALVINGS):
         a, b = k * z[0], k * z[1]
         bow = -0.5 * (a * a * S[0] + 2.0 * a * b * S[1] + b * b * S[2])
@@ -184,11 +187,11 @@ def nearest(hull: Matrix, o: int, c: Vec3) -> tuple[float, Vec3, Bend, bool]:
             break
         t, u = basis(n)
         a, b, positive = solved(d, S, dot(t, e), dot(u, e))
-        size = sqrt(a * a + b * b) * hull[o, 3]
+        size = sqrt(a * a + b * b) * hull[o, DistanceGrid.DENSITY]
         at, moved = stepped(hull, o, c, at, (a, b))
         found = size < (_CONVERGED if positive else _CONVERGED_LINEARLY)
         if not moved:
-            return d, n, S, found or size < _STUCK * (1.0 + abs(d) * hull[o, 3])
+            return d, n, S, found or size < _STUCK * (1.0 + abs(d) * hull[o, DistanceGrid.DENSITY])
     return d, at[1], at[2], found
 
 

@@ -16,7 +16,7 @@ from sim.contact.collision.box import column, to_b
 from sim.contact.collision.rim import line_minimum
 from sim.contact.collision.rim_rim import opposite, point_of, rim_minimum
 from sim.contact.collision.witness import along, dot
-from sim.model.record_columns import PairSize
+from sim.model.record_columns import Hull, PairSize
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, three
 from solvers.types import Matrix, Vector
@@ -46,7 +46,7 @@ def line_and_rim(k: int, x: Vec3, u: Vec3, rho: float, z: float) -> tuple[bool, 
 def from_polytope(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> float:
     """Largest separation of a polytope a, without its radius, and a cylinder b, where edges run along rims."""
     best = -1e300
-    for i in range(int(hull[int(sizes[0]), 1])):
+    for i in range(int(hull[int(sizes[0]), Hull.EDGES])):
         x, u, _ = polytopes.edge_of(hull, int(sizes[0]), i, R, r)
         for part in range(4):
             found, n, e = line_and_rim(

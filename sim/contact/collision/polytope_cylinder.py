@@ -25,16 +25,16 @@ from sim.contact.collision.polytope_cylinder_crossings import (
     put_crossing,
     separation_along,
 )
-from sim.contact.collision.polytope_table import above, row
+from sim.contact.collision.polytope_table import above, face_rows, row
 from sim.contact.collision.rim import (
     plane_rim,
     rim_below,
 )
 from sim.contact.collision.witness import TIE, absent, dot
-from sim.model.record_columns import PairSize
+from sim.model.record_columns import Hull, HullFace, PairSize, Witness
 from sim.model.shape_kinds import CROSSINGS, RIM_POINTS
 from solvers.compiler import inner_kernel
-from solvers.rotation import Vec3
+from solvers.rotation import Vec3, three
 from solvers.types import Integers, Matrix, Vector
 
 MISSED = 1e-2  # parts of the radius by which no contact is as near as the shapes: a point is added
@@ -47,7 +47,7 @@ Survey = tuple[float, int, int, int, int]  # separation, its source, index, face
 def face_plane(hull: Matrix, face: int, R: Vector, r: Vector) -> tuple[Vec3, float]:
     """n, s of the plane n.x = s of a face of a (its row), n into a."""
     m = to_b(R, row(hull, face))
-    return (-m[0], -m[1], -m[2]), -hull[face, 3] - dot(m, (r[0], r[1], r[2]))
+    return (-m[0], -m[1], -m[2]), -hull[face, HullFace.OFFSET] - dot(m, (r[0], r[1], r[2]))
 
 
 @inner_kernel
@@ -60,8 +60,8 @@ def apart_at_least(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> float:
     across = sqrt(r[0] * r[0] + r[1] * r[1])
     if across > 0.0:
         best = max(best, separation_along((r[0] / across, r[1] / across, 0.0), sizes, hull, R, r))
-    first = o + 1 + int(hull[o, 0] + hull[o, 1])
-    for f in range(first, first + int(hull[o, 2])):
+    start, behind = face_rows(hull, o)
+    for f in range(start, behind):
         n, s = face_plane(hull, f, R, r)
         best = max(best, s - reach(n, rho, half))
     return best
@@ -73,14 +73,15 @@ def survey(
 ) -> Survey:
     """Distance of the two, negative inside, and the elements that give its normal; overwrites `out`."""
     o, rho, half = int(sizes[0]), sizes[PairSize.B], sizes[PairSize.B + 1]
-    na = int(hull[o, 0])
+    na = int(hull[o, Hull.CORNERS])
     best, kind, which, face, end = -1e300, END, 0, 0, TOP
     for k in range(2):
         s = separation_along((0.0, 0.0, 1.0 if k == 0 else -1.0), sizes, hull, R, r)
         if s > best:
             best, end = s, TOP + k
     highest = -1e300
-    for f in range(o + 1 + na + int(hull[o, 1]), o + 1 + na + int(hull[o, 1]) + int(hull[o, 2])):
+    start, behind = face_rows(hull, o)
+    for f in range(start, behind):
         n, s = face_plane(hull, f, R, r)
         s -= reach(n, rho, half)
         if s > highest:
@@ -95,7 +96,7 @@ def survey(
         where = nearest(x, rho, half)
         where = SIDE if where < SIDE else where
         vertex_on_cylinder(where, x, 0.0, rho, half, out)
-        s = separation_along((out[1], out[2], out[3]), sizes, hull, R, r)
+        s = separation_along(three(out, Witness.NORMAL), sizes, hull, R, r)
         if s > best + TIE * rho:
             best, kind, which = s, CORNER, 8 * k + where
     if best < sizes[1]:
@@ -111,8 +112,8 @@ def choose_elements(
 ) -> None:
     """codes[first:] = the elements of all contact points at this pose; uses up `out`."""
     o, rho, half = int(sizes[0]), sizes[PairSize.B], sizes[PairSize.B + 1]
-    na = int(hull[o, 0])
-    rims = RIM_POINTS if int(hull[o, 2]) > 0 else 0
+    na = int(hull[o, Hull.CORNERS])
+    rims = RIM_POINTS if int(hull[o, Hull.FACES]) > 0 else 0
     begin = first + na + rims
     for k in range(CROSSINGS):
         codes[begin + k] = 0
@@ -136,13 +137,13 @@ def choose_elements(
             codes[k] = 0
             continue
         put_crossing(codes[k], sizes, hull, R, r, out)
-        d = out[0] + sizes[1]
+        d = out[Witness.GAP] + sizes[1]
         if d < 0.0 and (s > 0.0 or d < deepest):
             codes[k] = 0
     least = 1e300
     for k in range(first, begin + CROSSINGS):
         put_elements(k - first, codes[k], sizes, hull, R, r, out)
-        least = min(least, out[0] + sizes[1])
+        least = min(least, out[Witness.GAP] + sizes[1])
     if least > s + MISSED * rho:
         codes[begin] = nearest_rim_point(sizes, hull, R, r, out)
 
@@ -159,12 +160,12 @@ def put_elements(feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector
     """Contact of the elements `code`."""
     feature, code = substituted_feature(feature, code)
     o, rho, half = int(sizes[0]), sizes[PairSize.B], sizes[PairSize.B + 1]
-    na = int(hull[o, 0])
+    na = int(hull[o, Hull.CORNERS])
     if code == 0:
         absent(out)
     elif feature < na:
         vertex_on_cylinder(code & 7, corner_of(hull, o, feature, R, r), sizes[1], rho, half, out)
-    elif int(hull[o, 2]) > 0 and feature < na + RIM_POINTS:
+    elif int(hull[o, Hull.FACES]) > 0 and feature < na + RIM_POINTS:
         n, s = face_plane(hull, o + (code >> 3) - 2, R, r)
         plane_rim(feature - na, n, s, rho, half, out)
     else:
@@ -175,6 +176,6 @@ def put_elements(feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector
 def corner_instead(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
     """Code of the element of b nearest to corner `feature` of a; 0 if that is not a corner."""
     o = int(sizes[0])
-    if feature >= int(hull[o, 0]):
+    if feature >= int(hull[o, Hull.CORNERS]):
         return 0
     return 16 + nearest(corner_of(hull, o, feature, R, r), sizes[PairSize.B], sizes[PairSize.B + 1])

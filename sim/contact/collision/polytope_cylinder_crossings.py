@@ -21,9 +21,9 @@ from sim.contact.collision.rim import (
     sector_of,
 )
 from sim.contact.collision.witness import Z, along, dot, edges, vertex_b
-from sim.model.record_columns import PairSize
+from sim.model.record_columns import Hull, PairSize, Witness
 from solvers.compiler import inner_kernel
-from solvers.rotation import Vec3
+from solvers.rotation import Vec3, three
 from solvers.types import Integers, Matrix, Vector
 
 LEANING = 0.05  # part of a unit normal by which it may lie outside of the cone of its elements
@@ -54,7 +54,7 @@ def separation_along(n: Vec3, sizes: Vector, hull: Matrix, R: Vector, r: Vector)
     o = int(sizes[0])
     least = 1e300
     w = to_a(R, n)
-    for k in range(int(hull[o, 0])):
+    for k in range(int(hull[o, Hull.CORNERS])):
         least = min(least, dot(w, row(hull, o + 1 + k)))
     return least + dot(n, (r[0], r[1], r[2])) - reach(n, sizes[PairSize.B], sizes[PairSize.B + 1])
 
@@ -83,8 +83,8 @@ def crossing(i: int, part: int, sizes: Vector, hull: Matrix, R: Vector, r: Vecto
             return 0
         sector = sector_of(angle)
         line_rim(x, u, angle, rho, z, sizes[1], out)
-        n = (out[1], out[2], out[3])
-        y = along((out[4], out[5], out[6]), -0.5 * out[0], n)
+        n = three(out, Witness.NORMAL)
+        y = along(three(out, Witness.POINT), -0.5 * out[Witness.GAP], n)
         e = (y[0] / rho, y[1] / rho, 0.0)
         rise = n[2] if part < 3 else -n[2]
         c = dot(u, across(Z, e))
@@ -122,8 +122,8 @@ def nearest_rim_point(sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Ve
             k = nearest_element(hull, o, to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2])))
             trial = 16 + where + 16 * (k + _MANY * sector)
             put_crossing(trial, sizes, hull, R, r, out)
-            if out[0] < best:
-                best, code = out[0], trial
+            if out[Witness.GAP] < best:
+                best, code = out[Witness.GAP], trial
     return code
 
 
@@ -152,12 +152,12 @@ def crossings(
 ) -> tuple[float, int]:
     """Largest separation along the normal of an edge that crosses b, and its code; the codes of all from `first`."""
     best, which, found = -1e300, 0, 0
-    for i in range(int(hull[int(sizes[0]), 1])):
+    for i in range(int(hull[int(sizes[0]), Hull.EDGES])):
         for part in range(5):
             code = crossing(i, part, sizes, hull, R, r, out)
             if code == 0:
                 continue
-            s = separation_along((out[1], out[2], out[3]), sizes, hull, R, r)
+            s = separation_along(three(out, Witness.NORMAL), sizes, hull, R, r)
             if s > best:
                 best, which = s, code
             if found < room:

@@ -17,7 +17,7 @@ from sim.contact.collision.box import to_a, to_b
 from sim.contact.collision.edge_axes import Arrangement
 from sim.contact.collision.edge_clipping import edge_normal, on_edges
 from sim.contact.collision.feature_code import substituted_feature
-from sim.contact.collision.polytope_table import above, edge, edge_faces, highest_face, nearest_edge, row
+from sim.contact.collision.polytope_table import above, edge, edge_faces, face_rows, highest_face, nearest_edge, row
 from sim.contact.collision.witness import (
     FACE,
     LINE,
@@ -34,7 +34,7 @@ from sim.contact.collision.witness import (
     vertex_b,
 )
 from sim.model.model import Model
-from sim.model.record_columns import PairSize
+from sim.model.record_columns import Hull, HullEdge, HullFace, PairSize
 from sim.model.slots import Slot
 from solvers.compiler import inner_kernel, optional
 from solvers.rotation import Vec3, cross
@@ -48,33 +48,33 @@ _LEANING = 0.05  # part of a face normal by which the normal of two edges may li
 @inner_kernel
 def nearest_element(hull: Matrix, o: int, x: Vec3) -> int:
     """Row, from o, of the element nearest to a point."""
-    if int(hull[o, 1]) == 0:  # a point
+    if int(hull[o, Hull.EDGES]) == 0:  # a point
         return 1
     face, height = highest_face(hull, o, x)
     if face > 0 and (height <= 0.0 or above(hull, o, face, x)):
         return face - o
     e, _, _, corner = nearest_edge(hull, o, x)
-    k = 1 + int(hull[o, 0]) + e
+    k = 1 + int(hull[o, Hull.CORNERS]) + e
     if not corner:
         return k
     y, u, length = edge(hull, o, e)
     t = dot(u, x) - dot(u, y)
-    return 1 + int(hull[o + k, 0 if 2.0 * t < length else 1])
+    return 1 + int(hull[o + k, HullEdge.START if 2.0 * t < length else HullEdge.END])
 
 
 @inner_kernel
 def below(hull: Matrix, o: int, face: int, x: Vec3) -> bool:
     """Whether a point is below a face (its row), seen along its normal."""
-    return dot(row(hull, face), x) < hull[face, 3] and above(hull, o, face, x)
+    return dot(row(hull, face), x) < hull[face, HullFace.OFFSET] and above(hull, o, face, x)
 
 
 @inner_kernel
 def element(hull: Matrix, o: int, k: int, x: Vec3) -> tuple[Vec3, Vec3, float, Vec3, Vec3]:
     """Normal n, direction u, distance d, bend and slip (witness.py) of the element in row o + k at a point."""
-    corners, lines = int(hull[o, 0]), int(hull[o, 1])
+    corners, lines = int(hull[o, Hull.CORNERS]), int(hull[o, Hull.EDGES])
     if k > corners + lines:
         n = row(hull, o + k)
-        return n, NOWHERE, dot(n, x) - hull[o + k, 3], NOWHERE, FACE
+        return n, NOWHERE, dot(n, x) - hull[o + k, HullFace.OFFSET], NOWHERE, FACE
     if k > corners:
         y, u, _ = edge(hull, o, k - corners - 1)
         n, d = direction(x, along(y, dot(u, x) - dot(u, y), u), u)
@@ -143,20 +143,22 @@ def apart_along_faces(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> tupl
     without their radii: at most that of the shapes.
     """
     oa, ob = int(sizes[0]), int(sizes[PairSize.B])
-    na, nb = int(hull[oa, 0]), int(hull[ob, 0])
+    na, nb = int(hull[oa, Hull.CORNERS]), int(hull[ob, Hull.CORNERS])
     best, face = -1e300, -1
-    for f in range(ob + 1 + nb + int(hull[ob, 1]), ob + 1 + nb + int(hull[ob, 1]) + int(hull[ob, 2])):
+    start, behind = face_rows(hull, ob)
+    for f in range(start, behind):
         n = row(hull, f)
         w = to_a(R, n)
-        height = dot(n, (r[0], r[1], r[2])) - hull[f, 3]
+        height = dot(n, (r[0], r[1], r[2])) - hull[f, HullFace.OFFSET]
         least = 1e300
         for k in range(na):
             least = min(least, dot(w, row(hull, oa + 1 + k)))
         if least + height > best:
             best, face = least + height, f
-    for f in range(oa + 1 + na + int(hull[oa, 1]), oa + 1 + na + int(hull[oa, 1]) + int(hull[oa, 2])):
+    start, behind = face_rows(hull, oa)
+    for f in range(start, behind):
         n = to_b(R, row(hull, f))
-        height = -dot(n, (r[0], r[1], r[2])) - hull[f, 3]
+        height = -dot(n, (r[0], r[1], r[2])) - hull[f, HullFace.OFFSET]
         least = 1e300
         for k in range(nb):
             least = min(least, dot(n, row(hull, ob + 1 + k)))
@@ -179,9 +181,9 @@ def separation(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Arrangement
     face, best = apart_along_faces(sizes, hull, R, r)
     oa, ob = int(sizes[0]), int(sizes[PairSize.B])
     outside, inside = 0, 0
-    for i in range(int(hull[oa, 1])):
+    for i in range(int(hull[oa, Hull.EDGES])):
         u = to_b(R, edge(hull, oa, i)[1])
-        for j in range(int(hull[ob, 1])):
+        for j in range(int(hull[ob, Hull.EDGES])):
             if not _straddles(hull, ob, j, u):
                 continue
             code, d, _ = _edge_axis(i, j, 0.0, sizes, hull, R, r)
@@ -201,9 +203,9 @@ def two_edges(m: int, deepest: float, sizes: Vector, hull: Matrix, R: Vector, r:
     overlap, and least along that normal: by `deepest`.
     """
     oa, ob = int(sizes[0]), int(sizes[PairSize.B])
-    for i in range(int(hull[oa, 1])):
+    for i in range(int(hull[oa, Hull.EDGES])):
         u = to_b(R, edge(hull, oa, i)[1])
-        for j in range(int(hull[ob, 1])):
+        for j in range(int(hull[ob, Hull.EDGES])):
             if not _straddles(hull, ob, j, u):
                 continue
             code, d, crosses = _edge_axis(i, j, _LEANING, sizes, hull, R, r)
@@ -224,7 +226,7 @@ def face_towards(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector
     """
     radius = sizes[1] + sizes[PairSize.B + 1]
     oa, ob = int(sizes[0]), int(sizes[PairSize.B])
-    na, nb = int(hull[oa, 0]), int(hull[ob, 0])
+    na, nb = int(hull[oa, Hull.CORNERS]), int(hull[ob, Hull.CORNERS])
     if feature < na:
         x = to_b(R, row(hull, oa + 1 + feature))
         x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
@@ -245,7 +247,7 @@ def choose_elements(
     """The elements that are contact point `feature` at this pose; writes the contact, too."""
     face, crossings, s, _, _ = arrangement
     oa, ob = int(sizes[0]), int(sizes[PairSize.B])
-    na, nb = int(hull[oa, 0]), int(hull[ob, 0])
+    na, nb = int(hull[oa, Hull.CORNERS]), int(hull[ob, Hull.CORNERS])
     if feature < na:
         x = to_b(R, row(hull, oa + 1 + feature))
         x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
@@ -267,7 +269,7 @@ def put_elements(feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector
     """Contact of the elements `code`."""
     feature, code = substituted_feature(feature, code)
     oa, ob = int(sizes[0]), int(sizes[PairSize.B])
-    na, nb = int(hull[oa, 0]), int(hull[ob, 0])
+    na, nb = int(hull[oa, Hull.CORNERS]), int(hull[ob, Hull.CORNERS])
     radii = (sizes[1], sizes[PairSize.B + 1])
     if code == 0:
         absent(out)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.collision.witness import NOWHERE, TIE, dot
+from sim.model.record_columns import Hull, HullEdge, HullFace
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, cross
 from solvers.types import Matrix
@@ -28,8 +29,8 @@ def row(hull: Matrix, k: int) -> Vec3:
 @inner_kernel
 def edge(hull: Matrix, o: int, e: int) -> tuple[Vec3, Vec3, float]:
     """First corner, direction and length of edge e."""
-    k = o + 1 + int(hull[o, 0]) + e
-    x, y = row(hull, o + 1 + int(hull[k, 0])), row(hull, o + 1 + int(hull[k, 1]))
+    k = o + 1 + int(hull[o, Hull.CORNERS]) + e
+    x, y = row(hull, o + 1 + int(hull[k, HullEdge.START])), row(hull, o + 1 + int(hull[k, HullEdge.END]))
     d = (y[0] - x[0], y[1] - x[1], y[2] - x[2])
     length = sqrt(dot(d, d))
     return x, (d[0] / length, d[1] / length, d[2] / length), length
@@ -38,20 +39,27 @@ def edge(hull: Matrix, o: int, e: int) -> tuple[Vec3, Vec3, float]:
 @inner_kernel
 def edge_faces(hull: Matrix, o: int, e: int) -> tuple[int, int]:
     """Rows of the two faces of edge e; -1 for the edge of a capsule, which has none."""
-    k = o + 1 + int(hull[o, 0]) + e
-    if int(hull[o, 2]) == 0:
+    k = o + 1 + int(hull[o, Hull.CORNERS]) + e
+    if int(hull[o, Hull.FACES]) == 0:
         return _NONE, _NONE
-    first = o + 1 + int(hull[o, 0] + hull[o, 1])
-    return first + int(hull[k, 2]), first + int(hull[k, 3])
+    first, _ = face_rows(hull, o)
+    return first + int(hull[k, HullEdge.LEFT]), first + int(hull[k, HullEdge.RIGHT])
+
+
+@inner_kernel
+def face_rows(hull: Matrix, o: int) -> tuple[int, int]:
+    """The row of the first face, and the one behind the last."""
+    first = o + 1 + int(hull[o, Hull.CORNERS] + hull[o, Hull.EDGES])
+    return first, first + int(hull[o, Hull.FACES])
 
 
 @inner_kernel
 def highest_face(hull: Matrix, o: int, x: Vec3) -> tuple[int, float]:
     """The row of the face that a point is highest above, and the height; -1 without faces."""
-    first = o + 1 + int(hull[o, 0] + hull[o, 1])
     best, height = _NONE, -1e300
-    for f in range(first, first + int(hull[o, 2])):
-        d = dot(row(hull, f), x) - hull[f, 3]
+    first, end = face_rows(hull, o)
+    for f in range(first, end):
+        d = dot(row(hull, f), x) - hull[f, HullFace.OFFSET]
         if d > height + TIE * abs(height):
             best, height = f, d
     return best, height
@@ -61,7 +69,7 @@ def highest_face(hull: Matrix, o: int, x: Vec3) -> tuple[int, float]:
 def nearest_edge(hull: Matrix, o: int, x: Vec3) -> tuple[int, float, Vec3, bool]:
     """The edge nearest to a point, its squared distance, its nearest point, and whether that is a corner."""
     best, d2, where, corner = _NONE, 1e300, NOWHERE, False
-    for e in range(int(hull[o, 1])):
+    for e in range(int(hull[o, Hull.EDGES])):
         y, u, length = edge(hull, o, e)
         t = dot(u, x) - dot(u, y)
         s = min(max(t, 0.0), length)
@@ -77,7 +85,7 @@ def nearest_edge(hull: Matrix, o: int, x: Vec3) -> tuple[int, float, Vec3, bool]
 def above(hull: Matrix, o: int, face: int, x: Vec3) -> bool:
     """Whether a point is above a face (its row): on the inner side of all its edges, seen along its normal."""
     n = row(hull, face)
-    for e in range(int(hull[o, 1])):
+    for e in range(int(hull[o, Hull.EDGES])):
         f, g = edge_faces(hull, o, e)
         if face != f and face != g:
             continue

@@ -11,6 +11,7 @@ from math import cos, pi, sin, sqrt
 
 from sim.contact.collision.box import to_a
 from sim.contact.collision.witness import along, axis, dot, put
+from sim.model.record_columns import Witness
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, cross
 from solvers.types import Vector
@@ -45,8 +46,8 @@ def across(x: Vec3, y: Vec3) -> Vec3:
 def put_column(k: int, dn: Vec3, dp: Vec3, out: Vector) -> None:
     """Column k of dn/d(v, w) and dp/d(v, w)."""
     for i in range(3):
-        out[7 + 6 * i + k] = dn[i]
-        out[25 + 6 * i + k] = dp[i]
+        out[Witness.NORMAL_RATE + 6 * i + k] = dn[i]
+        out[Witness.POINT_RATE + 6 * i + k] = dp[i]
 
 
 @inner_kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.contact.collision.box import vertex_on_box
 from sim.contact.collision.cylinder import nearest, vertex_on_cylinder
 from sim.contact.collision.witness import LINE, NOWHERE, TIE, Z, bend_line, bend_point, direction, vertex_a
-from sim.model.record_columns import PairSize
+from sim.model.record_columns import PairSize, Witness
 from solvers.compiler import inner_kernel
 from solvers.rotation import three
 from solvers.types import Vector
@@ -51,7 +51,7 @@ def string(sizes: Vector, r: Vector, out: Vector) -> None:
     x = (r[0], r[1], r[2])
     m, d = direction(x, NOWHERE, NOWHERE)
     vertex_a(x, m, NOWHERE, d, (0.0, 0.0), bend_point(d), NOWHERE, out)
-    out[0] = sizes[0] - d
+    out[Witness.GAP] = sizes[0] - d
     for i in range(1, 4):
         out[i] = -out[i]
     for i in range(7, 25):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from sim.contact.collision.box import column, to_a
 from sim.contact.collision.witness import axis, dot
+from sim.model.record_columns import Witness
 from solvers.compiler import inner_kernel
-from solvers.rotation import Vec3, cross
+from solvers.rotation import Vec3, cross, put_three, three
 from solvers.types import Vector
 
 
@@ -51,10 +52,10 @@ def exchange(R: Vector, r: Vector, out: Vector) -> None:
 
     n' = -R^T n,   p' = R^T (p - r),   derivatives by the twist of b about the origin of a
     """
-    n = to_a(R, (-out[1], -out[2], -out[3]))
-    p = to_a(R, (out[4] - r[0], out[5] - r[1], out[6] - r[2]))
-    _turn(R, r, out, 7, -1.0, n, 0.0)
-    _turn(R, r, out, 25, 1.0, p, 1.0)
-    for i in range(3):
-        out[1 + i] = n[i]
-        out[4 + i] = p[i]
+    n, p = three(out, Witness.NORMAL), three(out, Witness.POINT)
+    n = to_a(R, (-n[0], -n[1], -n[2]))
+    p = to_a(R, (p[0] - r[0], p[1] - r[1], p[2] - r[2]))
+    _turn(R, r, out, Witness.NORMAL_RATE, -1.0, n, 0.0)
+    _turn(R, r, out, Witness.POINT_RATE, 1.0, p, 1.0)
+    put_three(n, Witness.NORMAL, out)
+    put_three(p, Witness.POINT, out)

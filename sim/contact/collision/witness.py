@@ -15,8 +15,9 @@ from __future__ import annotations
 
 from math import sqrt
 
+from sim.model.record_columns import Witness
 from solvers.compiler import inner_kernel
-from solvers.rotation import Vec3, cross
+from solvers.rotation import Vec3, cross, put_three
 from solvers.types import Vector
 
 ABSENT = 1e9  # distance of a contact point that does not exist in this configuration [m]
@@ -51,16 +52,16 @@ def absent(out: Vector) -> None:
     """No such contact point now: phi = 1e9, with a normal and zero derivatives, so that nothing that reads it fails."""
     for i in range(43):
         out[i] = 0.0
-    out[0] = ABSENT
-    out[3] = 1.0
+    out[Witness.GAP] = ABSENT
+    out[Witness.NORMAL + 2] = 1.0
 
 
 @inner_kernel
 def put(phi: float, n: Vec3, p: Vec3, out: Vector) -> None:
     """phi, n and p."""
-    out[0] = phi
-    out[1], out[2], out[3] = n
-    out[4], out[5], out[6] = p
+    out[Witness.GAP] = phi
+    put_three(n, Witness.NORMAL, out)
+    put_three(p, Witness.POINT, out)
 
 
 @inner_kernel

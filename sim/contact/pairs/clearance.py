@@ -18,10 +18,10 @@ from sim.contact.pairs.pair_contact import point_kinematics
 from sim.contact.pairs.pair_pose import place_shapes
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import Apart, PairBound
+from sim.model.record_columns import Apart, PairBound, RelativePose
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
-from solvers.rotation import cross
+from solvers.rotation import cross, three
 
 
 @kernel
@@ -43,8 +43,9 @@ def largest_speed(data: Data, i: int, arm: float) -> float:
 def _pair_gap(model: Model, data: Data, j: int) -> float:
     """Lower bound of the gaps of the collision that begins at pair j, at configuration 2 [m]."""
     place_shapes(model, data, j, data.pos2, data.rot2)
-    r, radii = data.pair_relative[j], model.pair_far[j, PairBound.RADII]
-    apart = sqrt(r[9] * r[9] + r[10] * r[10] + r[11] * r[11]) - radii
+    x, y, z = three(data.pair_relative[j], RelativePose.CENTER)
+    radii = model.pair_far[j, PairBound.RADII]
+    apart = sqrt(x * x + y * y + z * z) - radii
     return apart if apart > radii else open_pairs(model, data, j)
 
 

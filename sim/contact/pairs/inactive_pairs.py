@@ -45,6 +45,7 @@ from sim.model.options import StepOptions
 from sim.model.record_columns import PairBound, RelativePose, Witness
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
+from solvers.rotation import three
 
 STEEPEST = 3.75  # reaches times the largest rate of the part that acts (limited_reach.py)
 COUPLED = 1e-2  # largest sum of e over the inactive collisions of a body
@@ -90,9 +91,9 @@ def begin_pairs(model: Model, data: Data, options: StepOptions) -> None:
 def _begin_pair(model: Model, data: Data, options: StepOptions, j: int) -> float:
     """pair_activation of the collision that begins at pair j."""
     place_shapes(model, data, j, data.pos2, data.rot2)
-    r = data.pair_relative[j]
+    x, y, z = three(data.pair_relative[j], RelativePose.CENTER)
     travel = _travel(model, data, j)
-    apart = (r[9] * r[9] + r[10] * r[10] + r[11] * r[11]) ** 0.5 - model.pair_far[j, PairBound.RADII]
+    apart = (x * x + y * y + z * z) ** 0.5 - model.pair_far[j, PairBound.RADII]
     keep_distance(model, data, j, apart)
     if is_beyond(model, data, j):
         return FAR

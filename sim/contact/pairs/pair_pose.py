@@ -5,6 +5,7 @@ from __future__ import annotations
 from sim.dynamics.frame_placement import place_frame
 from sim.model.data import Data
 from sim.model.model import Model
+from sim.model.record_columns import RelativePose
 from sim.model.shape_kinds import SWAPPED
 from solvers.compiler import kernel
 from solvers.types import Matrix
@@ -29,7 +30,7 @@ def relative_pose(data: Data, j: int, a: int, b: int) -> None:
     for r in range(3):
         for c in range(3):
             out[3 * r + c] = B[r] * A[c] + B[3 + r] * A[3 + c] + B[6 + r] * A[6 + c]
-        out[9 + r] = B[r] * x + B[3 + r] * y + B[6 + r] * z
+        out[RelativePose.CENTER + r] = B[r] * x + B[3 + r] * y + B[6 + r] * z
 
 
 @kernel

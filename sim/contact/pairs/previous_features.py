@@ -14,7 +14,7 @@ from sim.contact.collision.rim import LEVEL
 from sim.contact.collision.witness import dot
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import Cone, PairSize, Witness
+from sim.model.record_columns import Cone, Hull, PairSize, RelativePose, Witness
 from sim.model.shape_kinds import RIM_POINTS, SWAPPED, Pair
 from solvers.compiler import inner_kernel, kernel
 from solvers.rotation import Vec3, three
@@ -73,9 +73,9 @@ def room(kind: int, sizes: Vector, hull: Matrix) -> int:
         return 2 * RIM_POINTS
     if kind == Pair.POLYTOPE_CYLINDER:
         a = int(sizes[0])
-        return int(hull[a, 0]) + (RIM_POINTS if hull[a, 2] > 0.0 else 0)
+        return int(hull[a, Hull.CORNERS]) + (RIM_POINTS if hull[a, Hull.FACES] > 0.0 else 0)
     if kind == Pair.POLYTOPE_POLYTOPE:
-        return int(hull[int(sizes[0]), 0] + hull[int(sizes[PairSize.B]), 0])
+        return int(hull[int(sizes[0]), Hull.CORNERS] + hull[int(sizes[PairSize.B]), Hull.CORNERS])
     return 1 << 40
 
 
@@ -86,13 +86,13 @@ def moved_since(kind: int, out: Vector, pose: Vector, before: Vector) -> Vec3:
     p' = R' R^T (p - r) + r' of a point p of shape a, in the frame of b; of one of b in the frame of a, where the two
     have changed places, p' = R'^T (R p + r - r').
     """
-    R, r = pose[:9], (pose[9], pose[10], pose[11])
+    R, r, s = pose[:9], three(pose, RelativePose.CENTER), three(before, RelativePose.CENTER)
     p = three(out, Witness.POINT)
     if kind < SWAPPED:
         q = to_b(before[:9], to_a(R, (p[0] - r[0], p[1] - r[1], p[2] - r[2])))
-        return p[0] - q[0] - before[9], p[1] - q[1] - before[10], p[2] - q[2] - before[11]
+        return p[0] - q[0] - s[0], p[1] - q[1] - s[1], p[2] - q[2] - s[2]
     q = to_b(R, p)
-    q = to_a(before[:9], (q[0] + r[0] - before[9], q[1] + r[1] - before[10], q[2] + r[2] - before[11]))
+    q = to_a(before[:9], (q[0] + r[0] - s[0], q[1] + r[1] - s[1], q[2] + r[2] - s[2]))
     return p[0] - q[0], p[1] - q[1], p[2] - q[2]
 
 

@@ -20,7 +20,7 @@ from sim.dynamics.joints.damper import node_dampings
 from sim.integrators.adaptive import go_on
 from sim.integrators.adaptive_rollout import SubstepMotion, roll_substeps
 from sim.integrators.extrapolated_step import PARTS, combined_at
-from sim.integrators.hamilton_gradient import Slopes
+from sim.integrators.hamilton_gradient import Slopes, empty_slopes
 from sim.integrators.node_slopes import node_slopes
 from sim.integrators.node_step import begin_work, mean_of_node, node_at
 from sim.integrators.rollout import Linearized, MotionBuffers, linearize, roll
@@ -275,7 +275,7 @@ class AdaptiveEngine(PythonLoopEngine):
     def _node_terms(self, x: Vector, held: Held) -> tuple[Slopes, Floats]:
         """Derivatives of M(q) v and of the forces of inputs and wrenches, at the node x."""
         nv, (u, wrench) = self.sizes.nv, held
-        slopes, by_q = Slopes(*(np.zeros((nv, k)) for k in (nv, nv, nv, nv, self.nu, 42))), np.zeros((nv, nv))
+        slopes, by_q = empty_slopes(nv, self.nu), np.zeros((nv, nv))
         node_slopes(self._second.gradient_table(), self._scratch.table(), u, wrench, x, slopes, by_q)
         return slopes, by_q
 

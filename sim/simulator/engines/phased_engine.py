@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from sim.dynamics.joints.damper import node_dampings
 from sim.integrators import legendre
-from sim.integrators.hamilton_gradient import Slopes
+from sim.integrators.hamilton_gradient import empty_slopes
 from sim.integrators.phased_rollout import Phases, roll_phases
 from sim.integrators.rollout import MotionBuffers
 from sim.model.interruptible_loops import pieces
@@ -170,7 +170,7 @@ class PhasedEngine(PythonLoopEngine):
     def _node_slopes(self, mean: Vector) -> Floats:
         """d(q, v of the node)/d(q, mean velocity) of a state of order 2:  (p_v + C) dv = dp - p_q dq,  (ndx, ndx)."""
         nv = self.sizes.nv
-        slopes = Slopes(*(np.zeros((nv, k)) for k in (nv, nv, nv, nv, self.nu, 42)))
+        slopes = empty_slopes(nv, self.nu)
         by_q, by_mean = np.zeros((nv, nv)), np.zeros((nv, nv))
         out, model = np.eye(self.ndx), self._second.gradient_table()
         h, damping = self._second.states.interval(mean), np.zeros(nv)
