@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from copy import deepcopy
 from time import process_time
 from typing import Any
 
@@ -18,7 +19,9 @@ import gymnasium
 import numpy as np
 from command import deliver, number, parser, progress
 
+import dojo_opt as dojo
 from dojo_opt.learn.environment_names import TASKS
+from dojo_opt.learn.registration import task_of
 from dojo_opt.report.result import Report, Table
 from solvers.types import Floats
 
@@ -28,36 +31,43 @@ MOST, LEAST = 30.0, 15.0  # [us] of Python; times faster
 
 
 def _named(name: str) -> tuple[str, dict[str, Any]]:
-    """Name and options of an environment."""
+    """Name and options of a task."""
     if name == FORCES:
-        return "dojo/Ant-v0", {"include_cfrc_ext_in_observation": True, "contact_cost_weight": 5e-4}
-    return f"dojo/{name}-v0", {}
+        return "Ant", {"include_cfrc_ext_in_observation": True, "contact_cost_weight": 5e-4}
+    return name, {}
+
+
+def _begin(env: dojo.Environment, task: dojo.learn.Task) -> Floats:
+    """Reset an environment; the first state of its simulator, which the task draws from a copy of the generator."""
+    x: Floats = task.starts([deepcopy(env.np_random)])[0, : task.sim.nx]
+    env.reset()
+    return x
 
 
 def single(name: str, rounds: int) -> tuple[float, float]:
     """(time of an action in `step`, time of its compiled call) [us], medians of rounds."""
-    made, options = _named(name)
-    env = gymnasium.make(made, **options).unwrapped
-    task: Any = env._episode.task  # type: ignore[attr-defined]
+    registered, options = _named(name)
+    task = task_of(registered, **options)
+    env = dojo.Environment(task)  # as gymnasium.make(...).unwrapped
     row = task.sim.stepper(task.substeps, contacts=bool(task.touch))
     env.action_space.seed(0)
     steps, sims = [], []
     for k in range(rounds + 1):
-        env.reset(seed=k)
+        env.np_random = np.random.default_rng(k)
+        x = _begin(env, task)
         actions = [env.action_space.sample() for _ in range(ACTIONS)]
         states: list[Floats] = []
         spent = 0.0
         for a in actions:
-            states.append(env._episode.x[0].copy())  # type: ignore[attr-defined]
+            states.append(x)
             began = process_time()
             over = env.step(a)[2]
             spent += process_time() - began
-            if over:
-                env.reset()
+            x = _begin(env, task) if over else row.end.copy()  # the stepper of the task is that of the environment
         inputs = [task.inputs(a.astype(np.float64)) for a in actions]
         began = process_time()
         for x, u in zip(states, inputs, strict=True):
-            row.advance(x[: task.sim.nx], u)
+            row.advance(x, u)
         sims.append((process_time() - began) / ACTIONS)
         steps.append(spent / ACTIONS)
     return 1e6 * float(np.median(steps[1:])), 1e6 * float(np.median(sims[1:]))
@@ -65,8 +75,8 @@ def single(name: str, rounds: int) -> tuple[float, float]:
 
 def batch(name: str, rounds: int) -> float:
     """Time of an action of one of 64 environments [us], median of rounds."""
-    made, options = _named(name)
-    env = gymnasium.make_vec(made, num_envs=ROWS, **options)
+    registered, options = _named(name)
+    env = gymnasium.make_vec(f"dojo/{registered}-v0", num_envs=ROWS, **options)
     env.action_space.seed(0)
     found = []
     for k in range(rounds + 1):

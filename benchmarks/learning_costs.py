@@ -124,7 +124,7 @@ def epoch(name: str, epochs: int) -> list[Cell]:
         (dojo.Simulator, "step_batch", "simulation"), (dojo.Simulator, "with_parameters", "models"),
         (Task, "observe", "observations and rewards"), (Task, "rewards", "observations and rewards"),
         (Network, "forward", "networks of the rollout"), (PolicyRollout, "gradient", "gradient of the return"),
-        (module._Shac, "_fit", "critic"), (module._Shac, "values", "values"),
+        (module.ShacTraining, "fit_critic", "critic"), (module.ShacTraining, "values", "values"),
     )  # fmt: skip
 
     def mark(record: dict[str, Any]) -> None:

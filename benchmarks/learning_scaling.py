@@ -46,7 +46,7 @@ def scaled(name: str, rounds: int) -> list[Cell]:
     sim = task.sim.replace(time_step=h)
     x, inputs, _ = moving(task, sim, substeps)
     step = least(lambda: sim.step_batch(x, inputs, substeps, True, KAPPA), rounds)
-    learner = module._Shac(task, module.ShacOptions(**task.settings), 0)
+    learner = module.ShacTraining(task, module.ShacOptions(**task.settings), 0)
     for _ in range(BEFORE):
         learner.train()
 

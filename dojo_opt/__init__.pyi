@@ -14,7 +14,11 @@ from dojo_opt import (
     viewer as viewer,
 )
 from dojo_opt.gaits.equilibrium import equilibrium as equilibrium
-from dojo_opt.identification.identify import Identified as Identified, identify as identify
+from dojo_opt.identification.identify import (
+    Identified as Identified,
+    IdentifyOptions as IdentifyOptions,
+    identify as identify,
+)
 from dojo_opt.identification.parameter_space import ParameterSpace as ParameterSpace
 from dojo_opt.learn.environment import Environment as Environment
 from dojo_opt.mpc.adaptation import Adaptation as Adaptation
@@ -23,6 +27,7 @@ from dojo_opt.mpc.moving_reference import (
     AnchoredReference as AnchoredReference,
     SampledReference as SampledReference,
 )
+from dojo_opt.mpc.settings import MPCSettings as MPCSettings
 from dojo_opt.planning.ilqr import ilqr as ilqr
 from dojo_opt.planning.options import Options as Options, Stage as Stage
 from dojo_opt.planning.plan import Plan as Plan

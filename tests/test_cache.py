@@ -93,7 +93,7 @@ print([str(w.message) for w in told])
 """
 
 
-class Filled:
+class FilledCache:
     """A folder of compiled code, and a program with its kernel in this folder."""
 
     def __init__(self, home: Path) -> None:
@@ -122,12 +122,12 @@ class Filled:
 
 
 @pytest.fixture(scope="module")
-def once(tmp_path_factory: pytest.TempPathFactory) -> Filled:
-    return Filled(tmp_path_factory.mktemp("filled"))
+def once(tmp_path_factory: pytest.TempPathFactory) -> FilledCache:
+    return FilledCache(tmp_path_factory.mktemp("filled"))
 
 
 @pytest.fixture
-def filled(once: Filled) -> Filled:
+def filled(once: FilledCache) -> FilledCache:
     once.restore()
     return once
 
@@ -172,7 +172,7 @@ DAMAGE: dict[str, Callable[[Path], object]] = {
 
 @pytest.mark.sweep(7)
 @pytest.mark.parametrize("kind", DAMAGE)
-def test_a_damaged_file_is_compiled_again(filled: Filled, kind: str) -> None:
+def test_a_damaged_file_is_compiled_again(filled: FilledCache, kind: str) -> None:
     DAMAGE[kind](filled.file)
     assert filled.run() == ["2.0", "0"]
     assert filled.file.read_bytes()[:64] == hashlib.blake2b(filled.file.read_bytes()[64:]).digest()
@@ -214,14 +214,14 @@ DURING = {  # where the handler of a signal raises
 
 
 @pytest.mark.parametrize("name", DURING)
-def test_an_exception_of_a_signal_is_heard_and_loses_no_code(filled: Filled, name: str) -> None:
+def test_an_exception_of_a_signal_is_heard_and_loses_no_code(filled: FilledCache, name: str) -> None:
     if name in ("code comes from LLVM", "a file is written"):
         filled.file.unlink()
     assert filled.run(ALARM.format(DURING[name])) == ["heard", "2.0"]
     assert filled.run() == ["2.0", "1"]
 
 
-def test_a_full_disk_is_one_warning(filled: Filled) -> None:
+def test_a_full_disk_is_one_warning(filled: FilledCache) -> None:
     filled.file.unlink()
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"  # the system's own error for a write
     value, hits, told = filled.run(limit + COUNTED)
@@ -230,7 +230,7 @@ def test_a_full_disk_is_one_warning(filled: Filled) -> None:
     assert list(filled.digest.iterdir()) == []
 
 
-def test_a_disk_without_room_for_a_folder_is_one_warning(filled: Filled) -> None:
+def test_a_disk_without_room_for_a_folder_is_one_warning(filled: FilledCache) -> None:
     patch = "import errno, os, pathlib\ndef full(*a, **k): raise OSError(errno.ENOSPC, 'No space left on device')\n"
     value, hits, told = filled.run(
         patch + "pathlib.Path.mkdir = full\n" + COUNTED, NUMBA_CACHE_DIR=str(filled.home / "new")
@@ -239,7 +239,7 @@ def test_a_disk_without_room_for_a_folder_is_one_warning(filled: Filled) -> None
     assert told.count("compiled code cannot be stored") == 1 and "No space left on device" in told
 
 
-def test_a_filled_folder_that_is_read_only_is_read(filled: Filled) -> None:
+def test_a_filled_folder_that_is_read_only_is_read(filled: FilledCache) -> None:
     for path in (filled.file, filled.digest, filled.digest.parent, filled.base):
         path.chmod(path.stat().st_mode & ~0o222)
     value, hits, told = filled.run(COUNTED.replace("two(1.0)", "pass"))
@@ -249,7 +249,7 @@ def test_a_filled_folder_that_is_read_only_is_read(filled: Filled) -> None:
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes of POSIX")
 @pytest.mark.parametrize("part", ["base", "root", "digest", "file"])
 @pytest.mark.parametrize("whose", ["group", "world", "another user"])
-def test_files_that_others_can_write_are_not_read(filled: Filled, part: str, whose: str) -> None:
+def test_files_that_others_can_write_are_not_read(filled: FilledCache, part: str, whose: str) -> None:
     marker = filled.home / "ran"
     written(filled.file, pickle.dumps(Evil(marker)))
     path = {"base": filled.base, "root": filled.digest.parent, "digest": filled.digest, "file": filled.file}[part]
@@ -267,7 +267,7 @@ def test_files_that_others_can_write_are_not_read(filled: Filled, part: str, who
         assert told.count(wrong) == 1 and str(path) in told
 
 
-def test_a_planted_file_runs_where_the_folder_is_believed(filled: Filled) -> None:
+def test_a_planted_file_runs_where_the_folder_is_believed(filled: FilledCache) -> None:
     """The tests above rely on this: the planted file would run."""
     marker = filled.home / "ran"
     written(filled.file, pickle.dumps(Evil(marker)))
@@ -275,18 +275,18 @@ def test_a_planted_file_runs_where_the_folder_is_believed(filled: Filled) -> Non
     assert marker.exists()
 
 
-def test_a_new_folder_is_the_users_own(filled: Filled) -> None:
+def test_a_new_folder_is_the_users_own(filled: FilledCache) -> None:
     for path in (filled.base, filled.digest.parent, filled.digest):
         assert stat.S_IMODE(path.stat().st_mode) == 0o700
     assert stat.S_IMODE(filled.file.stat().st_mode) == 0o600
 
 
-def test_a_sticky_folder_of_root_is_no_danger(filled: Filled) -> None:
+def test_a_sticky_folder_of_root_is_no_danger(filled: FilledCache) -> None:
     filled.base.chmod(0o1777)
     assert filled.run() == ["2.0", "1"]
 
 
-def test_a_link_to_the_folder_is_followed(filled: Filled) -> None:
+def test_a_link_to_the_folder_is_followed(filled: FilledCache) -> None:
     (filled.home / "link").symlink_to(filled.base)
     assert filled.run(NUMBA_CACHE_DIR=str(filled.home / "link")) == ["2.0", "1"]
 
@@ -302,7 +302,7 @@ def test_no_folder_depends_on_where_a_process_starts(tmp_path: Path, given: str)
 
 
 @pytest.mark.slow
-def test_a_user_that_the_system_does_not_know_can_import(filled: Filled) -> None:
+def test_a_user_that_the_system_does_not_know_can_import(filled: FilledCache) -> None:
     unknown = """
 import os, pwd
 def nobody(uid): raise KeyError(uid)
@@ -330,7 +330,7 @@ print([os.waitpid(child, 0)[1] for child in children])
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
-def test_processes_may_write_at_once(filled: Filled) -> None:
+def test_processes_may_write_at_once(filled: FilledCache) -> None:
     for _ in range(2):
         filled.file.unlink()
         assert json.loads(" ".join(filled.run(AT_ONCE))) == [0] * 4

@@ -87,12 +87,12 @@ def test_an_interrupted_compilation_ends_the_helper(told: Path, monkeypatch: pyt
     monkeypatch.setattr(helper_process, "_PROGRAM", program)
     started: list[subprocess.Popen[str]] = []
 
-    class Watched(subprocess.Popen):  # type: ignore[type-arg]
+    class WatchedPopen(subprocess.Popen):  # type: ignore[type-arg]
         def __init__(self, *args: Any, **settings: Any) -> None:
             super().__init__(*args, **settings)
             started.append(self)
 
-    monkeypatch.setattr(helper_process.subprocess, "Popen", Watched)
+    monkeypatch.setattr(helper_process.subprocess, "Popen", WatchedPopen)
     with closing(helper_process.divided(JOBS)) as queue:
         next(queue), next(queue)
         while not told.read_text():

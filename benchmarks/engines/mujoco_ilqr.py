@@ -120,14 +120,14 @@ class MujocoIlqr:
         """(xs, us) of a solution under its gains, with time steps `refine` times as short."""
         fine = MujocoIlqr(self._problem, self._settings._replace(step=self.time_step / refine))
         with quiet():
-            return fine._rollout(solution.x, solution.u, None, solution.K, np.zeros_like(solution.u), 0.0)
+            return fine.rollout(solution.x, solution.u, None, solution.K, np.zeros_like(solution.u), 0.0)
 
     def _guess(self) -> tuple[Matrix, Matrix]:
         """States and inputs to start from: the states of the problem, or the rollout of its inputs."""
         problem = self._problem
         us = np.clip(problem.controls0, *self._limits)
         if problem.states0 is None:
-            return self._rollout(np.tile(problem.start, (problem.horizon + 1, 1)), us, None, None, None, 1.0)
+            return self.rollout(np.tile(problem.start, (problem.horizon + 1, 1)), us, None, None, None, 1.0)
         xs = problem.states0.copy()
         xs[1:, 2] -= PRESS
         return xs, us
@@ -140,7 +140,7 @@ class MujocoIlqr:
         Closing gaps may cost: when the model predicts an increase, one up to ASCENT times as large is allowed.
         """
         for alpha in 0.5 ** np.arange(HALVINGS):
-            x_new, u_new = self._rollout(xs, us, gaps, K, k, alpha)
+            x_new, u_new = self.rollout(xs, us, gaps, K, k, alpha)
             new = self._objective.evaluate(x_new, u_new)[1]
             change = alpha * (predicted[0] + 0.5 * alpha * predicted[1])
             if new - merit <= (ARMIJO if change < 0.0 else ASCENT) * change:  # false for NaN
@@ -230,7 +230,7 @@ class MujocoIlqr:
         dx = z[:n]
         return float(d0 + g[-1, :n] @ dx), float(d1 + dx @ H[-1, :n, :n] @ dx)
 
-    def _rollout(
+    def rollout(
         self, xs: Matrix, us: Matrix, gaps: Matrix | None, K: Any, k: Matrix | None, alpha: float
     ) -> tuple[Matrix, Matrix]:
         """u = us + a k + K (x (-) xs), with the share 1 - a of every gap left open; gains None: open loop."""

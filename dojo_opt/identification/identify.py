@@ -332,7 +332,8 @@ def identify(
             prior, or around those of `sim` with a deviation of three tenths (default 1). The best one is returned.
         seed: of these values (default 0).
         executor: whose workers fit, as for `dojo.monte_carlo`; the result does not depend on it (default None).
-        **options: fields of `IdentifyOptions`.
+        **options: fields of `dojo.IdentifyOptions` by name, whose help has their units and defaults: window, every,
+            delay, kappas, outlier, tolerance, max_iterations, verbose.
 
     Returns:
         Identified.

@@ -171,14 +171,14 @@ class _Imitation(Training):
 def imitate(
     task: Task, plans: Sequence[Any], *, seed: int = 0, resume: Learned | None = None, **options: Any
 ) -> Learned:
-    """Learn a policy from plans and their gains: see the module, and `ImitationOptions` for the options.
+    """Learn a policy from plans and their gains: see the module, and `dojo.learn.ImitationOptions`.
 
     Args:
         task: whose states, inputs and control steps the plans have.
         plans: of `dojo.ilqr`, or (states (T + 1, nx), inputs (T, nu) [N, N m], gains (T, nu, ndx)).
         seed: of all random numbers; the same seed gives the same policy, to the last bit.
         resume: a run to continue, of the same plans, seed and options.
-        **options: fields of `ImitationOptions`.
+        **options: fields of `dojo.learn.ImitationOptions`.
 
     Returns:
         Learned, with the best of the evaluated policies.

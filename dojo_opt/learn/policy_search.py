@@ -240,7 +240,7 @@ class GradientSearch(WeightSearch):
 def ars(
     task: Task, *, seed: int = 0, resume: Learned | None = None, executor: Executor | None = None, **options: Any
 ) -> Learned:
-    """Augmented random search, without derivatives: see the module, and `RandomSearchOptions` for the options.
+    """Augmented random search, without derivatives: see the module, and `dojo.learn.RandomSearchOptions`.
 
     Args:
         task: the task to learn.
@@ -248,7 +248,7 @@ def ars(
         resume: a run to continue, of the same task, seed and options.
         executor: anything with the interface of `concurrent.futures.Executor`, as for `dojo.monte_carlo`; its workers
             roll out the directions, and the policy is the same to the last bit (default None: none).
-        **options: fields of `RandomSearchOptions`.
+        **options: fields of `dojo.learn.RandomSearchOptions`.
 
     Returns:
         Learned, with the best of the evaluated policies.
@@ -261,13 +261,13 @@ def ars(
 
 
 def gradient_search(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:
-    """Ascend the gradient of the return of whole episodes: see the module, and `GradientSearchOptions`.
+    """Ascend the gradient of the return of whole episodes: see the module, and `dojo.learn.GradientSearchOptions`.
 
     Args:
         task: the task to learn.
         seed: of all random numbers; the same seed gives the same policy, to the last bit.
         resume: a run to continue, of the same task, seed and options.
-        **options: fields of `GradientSearchOptions`.
+        **options: fields of `dojo.learn.GradientSearchOptions`.
 
     Returns:
         Learned, with the best of the evaluated policies.

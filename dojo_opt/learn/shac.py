@@ -133,7 +133,7 @@ class ShacOptions:
             raise TypeError(f"shac(start=...): expected a LearnedPolicy, got {self.start!r}")
 
 
-class _Shac(Training):
+class ShacTraining(Training):
     """Policy, critic, environments and random numbers of a run."""
 
     algorithm = "shac"
@@ -216,7 +216,7 @@ class _Shac(Training):
         after, by_value = after.reshape(o.horizon, n), by_value.reshape(o.horizon, n, -1)
         total = DiscountedSum(roll, after, o.gamma)
         length, share_clipped = self._improve(total, by_value, o.rate * (1.0 - share))
-        self._fit(roll, total.traced(o.trace))
+        self.fit_critic(roll, total.traced(o.trace))
         self.statistics.add(roll.observations.reshape(o.horizon * n, -1))
         self.x = roll.x[-1].copy()
         self.epoch += 1
@@ -246,7 +246,7 @@ class _Shac(Training):
             self.infinite += 1
         return length, found.clipped / weights.size
 
-    def _fit(self, roll: PolicyRollout, returns: Floats) -> None:
+    def fit_critic(self, roll: PolicyRollout, returns: Floats) -> None:
         """Steps of the critic towards the returns of solved steps, then of its target network."""
         o = self.options
         solved = ~roll.unsolved.ravel()
@@ -296,13 +296,13 @@ class _Shac(Training):
 
 
 def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:
-    """Learn a policy with the derivatives of the simulator: see the module, and `ShacOptions` for the options.
+    """Learn a policy with the derivatives of the simulator: see the module, and `dojo.learn.ShacOptions`.
 
     Args:
         task: the task to learn.
         seed: of all random numbers; the same seed gives the same policy, to the last bit, on any number of cores.
         resume: a run to continue, of the same task, seed and options: epochs that are done are not done again.
-        **options: fields of `ShacOptions`; by default those of `task.settings`.
+        **options: fields of `dojo.learn.ShacOptions`; by default those of `task.settings`.
 
     Returns:
         Learned, with the best of the evaluated policies.
@@ -311,4 +311,4 @@ def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options:
         TypeError: for an argument of the wrong kind.
         ValueError: for a value out of range, or a run that does not fit.
     """
-    return learn(_Shac, ShacOptions, task, seed, resume, {**getattr(task, "settings", {}), **options})
+    return learn(ShacTraining, ShacOptions, task, seed, resume, {**getattr(task, "settings", {}), **options})

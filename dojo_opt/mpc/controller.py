@@ -58,9 +58,9 @@ class MPC:
         reference: states to track over time, see `dojo_opt.mpc.moving_reference.References` (default None: the
             reference of the problem at every tick).
         plan: the first plan, at the time of the first call (default None: that of `ilqr` without refinement).
-        **settings: period, kappa, kappa_grad, guess, patience, gain_scale, delay, computation, servo, feedforward,
-            time_limit, mean_velocity, friction, learn_ground, adapt, options, first, log; see
-            `help(dojo_opt.mpc.settings.MPCSettings)`.
+        **settings: fields of `dojo.MPCSettings` by name, whose help has their units and defaults: period, kappa,
+            kappa_grad, guess, patience, gain_scale, delay, computation, servo, feedforward, time_limit, mean_velocity,
+            friction, learn_ground, adapt, options, first, log.
 
     Raises:
         TypeError: for an unknown setting, or an argument of the wrong kind.

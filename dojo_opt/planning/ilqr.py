@@ -541,7 +541,7 @@ class Solver:
         if stride is not None and status == Status.SOLVED:
             repeated = periodic_gains(local.model(now))
             if repeated is None:
-                detail = " Its gains are those of a single cycle: the motion repeated for ever has none."
+                detail = " The infinitely repeated motion has no stabilising gains; these are the gains of one cycle."
             else:
                 local.K[:] = repeated
         violation, culprit = self.objective.worst(now.x, now.u)

@@ -70,7 +70,7 @@ def _closed_loops(executor=None):
     return [outcome.x for outcome in study.outcomes]
 
 
-class Killing:
+class KillingPool:
     """An executor that kills a worker soon after the first call, which takes longer, as workers import their modules."""
 
     def __init__(self, executor, pid):
@@ -97,7 +97,7 @@ def test_a_cluster_finds_the_same_though_a_worker_is_killed():
         client.wait_for_workers(2, timeout=_PATIENCE)
         lost = next(iter(client.run(os.getpid).values()))
         pool = client.get_executor()
-        found = {_directions: _directions(Killing(pool, lost))}
+        found = {_directions: _directions(KillingPool(pool, lost))}
         assert lost not in client.run(os.getpid).values()
         for study in (_plans, _seeds, _starts, _closed_loops):
             found[study] = study(pool)

@@ -163,14 +163,14 @@ def test_ctrl_c_before_the_first_iterate_leaves_no_plan(monkeypatch: pytest.Monk
     assert found.value.result is None
 
 
-class Pair(NamedTuple):
+class ArrayAndNumber(NamedTuple):
     first: float
     second: float
 
 
 UNSAFE = {
-    "fields": lambda x: Pair(x, 2.0),
-    "fields inside": lambda x: (1, Pair(x, 2.0)),
+    "fields": lambda x: ArrayAndNumber(x, 2.0),
+    "fields inside": lambda x: (1, ArrayAndNumber(x, 2.0)),
     "enum": lambda x: Status.SOLVED,
     "enum inside": lambda x: (Status.SOLVED, x),
 }

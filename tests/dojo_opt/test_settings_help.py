@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import operator
 import re
 from dataclasses import MISSING
 
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.mpc.settings import MPCSettings
 
 REQUIRED = object()
 
@@ -23,7 +23,7 @@ def fields(cls):
 
 @pytest.mark.parametrize(
     "cls",
-    [dojo.Options, dojo.Stage, MPCSettings, dojo.Perturbation, dojo.Disturbances, dojo.Push]
+    [dojo.Options, dojo.Stage, dojo.MPCSettings, dojo.IdentifyOptions, dojo.Perturbation, dojo.Disturbances, dojo.Push]
     + [dojo.Body, dojo.Joint, dojo.Contact, dojo.Collision, dojo.Input, dojo.Gear],
 )
 def test_every_field_is_in_help(cls):
@@ -42,5 +42,23 @@ def test_every_field_is_in_help(cls):
             assert said, name
 
 
-def test_settings_of_mpc_are_named_where_they_are_given():
-    assert all(re.search(rf"\b{name}\b", dojo.MPC.__doc__) for name in MPCSettings.__dataclass_fields__)
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        *((dojo.ilqr, "dojo.Options"), (dojo.MPC, "dojo.MPCSettings"), (dojo.identify, "dojo.IdentifyOptions")),
+        *((dojo.learn.shac, "dojo.learn.ShacOptions"), (dojo.learn.imitate, "dojo.learn.ImitationOptions")),
+        (dojo.learn.ars, "dojo.learn.RandomSearchOptions"),
+        (dojo.learn.gradient_search, "dojo.learn.GradientSearchOptions"),
+    ],
+)
+def test_help_of_a_call_leads_to_its_settings(call, name):
+    """By a public name, whose own help has every field."""
+    assert f"`{name}`" in call.__doc__
+    cls = operator.attrgetter(name.removeprefix("dojo."))(dojo)
+    described = re.findall(r"^        (\w+):", cls.__doc__, flags=re.MULTILINE)
+    assert set(fields(cls)) <= set(described), set(fields(cls)) - set(described)
+
+
+@pytest.mark.parametrize(("call", "cls"), [(dojo.MPC, dojo.MPCSettings), (dojo.identify, dojo.IdentifyOptions)])
+def test_settings_are_named_where_they_are_given(call, cls):
+    assert all(re.search(rf"\b{name}\b", call.__doc__) for name in fields(cls))

@@ -25,7 +25,7 @@ from naive.lagrangian import (
     varied,
 )
 from naive.rotation import Array
-from naive.scene import BODY, IMPACT, JOINT, LINEAR, Contact, Limit, Scene, advance, poses
+from naive.scene import BODY, IMPACT, JOINT, LINEAR, Limit, PlainContact, PlainScene, advance, poses
 
 
 def bilinear(x: Array, y: Array, kappa: float) -> Array:
@@ -60,7 +60,7 @@ def smoothed_cone(x: Array, y: Array, kappa: float) -> Array:
 class Step:
     """The equations of one step from (q, v) under the input u."""
 
-    def __init__(self, scene: Scene, q: Array, v: Array, u: Array, h: float) -> None:
+    def __init__(self, scene: PlainScene, q: Array, v: Array, u: Array, h: float) -> None:
         self.scene, self.h, self.q2, self.u = scene, h, q, u
         self.q1 = advance(scene, q, -v, h)
         self.z1, self.z2 = poses(scene, self.q1), poses(scene, q)
@@ -171,7 +171,7 @@ class Step:
             q, v = q + joint.nq, v + joint.nv
         raise IndexError(dof)
 
-    def gap_and_slip(self, contact: Contact, z3: Poses) -> tuple[Array, Array, Array]:
+    def gap_and_slip(self, contact: PlainContact, z3: Poses) -> tuple[Array, Array, Array]:
         """phi = n.(x3 + R3 p) - rho - height, v_t = T ((x3 - x2)/h + (2/h) s_w x r), r = R3 p - rho n."""
         b, n, tangents = contact.body, contact.frame[0], contact.frame[1:]
         x3, q3 = z3[0][..., b, :], z3[1][..., b, :]
@@ -181,7 +181,7 @@ class Step:
         slip = ((x3 - self.z2[0][b]) / self.h + rot.cross(2.0 / self.h * sine, arm)) @ tangents.T
         return (x3 + center) @ n - contact.radius - contact.height, slip, arm
 
-    def contact(self, contact: Contact, y: Array, z3: Poses, kappa: float, exact: bool) -> tuple[Array, Array]:
+    def contact(self, contact: PlainContact, y: Array, z3: Poses, kappa: float, exact: bool) -> tuple[Array, Array]:
         """Law of one contact and its wrench on the body about the centre of mass; y as in `contact_size`."""
         gap, slip, arm = self.gap_and_slip(contact, z3)
         product = bilinear if exact else smoothed
@@ -223,19 +223,19 @@ class Step:
         return np.concatenate(y)
 
 
-def frictional(contact: Contact) -> bool:
+def frictional(contact: PlainContact) -> bool:
     """Friction has its own variables only where there is any."""
     return contact.law != IMPACT and contact.friction > 0.0
 
 
-def contact_size(contact: Contact) -> int:
+def contact_size(contact: PlainContact) -> int:
     """(s, gamma); then (psi, eta 2, beta 2) for the cone, (slack, psi, s_beta 4, beta 4) for the pyramid."""
     if not frictional(contact):
         return 2
     return 12 if contact.law == LINEAR else 7
 
 
-def central_path(contact: Contact, gap: float, slip: Array, kappa: float) -> Array:
+def central_path(contact: PlainContact, gap: float, slip: Array, kappa: float) -> Array:
     """A point of the cone near the central path at a given gap and slip."""
     s = max(gap, np.sqrt(kappa))
     gamma, mu = kappa / s, contact.friction

@@ -14,7 +14,7 @@ import numpy as np
 
 from naive import rotation as rot
 from naive.rotation import Array
-from naive.scene import UNIT, ZERO, Joint, Scene, advance, poses, split
+from naive.scene import UNIT, ZERO, PlainJoint, PlainScene, advance, poses, split
 
 Poses = tuple[Array, Array]  # positions (..., nbody, 3), quaternions (..., nbody, 4)
 TINY = 1e-30  # complex step
@@ -59,7 +59,7 @@ def arriving_momentum(inertia: Array, q1: Array, q2: Array, h: float) -> Array:
 # -- joints ------------------------------------------------------------------------------------------------------------
 
 
-def pair(joint: Joint, child: int, z: Poses) -> tuple[Array, Array, Array, Array]:
+def pair(joint: PlainJoint, child: int, z: Poses) -> tuple[Array, Array, Array, Array]:
     """Poses of the parent (the world for -1) and the child."""
     pos, quat = z
     if joint.parent < 0:
@@ -67,7 +67,7 @@ def pair(joint: Joint, child: int, z: Poses) -> tuple[Array, Array, Array, Array
     return pos[..., joint.parent, :], quat[..., joint.parent, :], pos[..., child, :], quat[..., child, :]
 
 
-def separation(joint: Joint, child: int, z: Poses) -> tuple[Array, Array]:
+def separation(joint: PlainJoint, child: int, z: Poses) -> tuple[Array, Array]:
     """Translation and rotation of the child in the joint frame, (..., 3) and (..., 4)."""
     xa, qa, xb, qb = pair(joint, child, z)
     frame = rot.mul(qa, joint.offset)
@@ -80,7 +80,7 @@ def complement(rows: Array) -> Array:
     return np.linalg.svd(rows)[2][len(rows) :] if len(rows) else np.eye(3)
 
 
-def constraint(joint: Joint, child: int, z: Poses) -> Array:
+def constraint(joint: PlainJoint, child: int, z: Poses) -> Array:
     """Constraints of a joint: 3 - ntrans translations and 3 - nrot components of the relative rotation."""
     d, q = separation(joint, child, z)
     rows = [d @ complement(joint.trans_axes).T]
@@ -97,7 +97,7 @@ def constraint(joint: Joint, child: int, z: Poses) -> Array:
     return np.concatenate(rows, axis=-1)
 
 
-def displacement(joint: Joint, child: int, z: Poses, reference: Poses) -> Array:
+def displacement(joint: PlainJoint, child: int, z: Poses, reference: Poses) -> Array:
     """Free motion of a joint from the reference poses: translations, then the rotation vector in the child's axes.
 
     Of a swing, the difference of the rotation vectors from the joint frame.
@@ -113,13 +113,13 @@ def displacement(joint: Joint, child: int, z: Poses, reference: Poses) -> Array:
     return np.concatenate(rows, axis=-1)
 
 
-def displacements(scene: Scene, z: Poses, reference: Poses) -> Array:
+def displacements(scene: PlainScene, z: Poses, reference: Poses) -> Array:
     """All joints, (..., nv)."""
     rows = [displacement(joint, i, z, reference) for i, joint in enumerate(scene.joints)]
     return np.concatenate(rows, axis=-1)
 
 
-def constraints(scene: Scene, z: Poses) -> Array:
+def constraints(scene: PlainScene, z: Poses) -> Array:
     """All joints, (..., 6 nbody - nv)."""
     return np.concatenate([constraint(joint, i, z) for i, joint in enumerate(scene.joints)], axis=-1)
 
@@ -132,7 +132,7 @@ def varied(z: Poses) -> Poses:
     return pos + step[..., :3], rot.mul(rot.exp(step[..., 3:]), quat[None])
 
 
-def spring_impulse(scene: Scene, q1: Array, q2: Array, moved: Array | None, h: float) -> Array:
+def spring_impulse(scene: PlainScene, q1: Array, q2: Array, moved: Array | None, h: float) -> Array:
     """-d(V_d(1,2) + V_d(2,3))/d(joint displacement at 2), (..., nv), [N s, N m s].
 
     moved: the displacements from 2 to 3, (..., nv); None leaves V_d(2,3) out.
@@ -161,7 +161,7 @@ def spring_impulse(scene: Scene, q1: Array, q2: Array, moved: Array | None, h: f
 # -- nodes -------------------------------------------------------------------------------------------------------------
 
 
-def node_momentum(scene: Scene, q: Array, v: Array, h: float) -> Array:
+def node_momentum(scene: PlainScene, q: Array, v: Array, h: float) -> Array:
     """dL_d(1, 2)/dz2 of every body, (nbody, 6): force about and moment about its centre of mass, world axes."""
     q1 = advance(scene, q, -v, h)
     z1, z2 = poses(scene, q1), poses(scene, q)
@@ -174,17 +174,17 @@ def node_momentum(scene: Scene, q: Array, v: Array, h: float) -> Array:
     return p + (free @ pull).reshape(-1, 6)
 
 
-def armatures(scene: Scene) -> Array:
+def armatures(scene: PlainScene) -> Array:
     """Inertia of every coordinate alone, (nv,)."""
     return np.concatenate([np.broadcast_to(joint.armature, joint.nv) for joint in scene.joints])
 
 
-def dampers(scene: Scene) -> Array:
+def dampers(scene: PlainScene) -> Array:
     """Damper of every coordinate, (nv,)."""
     return np.concatenate([np.broadcast_to(joint.damper, joint.nv) for joint in scene.joints])
 
 
-def stiffness(scene: Scene, h: float) -> Array:
+def stiffness(scene: PlainScene, h: float) -> Array:
     """z = h d (M^-1)_dd with all hinges at half a radian and all other coordinates at zero, (nv,)."""
     turned = {0: (), 1: (0.5,), 2: (0.0, 0.0), 3: (1.0, 0.0, 0.0, 0.0)}
     q = np.concatenate([np.r_[np.zeros(len(j.trans_axes)), turned[j.nrot]] for j in scene.joints])
@@ -192,20 +192,20 @@ def stiffness(scene: Scene, h: float) -> Array:
     return h * d * np.diag(np.linalg.inv(mass_matrix(scene, q))) if d.any() else d
 
 
-def lag(scene: Scene, h: float) -> Array:
+def lag(scene: PlainScene, h: float) -> Array:
     """Weight of the velocity before the node in the impulse of a damper, (nv,)."""
     z = stiffness(scene, h)
     return 3.0 * h * dampers(scene) / (6.0 + z + z * z)
 
 
-def damped_mass(scene: Scene, q: Array, h: float) -> Array:
+def damped_mass(scene: PlainScene, q: Array, h: float) -> Array:
     """M + C: maps the velocity of the node to the momentum that arrives there."""
     z = stiffness(scene, h)
     share = 3.0 * z / (6.0 + z + z * z)  # lag/I; a body with nothing but the damper has I v2 = (I - lag) v
     return mass_matrix(scene, q) + np.diag(lag(scene, h) / (1.0 - share))
 
 
-def motion_subspace(scene: Scene, q: Array) -> Array:
+def motion_subspace(scene: PlainScene, q: Array) -> Array:
     """Variations of the bodies per unit of joint displacement, (6 nbody, nv): inverse of the maps by least squares."""
     z = poses(scene, q)
     G = np.imag(constraints(scene, varied(z))).T / TINY
@@ -213,7 +213,7 @@ def motion_subspace(scene: Scene, q: Array) -> Array:
     return np.linalg.solve(np.vstack((G, B)), np.vstack((np.zeros((len(G), len(B))), np.eye(len(B)))))
 
 
-def mass_matrix(scene: Scene, q: Array) -> Array:
+def mass_matrix(scene: PlainScene, q: Array) -> Array:
     """Joint-space inertia, (nv, nv)."""
     S = motion_subspace(scene, q)
     M = np.zeros((6 * len(scene.bodies),) * 2)
@@ -223,7 +223,7 @@ def mass_matrix(scene: Scene, q: Array) -> Array:
     return S.T @ M @ S + np.diag(armatures(scene))
 
 
-def potential(scene: Scene, q: Array) -> float:
+def potential(scene: PlainScene, q: Array) -> float:
     """Gravity and springs at a configuration [J]."""
     total = -sum(b.mass * scene.gravity @ x for b, x in zip(scene.bodies, poses(scene, q)[0], strict=True))
     for joint, a in zip(scene.joints, split(scene, q), strict=True):
@@ -236,21 +236,21 @@ def potential(scene: Scene, q: Array) -> float:
     return float(total)
 
 
-def energy(scene: Scene, q: Array, v: Array, h: float) -> float:
+def energy(scene: PlainScene, q: Array, v: Array, h: float) -> float:
     """v.M v / 2 + V with the velocity v of the node [J]."""
     p = motion_subspace(scene, q).T @ node_momentum(scene, q, v, h).ravel()
     node = np.linalg.solve(damped_mass(scene, q, h), p)
     return float(0.5 * node @ mass_matrix(scene, q) @ node) + potential(scene, q)
 
 
-def momentum(scene: Scene, q: Array, v: Array, h: float) -> Array:
+def momentum(scene: PlainScene, q: Array, v: Array, h: float) -> Array:
     """Linear and angular momentum about the origin, (6,)."""
     p = node_momentum(scene, q, v, h)
     x = poses(scene, q)[0]
     return np.concatenate((p[:, :3].sum(0), (p[:, 3:] + rot.cross(x, p[:, :3])).sum(0)))
 
 
-def start(scene: Scene, q: Array, v: Array, h: float) -> Array:
+def start(scene: PlainScene, q: Array, v: Array, h: float) -> Array:
     """Joint velocities of the interval that ends at q with the velocity v of the node."""
     S, target = motion_subspace(scene, q), damped_mass(scene, q, h) @ v
     nu = np.array(v, dtype=float)

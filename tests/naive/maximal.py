@@ -13,11 +13,11 @@ import numpy as np
 from naive.equations import Step, frictional
 from naive.lagrangian import TINY, displacements
 from naive.rotation import Array
-from naive.scene import LINEAR, Scene, advance
+from naive.scene import LINEAR, PlainScene, advance
 
 
 @dataclass(frozen=True)
-class Solution:
+class NaiveSolution:
     q: Array  # (nq,) next coordinates
     v: Array  # (nv,) joint velocities of the step
     pos: Array  # (nbody, 3) next poses
@@ -89,7 +89,9 @@ def follow(step: Step, y: Array, k: float, kappa: float, tolerance: float) -> tu
         k = max(rate * k_good, kappa)
 
 
-def solve(scene: Scene, q: Array, v: Array, u: Array, h: float, kappa: float, *, tolerance: float = 1e-13) -> Solution:
+def solve(
+    scene: PlainScene, q: Array, v: Array, u: Array, h: float, kappa: float, *, tolerance: float = 1e-13
+) -> NaiveSolution:
     """Path following from a large kappa in the smoothed equations, then Newton on the bilinear ones."""
     step = Step(scene, q, v, u, h)
     count, hard = 0, scene.contacts or scene.limits
@@ -108,7 +110,7 @@ def solve(scene: Scene, q: Array, v: Array, u: Array, h: float, kappa: float, *,
     raise RuntimeError(f"the reference did not solve its step in {count} iterations")
 
 
-def solution(step: Step, y: Array, error: float, count: int) -> Solution:
+def solution(step: Step, y: Array, error: float, count: int) -> NaiveSolution:
     """Unknowns in readable form."""
     parts = np.split(y, np.cumsum(step.sizes)[:-1])
     z3 = step.next_poses(parts[0].reshape(-1, 6))
@@ -117,7 +119,7 @@ def solution(step: Step, y: Array, error: float, count: int) -> Solution:
     forces = [
         step.contact(c, part, z3, 0.0, True)[1][:3] for c, part in zip(step.scene.contacts, parts[2:], strict=False)
     ]
-    return Solution(
+    return NaiveSolution(
         advance(step.scene, step.q2, v, step.h),
         v,
         *z3,

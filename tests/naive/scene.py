@@ -24,13 +24,13 @@ JOINT, WORLD, BODY = 0, 1, 2
 
 
 @dataclass(frozen=True)
-class Body:
+class PlainBody:
     mass: float
     inertia: Array  # (3, 3) about the centre of mass, body axes
 
 
 @dataclass(frozen=True)
-class Joint:
+class PlainJoint:
     parent: int  # body index, -1 for the world
     trans_axes: Array = field(default_factory=lambda: np.zeros((0, 3)))  # free translations, joint frame
     nrot: int = 0  # 0, 1 (about axis), 2 (rotation vector along swing_axes) or 3
@@ -59,7 +59,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Contact:
+class PlainContact:
     body: int
     point: Array = field(default_factory=lambda: ZERO)
     radius: float = 0.0
@@ -77,19 +77,19 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Input:
+class PlainInput:
     kind: int  # JOINT: index is a degree of freedom; WORLD, BODY: index is a body
     index: int
     wrench: Array = field(default_factory=lambda: np.zeros(6))
 
 
 @dataclass(frozen=True)
-class Scene:
-    bodies: Sequence[Body]
-    joints: Sequence[Joint]
-    contacts: Sequence[Contact] = ()
+class PlainScene:
+    bodies: Sequence[PlainBody]
+    joints: Sequence[PlainJoint]
+    contacts: Sequence[PlainContact] = ()
     limits: Sequence[Limit] = ()
-    inputs: Sequence[Input] = ()
+    inputs: Sequence[PlainInput] = ()
     gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
 
     @property
@@ -101,12 +101,12 @@ class Scene:
         return sum(joint.nv for joint in self.joints)
 
 
-def split(scene: Scene, q: Array) -> list[Array]:
+def split(scene: PlainScene, q: Array) -> list[Array]:
     """Coordinates per joint."""
     return np.split(q, np.cumsum([joint.nq for joint in scene.joints])[:-1], axis=-1)
 
 
-def poses(scene: Scene, q: Array) -> tuple[Array, Array]:
+def poses(scene: PlainScene, q: Array) -> tuple[Array, Array]:
     """Positions (nbody, 3) and quaternions (nbody, 4) of the bodies at the joint coordinates q."""
     pos, quat = [], []
     for joint, qj in zip(scene.joints, split(scene, q), strict=True):
@@ -129,7 +129,7 @@ def poses(scene: Scene, q: Array) -> tuple[Array, Array]:
     return np.array(pos), np.array(quat)
 
 
-def advance(scene: Scene, q: Array, v: Array, h: float) -> Array:
+def advance(scene: PlainScene, q: Array, v: Array, h: float) -> Array:
     """q (+) h v, joint by joint; quaternions by the exponential map on the right."""
     out, start = [], 0
     for joint, qj in zip(scene.joints, split(scene, q), strict=True):
@@ -167,17 +167,17 @@ def contact_frame(normal: Any) -> Array:
     return np.array([n, t, rot.cross(n, t)])
 
 
-def from_mechanism(mech: Any) -> Scene:
+def from_mechanism(mech: Any) -> PlainScene:
     """The scene of a `dojo_opt.Mechanism`, from the attributes of its parts."""
     names = [body.name for body in mech.bodies]
-    bodies = [Body(body.mass, np.array(body.inertia)) for body in mech.bodies]
+    bodies = [PlainBody(body.mass, np.array(body.inertia)) for body in mech.bodies]
     joints, limits, dof = [], [], {}
     for j in mech.joints:
         parent = names.index(j.parent) if j.parent in names else -1
         dof[j.name] = sum(other.nv for other in joints)
         points = (np.array(j.parent_point), np.array(j.child_point), np.array(j.orientation))
         joints.append(
-            Joint(
+            PlainJoint(
                 parent,
                 translation_axes(j),
                 j.nrot,
@@ -194,7 +194,7 @@ def from_mechanism(mech: Any) -> Scene:
             limits += [Limit(dof[j.name] + k, s, b) for s, b in zip((1.0, -1.0), bounds, strict=True) if np.isfinite(b)]
     laws = {"impact": IMPACT, "linear": LINEAR, "nonlinear": NONLINEAR}
     contacts = [
-        Contact(
+        PlainContact(
             names.index(c.body), np.array(c.point), c.radius, c.friction, laws[c.law], contact_frame(c.normal), c.height
         )
         for c in mech.contacts
@@ -202,8 +202,8 @@ def from_mechanism(mech: Any) -> Scene:
     inputs = []
     for part in mech.inputs:
         if part.joint is not None:
-            inputs.append(Input(JOINT, dof[part.joint] + part.dof))
+            inputs.append(PlainInput(JOINT, dof[part.joint] + part.dof))
         else:
             wrench = np.concatenate((part.force, part.torque))
-            inputs.append(Input(WORLD if part.frame == "world" else BODY, names.index(part.body), wrench))
-    return Scene(bodies, joints, contacts, limits, inputs, np.array(mech.gravity))
+            inputs.append(PlainInput(WORLD if part.frame == "world" else BODY, names.index(part.body), wrench))
+    return PlainScene(bodies, joints, contacts, limits, inputs, np.array(mech.gravity))

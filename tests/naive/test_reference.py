@@ -9,10 +9,10 @@ from naive import rotation as rot
 from naive import samples
 from naive.equations import Step
 from naive.maximal import jacobian, solve
-from naive.scene import IMPACT, LINEAR, NONLINEAR, Scene, advance, poses
+from naive.scene import IMPACT, LINEAR, NONLINEAR, PlainScene, advance, poses
 
 
-def simulate(scene: Scene, q, v, h: float, steps: int, kappa: float = 1e-6):
+def simulate(scene: PlainScene, q, v, h: float, steps: int, kappa: float = 1e-6):
     """States after every step without inputs."""
     out = [(q, v)]
     for _ in range(steps):
@@ -107,8 +107,8 @@ def test_pendulum_against_ode_order_two():
 @pytest.mark.slow
 def test_momentum_and_energy_of_a_floating_tree(rng):
     tree = samples.quadruped()
-    scene = Scene(tree.bodies, [tree.joints[0]] + [j for j in tree.joints[1:]], gravity=np.zeros(3))
-    soft = Scene(scene.bodies, scene.joints, inputs=tree.inputs, gravity=np.zeros(3))
+    scene = PlainScene(tree.bodies, [tree.joints[0]] + [j for j in tree.joints[1:]], gravity=np.zeros(3))
+    soft = PlainScene(scene.bodies, scene.joints, inputs=tree.inputs, gravity=np.zeros(3))
     q = np.concatenate((rng.normal(size=3), rot.exp(rng.normal(size=3)), np.tile([0.1, 0.7, -1.4], 4)))
     v = rng.normal(size=18)
     before = lag.momentum(soft, q, v, 0.02)
@@ -165,7 +165,7 @@ def test_energy_of_a_spring_is_kept():
         type(j)(j.parent, j.trans_axes, j.nrot, j.axis, j.parent_point, j.child_point, j.offset, j.spring, 0.0, j.rest)
         for j in scene.joints
     ]
-    scene = Scene(scene.bodies, joint)
+    scene = PlainScene(scene.bodies, joint)
     q = np.concatenate(([0.3], rot.exp(np.array([0.2, 0.1, -0.3])), [0.2, 0.1]))
     spread = []
     for h in (0.02, 0.01):

@@ -21,7 +21,7 @@ from support.programs import python
 GAIN = 1.0
 
 
-class Point(NamedTuple):
+class PlanePoint(NamedTuple):
     x: float
     y: float
 
@@ -61,7 +61,18 @@ def around(func: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def test_equal_functions_have_equal_digests() -> None:
-    for value in (2.0, (1, "a"), np.ones(3), Point(1.0, 2.0), Side.LEFT, Side, np.float64(3.0), math.sin, np.cos, abs):
+    for value in (
+        2.0,
+        (1, "a"),
+        np.ones(3),
+        PlanePoint(1.0, 2.0),
+        Side.LEFT,
+        Side,
+        np.float64(3.0),
+        math.sin,
+        np.cos,
+        abs,
+    ):
         assert digest(scaled(value)) == digest(scaled(value)) is not None
     assert digest(scaled(np.ones(3))) == digest(scaled(np.ones(3)))
     assert digest(around(users_kernel(scaled(2.0)))) == digest(around(users_kernel(scaled(2.0)))) is not None
@@ -78,7 +89,7 @@ def test_equal_functions_have_equal_digests() -> None:
         (np.ones(4), np.ones((2, 2))),
         (np.ones((2, 2)), np.asfortranarray(np.ones((2, 2)))),
         (np.ones(2), np.ones(2, dtype=np.float32)),
-        ((1.0, 2.0), Point(1.0, 2.0)),
+        ((1.0, 2.0), PlanePoint(1.0, 2.0)),
         (Side.LEFT, 0),
         (math.sin, math.cos),
         (np.sin, math.sin),

@@ -17,7 +17,7 @@ from sim.contact.collision.cylinder_contacts import choose_on_cylinder, collide_
 from sim.contact.collision.edge_axes import OPEN
 from sim.model.shape_kinds import OUT, Pair, Shape
 from support.collide import arrange, choose, collide_chosen
-from support.solids import PAIRS, Case, distance, features, off_surface, random_case, shapes
+from support.solids import PAIRS, PairCase, distance, features, off_surface, random_case, shapes
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def bar(name: str, measure: str) -> float:
     return BARS[what] if what == "derivative" else ROUNDED.get(name, BARS[what])
 
 
-def chosen(case: Case, R: Floats, r: Floats) -> list[tuple[int, int]]:
+def chosen(case: PairCase, R: Floats, r: Floats) -> list[tuple[int, int]]:
     """The existing contact points at a pose, each with its elements of the shapes."""
     pose = np.ascontiguousarray(R).ravel(), np.ascontiguousarray(r)
     number, out = features(case), np.empty(OUT)
@@ -49,7 +49,7 @@ def chosen(case: Case, R: Floats, r: Floats) -> list[tuple[int, int]]:
     return [(feature, int(code)) for feature, code in enumerate(found) if code != 0]
 
 
-def contact(case: Case, feature: int, code: int, R: Floats, r: Floats) -> Floats:
+def contact(case: PairCase, feature: int, code: int, R: Floats, r: Floats) -> Floats:
     """The kernels' data of a contact point of these elements, (43,)."""
     pose = np.ascontiguousarray(R).ravel(), np.ascontiguousarray(r)
     out = np.empty(OUT)
@@ -60,7 +60,7 @@ def contact(case: Case, feature: int, code: int, R: Floats, r: Floats) -> Floats
     return out
 
 
-def nearest(case: Case, R: Floats, r: Floats) -> Floats:
+def nearest(case: PairCase, R: Floats, r: Floats) -> Floats:
     """The contact point of least distance."""
     outs = (contact(case, feature, code, R, r) for feature, code in chosen(case, R, r))
     return min(outs, key=lambda out: float(out[0]))
@@ -76,7 +76,7 @@ def turn(w: Floats) -> Floats:
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
 
 
-def pose(case: Case, depth: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
+def pose(case: PairCase, depth: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """A random pose of a in the frame of b at which the least distance is -depth."""
     R = turn(rng.normal(size=3) * rng.choice([0.2, 2.0]))
     direction = rng.normal(size=3)
@@ -93,7 +93,7 @@ def pose(case: Case, depth: float, rng: np.random.Generator) -> tuple[Floats, Fl
     return R, high * direction
 
 
-def derivative_error(case: Case, R: Floats, r: Floats) -> float:
+def derivative_error(case: PairCase, R: Floats, r: Floats) -> float:
     """Largest error of d(phi, n, p)/d(twist of a), relative to the largest entry, over all contact points.
 
     Of the elements of the shapes that are in contact at this pose, which a step keeps while it is solved.

@@ -22,7 +22,7 @@ class Shot(NamedTuple):
     residual: float
 
 
-class Trial(NamedTuple):
+class SystemTrial(NamedTuple):
     x: Any
     u: Any
     status: Status
@@ -30,14 +30,14 @@ class Trial(NamedTuple):
     steps: Any = None
 
 
-class Linearization(NamedTuple):
+class SystemLinearization(NamedTuple):
     A: Any
     B: Any
     x_next: Any
     status: Any
 
 
-class System:
+class DiscreteSystem:
     """x = [q; v]; `quaternion` is the address of one free rotation in q, or None."""
 
     nq = nv = nu = 1
@@ -112,7 +112,7 @@ class System:
         return Shot(x, u, Status.SOLVED, T, 0.0)
 
     def horizon(self, knots, substeps=1, limits=None):
-        return Horizon(self, substeps, limits)
+        return SystemHorizon(self, substeps, limits)
 
     def linearize_trajectory(self, xs, us, substeps=1, kappa=None):
         T = len(us)
@@ -134,10 +134,10 @@ class System:
                     step[i] = eps
                     plus, minus = (self.advance(*shift(s), substeps, kappa) for s in (step, -step))
                     out[:, i] = (self.difference(plus, center) - self.difference(minus, center)) / (2 * eps)
-        return Linearization(A, B, x_next, status)
+        return SystemLinearization(A, B, x_next, status)
 
 
-class Horizon:
+class SystemHorizon:
     """The interface of `sim.horizon.Horizon` around a system; it learns nothing from previous steps."""
 
     def __init__(self, system, substeps, limits):
@@ -149,7 +149,7 @@ class Horizon:
     def roll(self, x0, xs, us, kappa, *, k=None, K=None, gaps=None, alpha=1.0, **hints):
         gaps = gaps if alpha < 1.0 else None
         shot = self.system.rollout_feedback(x0, us, xs, k, K, gaps, alpha, self.limits, self.substeps, kappa)
-        return Trial(shot.x, shot.u, shot.status, shot.solved_knots)
+        return SystemTrial(shot.x, shot.u, shot.status, shot.solved_knots)
 
     def linearize(self, xs, us, kappa, guess=None):
         return self.system.linearize_trajectory(xs, us, self.substeps, kappa)
@@ -160,7 +160,7 @@ class Horizon:
         return gaps
 
 
-class DoubleIntegrator(System):
+class DoubleIntegrator(DiscreteSystem):
     """A unit mass on a line, pushed: linear."""
 
     def move(self, x, u, kappa):
@@ -168,7 +168,7 @@ class DoubleIntegrator(System):
         return np.array([x[0] + self.time_step * v, v])
 
 
-class Pendulum(System):
+class Pendulum(DiscreteSystem):
     """A damped point pendulum, angle 0 hanging, torque at the pivot; beyond `too_fast` it cannot be stepped."""
 
     too_fast = np.inf
@@ -180,7 +180,7 @@ class Pendulum(System):
         return np.array([x[0] + self.time_step * v, v])
 
 
-class SmoothedWall(System):
+class SmoothedWall(DiscreteSystem):
     """A unit mass on a line that a wall at 0 keeps out by the force kappa / distance, implicit: smooth contact."""
 
     def move(self, x, u, kappa):
@@ -189,7 +189,7 @@ class SmoothedWall(System):
         return np.array([q, (q - x[0]) / h])
 
 
-class FreeBody(System):
+class FreeBody(DiscreteSystem):
     """Position and attitude of a body with unit mass and inertia; force in world, torque in body axes."""
 
     nq, nv, nu, quaternion = 7, 6, 6, 3

@@ -23,7 +23,7 @@ HEARD = 0.2  # [s] of processor time of each thread within which a call has to a
 _THREADS = os.cpu_count() or 1  # whose processor times are added
 
 
-class Heard(NamedTuple):
+class HeardInterrupt(NamedTuple):
     """The effect of Ctrl-C."""
 
     stop: KeyboardInterrupt | None  # None: the call had ended before
@@ -46,7 +46,7 @@ def at_first_piece(start: Callable[[], None]) -> Iterator[None]:
         interruptible_loops._pieces = before
 
 
-def interrupt(call: Callable[[], Any], after: float, *, in_loop: bool = False) -> Heard:
+def interrupt(call: Callable[[], Any], after: float, *, in_loop: bool = False) -> HeardInterrupt:
     """Send SIGINT to this process so many seconds after `call` has begun, or after its first loop over steps has."""
     sent: list[float] = []
 
@@ -73,7 +73,7 @@ def interrupt(call: Callable[[], Any], after: float, *, in_loop: bool = False) -
     finally:
         timer.cancel()
         signal.signal(signal.SIGINT, before)
-    return Heard(stop, end - sent[0] if stop else 0.0)
+    return HeardInterrupt(stop, end - sent[0] if stop else 0.0)
 
 
 def heard(call: Callable[[], Any], after: float = 0.3) -> Any:

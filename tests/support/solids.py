@@ -37,7 +37,7 @@ def shapes(kind: Pair) -> tuple[Shape, Shape]:
     return Shape[first], Shape[second[0] if second else first]
 
 
-class Case(NamedTuple):
+class PairCase(NamedTuple):
     """Two shapes: sizes (8,) of both and tables of polytopes as `collide` takes them, corners of the polytopes."""
 
     kind: Pair
@@ -46,11 +46,11 @@ class Case(NamedTuple):
     points: tuple[Floats, Floats]
 
 
-def random_case(name: str, rng: np.random.Generator) -> Case:
+def random_case(name: str, rng: np.random.Generator) -> PairCase:
     """A pair of shapes with random sizes."""
     if name not in (*POLYTOPES, *ON_CYLINDERS, *ON_ELLIPSOIDS):
         none = np.zeros((0, 3))
-        return Case(Pair[name.upper()], rng.uniform(0.15, 0.5, 2 * SIZES), np.zeros((1, 4)), (none, none))
+        return PairCase(Pair[name.upper()], rng.uniform(0.15, 0.5, 2 * SIZES), np.zeros((1, 4)), (none, none))
     solids = []
     for word in name.split("_"):
         size = rng.uniform(0.2, 0.5, 3)
@@ -71,19 +71,19 @@ def random_case(name: str, rng: np.random.Generator) -> Case:
         sizes = np.zeros(8)
         sizes[1], sizes[4 : 4 + len(solids[1].sizes())] = radius, solids[1].sizes()
         kind = Pair.POLYTOPE_CYLINDER if isinstance(solids[1], Cylinder) else Pair.POLYTOPE_ELLIPSOID
-        return Case(kind, sizes, table, (table[1 : 1 + int(table[0, 0]), :3], np.zeros((0, 3))))
+        return PairCase(kind, sizes, table, (table[1 : 1 + int(table[0, 0]), :3], np.zeros((0, 3))))
     (a, ra), (b, rb) = (hull_table(solid) for solid in solids)
     sizes = np.array([0.0, ra, 0.0, 0.0, len(a), rb, 0.0, 0.0])
     points = (a[1 : 1 + int(a[0, 0]), :3], b[1 : 1 + int(b[0, 0]), :3])
-    return Case(Pair.POLYTOPE_POLYTOPE, sizes, np.vstack([a, b]), points)
+    return PairCase(Pair.POLYTOPE_POLYTOPE, sizes, np.vstack([a, b]), points)
 
 
-def features(case: Case) -> int:
+def features(case: PairCase) -> int:
     """How many contact points there may be."""
     return count(case.kind, (len(case.points[0]), len(case.points[1])))
 
 
-def support(case: Case, side: int, n: Floats) -> Floats:
+def support(case: PairCase, side: int, n: Floats) -> Floats:
     """Largest n.x over the points x of shape a or b (side 0, 1) about its own origin, for directions n (m, 3)."""
     shape, sizes = shapes(case.kind)[side], case.sizes[SIZES * side :]
     if shape == Shape.POLYTOPE:
@@ -116,7 +116,7 @@ def widest(separation: Callable[[Floats], Floats], rng: np.random.Generator) -> 
     return float(separation(best).max())
 
 
-def distance(case: Case, R: Floats, r: Floats, rng: np.random.Generator) -> float:
+def distance(case: PairCase, R: Floats, r: Floats, rng: np.random.Generator) -> float:
     """Signed distance of the shapes of a pair, from their support functions."""
     if case.kind == Pair.STRING:
         return float(case.sizes[0] - np.linalg.norm(r))
@@ -125,7 +125,7 @@ def distance(case: Case, R: Floats, r: Floats, rng: np.random.Generator) -> floa
     return widest(lambda n: n @ r - support(case, 0, -n @ R) - support(case, 1, n), rng)
 
 
-def off_surface(case: Case, side: int, x: Floats, rng: np.random.Generator) -> float:
+def off_surface(case: PairCase, side: int, x: Floats, rng: np.random.Generator) -> float:
     """Distance of a point from the surface of shape a or b about its own origin."""
     shape = shapes(case.kind)[side]
     if shape == Shape.HALFSPACE:
