@@ -20,7 +20,9 @@ from dojo_opt.report.result import Report
 from sim.derivatives.parameters.damper_inertia_effects import with_damper_inertia
 from sim.derivatives.parameters.parameters import KINDS, all_parameters
 from sim.derivatives.parameters.selection import by_names, select
+from sim.simulator.engines.engine_choice import engine_of
 from sim.simulator.sensitivity import parameter_columns
+from sim.simulator.settings import Settings
 
 REPEATS = 40
 
@@ -40,7 +42,7 @@ def run(args: argparse.Namespace) -> Report:
     """The standing quadruped, over 50 steps (5 quick)."""
     sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.02)
     x, u = sim.neutral(), np.zeros(sim.nu)
-    calls = sim._engine
+    calls = engine_of(sim.model, sim.mechanism, Settings(sim.time_step, sim.kappa, sim.tolerance, sim.max_iterations))
     known = with_damper_inertia(sim.model, all_parameters(sim.mechanism, sim.time_step))
     every, plan = select("benchmark", by_names(known), sim.parameters().names)
     T = 5 if args.quick else 50

@@ -32,7 +32,7 @@ from robustness import TIME_STEPS as EXTREME_STEPS
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Cell, Report, Table
-from sim.model.layout import data_view
+from sim.simulator.state_space import strategy_solves
 from sim.solve.globalization import ATTEMPTS, STRATEGIES, Start
 
 Counts = NDArray[np.int64]
@@ -40,8 +40,7 @@ Counts = NDArray[np.int64]
 
 def solves(sim: Any) -> Counts:
     """(ATTEMPTS,) solutions by strategy of all steps of a simulator so far, and of the parts of its divided steps."""
-    engines = [sim._engine, *getattr(sim._engine, "_engines", {}).values()]
-    return sum((data_view(e._scratch.table()).strategy_solves[:ATTEMPTS] for e in engines), np.zeros(ATTEMPTS, int))
+    return strategy_solves(sim)[:ATTEMPTS]
 
 
 def extreme(states: int, seed: int) -> Iterator[Counts]:

@@ -44,7 +44,8 @@ PAGES = (
     "CHANGELOG.md",
     *(f"docs/{name}.md" for name in ("accuracy", "examples", "guide", "installation", "limitations", "mpc_suites")),
     "docs/numbers.md",
-    "docs/theory/step.md",
+    *(f"docs/theory/{name}.md" for name in ("step", "energy_balance", "inactive_contacts", "active_features")),
+    *(f"docs/theory/{name}.md" for name in ("restitution", "error_control", "dampers")),
 )
 BULKY = (("planning", "settings"),)  # details that nothing quotes, 0.4 MB: not taken to docs/measured
 DIGITS = 6  # significant ones that are kept of what is taken

@@ -52,6 +52,23 @@ _check_own("sim")
 _check_own("solvers")
 
 
+def _inline_html(result: Any) -> str:
+    """The animation of a result in a notebook; its modules are imported when something is drawn."""
+    from dojo_opt.viewer.notebook import inline_html
+
+    return inline_html(result)
+
+
+def _register_drawing() -> None:
+    """Results draw themselves with the viewer: `sim`, below it, does not know it."""
+    from sim import register_drawing  # which loads no other module
+
+    register_drawing(_inline_html)
+
+
+_register_drawing()
+
+
 def _version() -> str:
     from importlib.metadata import PackageNotFoundError, version  # which takes longer than all the rest here
 

@@ -101,7 +101,7 @@ def test_the_memory_is_that_of_the_machine_its_container_and_the_process(monkeyp
         limit.write_text("max\n")
         memory_limit.memory.cache_clear()
         assert 2**20 < memory_limit.memory() < float("inf")
-        with pytest.raises(ValueError, match=r"f\(n\): 1e\+15 of them need at least .* GiB of memory; .* take fewer"):
+        with pytest.raises(ValueError, match=r"f\(n\): 1e\+15 rows need at least .* GiB of memory; .* take fewer"):
             memory_limit.room_for("f(n)", 10**15, 8.0)
     finally:
         memory_limit.memory.cache_clear()

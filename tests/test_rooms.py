@@ -101,9 +101,27 @@ def test_no_module_takes_private_parts_of_others() -> None:
     kinds = (ast.FunctionDef, ast.ClassDef, ast.AsyncFunctionDef, ast.Attribute)
     places = {
         module_name(file): _foreign_private(node for kind in kinds for node in nodes_of(file, kind))
-        for file in files_of(*PACKAGES)
+        for file in files_of(*PACKAGES, "benchmarks", "examples")
     }
     assert {name: texts for name, texts in places.items() if texts and not name.startswith("solvers.compiler")} == {}
+
+
+RANKS = ("solvers", "sim", "dojo_opt", "benchmarks")  # from below
+
+
+def _named_above(package: str, tree: ast.Module) -> list[str]:
+    """Modules of the packages above that strings name, as for `import_module`; docstrings are longer."""
+    above = "|".join(RANKS[RANKS.index(package) + 1 :]) or "nothing"
+    name = re.compile(rf"(?:{above})(?:\.\w+)*")
+    texts = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    return [text for text in texts if name.fullmatch(text) and "." in text]
+
+
+def test_no_string_names_a_module_of_a_package_above() -> None:
+    """`import_module` of a string would be an import that the contracts do not see."""
+    assert _named_above("sim", ast.parse("import_module('dojo_opt.viewer.notebook')")) == ["dojo_opt.viewer.notebook"]
+    found = {module_name(file): _named_above(file.relative_to(ROOT).parts[0], tree) for file, tree in modules().items()}
+    assert {name: texts for name, texts in found.items() if texts} == {}
 
 
 def test_files_that_docstrings_name_exist() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+import sim
 
 LETTERS = 1500
 
@@ -61,6 +62,13 @@ def test_tables_for_notebooks_are_short_and_escaped(objects):
     many = dataclasses.replace(study, outcomes=[hostile] * 300)
     assert "<script>" not in many._repr_html_() and "&lt;script&gt;" in many._repr_html_()
     assert "and 250 more" in many._repr_html_()
+
+
+def test_mechanisms_are_drawn_by_the_function_that_is_registered(monkeypatch):
+    mech = dojo.models.pendulum()
+    assert "<iframe" in mech._repr_html_()
+    monkeypatch.setattr(sim, "_registered", [])  # the simulation alone
+    assert mech._repr_html_().startswith("<p>Mechanism(")
 
 
 FIXED = {  # a few numbers each, however large the robot; or nothing that a user gets

@@ -150,7 +150,7 @@ def check_length(call: str, sim: Simulator, steps: float, remedy: str) -> None:
     """
     if not steps <= _LONGEST:
         raise ValueError(f"{call}: expected at most {_LONGEST:,} time steps, got {steps:.6g}: {remedy}")
-    check_room(call, int(steps), 8.0 * (sim.nx + sim.ndx * (sim.ndx + sim.nu)), remedy)
+    check_room(call, int(steps), 8.0 * (sim.nx + sim.ndx * (sim.ndx + sim.nu)), remedy, "time steps")
 
 
 def assemble(sim: Simulator, name: str, base: Floats, feet: Floats, contact: Flags, *, names: tuple[str, ...]) -> Gait:

@@ -360,7 +360,7 @@ def identify(
     check_executor(call, executor)
     known = Prior(space, checks.mapping(f"{call}(prior=...)", prior))
     windows = cut_windows(sim, trajectories, o.window, space.past)
-    count = room_for(f"{call}(fits=...)", fits, 8.0 * sum(w.x.size for w in windows))
+    count = room_for(f"{call}(fits=...)", fits, 8.0 * sum(w.x.size for w in windows), noun="fits")
     first = _first_values(space, known, count, checks.whole_number(f"{call}(seed=...)", seed, 0))
     calls = [(space, windows, deviations, o, known, values) for values in first]
     found = list(results_in_order(_fitted, calls, executor))

@@ -67,7 +67,7 @@ def evaluate(
     task = getattr(policy, "task", None)
     if task is None:
         raise ValueError(f"evaluate(policy): expected a policy with a task, got {policy!r}")
-    count = room_for("evaluate(episodes)", episodes, 8.0 * (task.nx + task.observations) + _EPISODE)
+    count = room_for("evaluate(episodes)", episodes, 8.0 * (task.nx + task.observations) + _EPISODE, noun="episodes")
     model = Drawn.of(task)
     if substeps is not None:
         steps = whole_number("evaluate(substeps=...)", substeps)

@@ -61,7 +61,8 @@ class Network:
         for size in sizes:
             checks.whole_number("Network(sizes)", size)
         checks.one_of("Network(activation=...)", self.activation, ACTIVATIONS)
-        check_room("Network(sizes)", max(sizes) ** 2, 8.0, "choose smaller layers")  # orthogonal weights are squares
+        # orthogonal weights are squares
+        check_room("Network(sizes)", max(sizes) ** 2, 8.0, "choose smaller layers", "weights")
 
     @property
     def count(self) -> int:

@@ -72,7 +72,9 @@ class Randomization:
             if not 0.0 < low <= high:
                 raise ValueError(f"Randomization(kappa=...): expected 0 < low <= high, got {self.kappa}")
         checks.number("Randomization(noise=...)", self.noise, at_least=0.0)
-        room_for("Randomization(models=...)", self.models, 8.0 * (1 + len(self.values) + len(self.factors)))
+        room_for(
+            "Randomization(models=...)", self.models, 8.0 * (1 + len(self.values) + len(self.factors)), noun="models"
+        )
         check_pushes("Randomization", self.pushes)
 
 

@@ -51,7 +51,8 @@ class VectorEnvironment(VectorEnv if gymnasium else object):  # type: ignore[mis
             raise ValueError(
                 f"VectorEnvironment(autoreset_mode=...): expected an AutoresetMode, got {checks.shown(autoreset_mode)}"
             )
-        self.task, self.num_envs = task, room_for("VectorEnvironment(num_envs=...)", num_envs, 8.0 * task.nx + 1000.0)
+        self.task, each = task, 8.0 * task.nx + 1000.0
+        self.num_envs = room_for("VectorEnvironment(num_envs=...)", num_envs, each, noun="environments")
         mode = AutoresetMode.NEXT_STEP if autoreset_mode is None else AutoresetMode(autoreset_mode)
         self.metadata = {**type(self).metadata, "autoreset_mode": mode}
         limit = task.steps if max_episode_steps is None else max_episode_steps

@@ -19,7 +19,7 @@ def box_chain(
     joint: kind of all joints; axes: theirs, in turn; size: length, width, height [m]; spring and damper of
     each joint. ValueError: n is not a whole number of boxes; the message names `call`.
     """
-    n = room_for(f"{call}(n)", n, LINK_BYTES)
+    n = room_for(f"{call}(n)", n, LINK_BYTES, noun="bodies")
     links = [Body(f"link_{i}", mass, shape=Box(*size)) for i in range(n)]
     front, rear = (size[0] / 2, 0.0, 0.0), (-size[0] / 2, 0.0, 0.0)
     joints = [Joint("floating", None, "link_0", name="base")]

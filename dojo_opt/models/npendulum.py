@@ -50,7 +50,7 @@ def npendulum(
     Raises:
         ValueError: for an argument out of range; the message names the part.
     """
-    n = room_for("npendulum(n)", n, LINK_BYTES)
+    n = room_for("npendulum(n)", n, LINK_BYTES, noun="bodies")
     half = (0.0, 0.0, length / 2)
     below = (0.0, 0.0, -length / 2)
     pivot = (0.0, 0.0, 1.1 * n * length)

@@ -45,7 +45,7 @@ def nslider(
     Raises:
         ValueError: for an argument out of range; the message names the part.
     """
-    n = room_for("nslider(n)", n, LINK_BYTES)
+    n = room_for("nslider(n)", n, LINK_BYTES, noun="bodies")
     rods = [Body(f"rod_{i}", mass, shape=Cylinder(radius, length)) for i in range(n)]
     top = (0.0, 0.0, length / 2)
     rails = [

@@ -45,7 +45,7 @@ def orbital(
     Raises:
         ValueError: for an argument out of range; the message names the part.
     """
-    n = room_for("orbital(n)", n, LINK_BYTES, least=2)
+    n = room_for("orbital(n)", n, LINK_BYTES, least=2, noun="bodies")
     upper, lower = (0.0, 0.0, length / 2), (0.0, 0.0, -length / 2)
     links = [Body(f"link_{i}", mass, shape=Box(width, width, length)) for i in range(n)]
     joints = [Joint("fixed", None, "link_0", name="joint_0", child_point=upper)]

@@ -61,7 +61,7 @@ def multi_start(
             any.
     """
     numbers = problem.horizon * (problem.sim.nx + problem.sim.nu * (2 + problem.sim.ndx))  # x, u, k, K of a plan
-    room_for("ilqr(starts=...)", starts, 8.0 * numbers)
+    room_for("ilqr(starts=...)", starts, 8.0 * numbers, noun="starts")
     controls, _, warm_start = guess
     center = problem.controls0 if warm_start is None else warm_start.u
     center = center if controls is None else problem.check_controls("ilqr(controls=...)", controls)

@@ -10,9 +10,10 @@ from typing import Any, cast
 import numpy as np
 
 from dojo_opt.planning.options import Options
+from sim import drawn
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
-from sim.mechanism.short_repr import drawn, short_table
+from sim.mechanism.short_repr import short_table
 from sim.simulator.motion_file import archived, export, opened, restored
 from sim.simulator.npz_file import check_head, check_shapes, reading, write_npz
 from sim.simulator.results import FeedbackRollout

@@ -175,7 +175,7 @@ class Problem:
         """Refuse a horizon whose derivatives alone are larger than the memory of the machine."""
         size = self.sim.ndx + self.sim.nu
         each = 8.0 * (2 * self.sim.ndx * size + 2 * size**2)  # A, B, twice; H, and its copy
-        check_room("Problem(horizon=...)", self.horizon + 1, each, "plan fewer knots, and go on from the last")
+        check_room("Problem(horizon=...)", self.horizon + 1, each, "plan fewer knots, and go on from the last", "knots")
 
     def refined(self, count: int = 5) -> Problem:
         """The same problem with shorter time steps: same knots, inputs and terms, and `refined_constraints`.

@@ -64,7 +64,7 @@ def check_residual(call: str, function: Any, dimension: Any, jacobian: Any, sim:
     ValueError, naming the function, when it fails there, writes into x or u, or leaves an entry of out as it was.
     """
     each = 8.0 * (sim.ndx + sim.nu)  # of the derivative
-    dimension = room_for(f"{call}(dimension=...)", dimension, each)
+    dimension = room_for(f"{call}(dimension=...)", dimension, each, noun="entries")
     first, second = (_tried(f"{call}(function=...)", function, (int(dimension),), sim, poison) for poison in _POISON)
     unset = np.flatnonzero((first == _POISON[0]) & (second == _POISON[1]))
     if unset.size:

@@ -79,7 +79,7 @@ def backflip(
     start, _ = equilibrium(sim)
     still, torques = standing(sim)
     horizon = round(min((_CROUCHED + _PUSH + _flight(height) + _LANDED) / step, 1e300))
-    check_room(f"{call}(height=..., time_step=...): knots", horizon, 8.0 * sim.nx, "flip lower, or with longer knots")
+    check_room(f"{call}(height=..., time_step=...)", horizon, 8.0 * sim.nx, "flip lower, or with longer knots", "knots")
     still_knots = np.arange(max(1, horizon - round(min(_STILL / step, 1e300))), horizon + 1)
     poses = _poses(start, np.linspace(0.0, step * horizon, horizon + 1), distance, height, crouch)
     states = np.tile(still, (horizon + 1, 1))

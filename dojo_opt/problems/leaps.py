@@ -79,7 +79,7 @@ def leap(
     still, torques = standing(sim)
     low, apex, goal = (_moved(start, *by) for by in ((0.0, -crouch), (0.5 * distance, height), (distance, 0.0)))
     horizon = max(5, round(min(duration / step, 1e300)))
-    check_room(f"{call}(duration=...): knots", horizon, 8.0 * sim.nx, "leap in less time, or with longer knots")
+    check_room(f"{call}(duration=...)", horizon, 8.0 * sim.nx, "leap in less time, or with longer knots", "knots")
     down, up = round(0.2 * horizon), round(0.4 * horizon)
     poses = np.array([low] * down + [apex] * up + [goal] * (horizon + 1 - down - up))
     return Problem(

@@ -100,7 +100,7 @@ def push(
     up = (0.0, 0.0, _half(object, np.array([0.0, 0.0, -1.0])))
     forward = way / far
     horizon = max(5, round(min(duration / time_step, 1e300)))
-    check_room(f"{_CALL}(duration=...): knots", horizon, 8.0 * alone.nx, "push in less time, or with longer steps")
+    check_room(f"{_CALL}(duration=...)", horizon, 8.0 * alone.nx, "push in less time, or with longer steps", "knots")
     share = np.clip(np.arange(-1.0, horizon + 1.0) / ((1.0 - _REST) * horizon), 0.0, 1.0)
     moved = -_GAP + (far + _GAP) * _smooth(share)
     hand = up - (_half(object, np.array([-1.0, 0.0, 0.0])) + radius) * forward + moved[:, None] * forward

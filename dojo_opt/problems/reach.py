@@ -78,7 +78,9 @@ def reach(
     substeps = whole_number("problems.reach(substeps=...)", substeps)
     checks.number("problems.reach(duration=...)", duration, above=0.0)
     horizon = max(2, round(min(duration / (time_step * substeps), 1e300)))
-    check_room("problems.reach(duration=...): knots", horizon, 8.0 * sim.nx, "reach in less time, or with longer steps")
+    check_room(
+        "problems.reach(duration=...)", horizon, 8.0 * sim.nx, "reach in less time, or with longer steps", "knots"
+    )
     states = _path(sim, first, found.q, horizon, substeps)
     B = input_map(sim)
     held = np.linalg.lstsq(B, potential_gradient(sim, states[:-1]).T, rcond=None)[0].T

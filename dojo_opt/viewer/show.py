@@ -131,7 +131,7 @@ def show(args: argparse.Namespace) -> int:
         raise ValueError(f"--drop requires a floating base; {mechanism.joints[0].name!r} is {mechanism.joints[0].kind}")
     sim = dojo.Simulator(mechanism, time_step=args.time_step)
     steps = max(1, round(min(args.seconds / args.time_step, 1e300)))
-    check_room("--seconds, --time-step: steps", steps, 8.0 * (sim.nx + sim.nu), "take fewer seconds or longer steps")
+    check_room("--seconds, --time-step", steps, 8.0 * (sim.nx + sim.nu), "take fewer seconds or longer steps", "steps")
     if not args.json:
         print(sim.describe())
         if getattr(mechanism, "report", None) is not None:

@@ -77,7 +77,7 @@ def save_video(
     if not m.time[-1] > 0.0:
         raise ValueError("save_video(result): the motion has no duration; use save_picture")
     count = float(m.time[-1]) * rate / speed
-    check_room("save_video(rate=..., speed=...): pictures", int(min(count, 1e300)), 3.0 * width * height)
+    check_room("save_video(rate=..., speed=...)", int(min(count, 1e300)), 3.0 * width * height, noun="pictures")
     times = np.arange(0.0, m.time[-1] + 0.5 * speed / rate, speed / rate)
     write = _write_gif if target.suffix == ".gif" else _write_mp4
 

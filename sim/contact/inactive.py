@@ -1,32 +1,15 @@
 """The active set of contacts with the ground: the contacts that the interior point solves for.
 
-On the central path a contact is an explicit force law of its gap and slip, gamma = kappa/gap and friction with it. At a
-large gap that force hardly changes within a step. Such a contact is inactive: its impulse is given, like gravity
-(inactive_impulses.py); it is not a variable of the interior point nor in its matrix. Contacts of one body against
-one direction are a cluster, tested as one ball.
-
-Of a cluster that is near, as the corners of a foot, those contacts are inactive whose e, for the n contacts of their
-body, is at most 1e-2: the matrix may omit it, as Newton's method converges all the same. Derivatives may not omit them;
-they take these contacts as active (stiff_contacts.py). Of a cluster of many points, as the corners of a mesh, e may be
-10 each: their stiffness is in the matrix and in the derivatives, as a sum (corner_laws.py). A Go2 that trots on feet of
-32 corners with steps of 2 ms takes 2.5 iterations a step, with 9 to 13 active corners.
-
-As a whole, a cluster is inactive when its stiffness, relative to the inertia behind it, is below the tolerance of the
-step:
+The impulses of inactive contacts are given (inactive_impulses.py). A cluster, the contacts of a body against one
+direction, is inactive if its stiffness, relative to the inertia behind it, is below the tolerance of the step:
 
     e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) <= 1000 tolerance
+    M = 1/m + W^2 (+ 2 spread W/sqrt(J0)),     T = |J^-1/2 (p x f)|/sqrt(J0)
 
-for n contacts (all of the mechanism, so that the sum holds) at the activation gap a, half the gap that is ahead. With W
-the largest |J^-1/2 (r x f)| of a unit impulse f at a contact and J0 the least moment of inertia, M = 1/m + W^2 bounds
-the velocity per impulse, whatever else hangs on the body, and 2 spread W/sqrt(J0) is added for impulses that differ
-within a cluster; T = |J^-1/2 (p x f)|/sqrt(J0), at the mean p of its points, is the turn of their common impulse with
-the body.
-
-The gradient omits the stiffness, at most a part e of the inertia. The tolerance of the step leaves an error of the same
-size: a solution that is off by eps has derivatives that are off by up to sqrt(eps). The step omits no force: at every
-iterate the impulses are those of the law there, up to the tolerance in all (`changes` of inactive_impulses.py bounds
-it, cluster by cluster, from the motion of the body since they were evaluated). A gap below a at the solution activates
-the cluster, and the step is solved again.
+n: contacts of the mechanism, a: half the gap that is ahead, W: largest |J^-1/2 (r x f)| of a unit impulse f, J0: least
+moment of inertia, p: mean point. Contacts of a near cluster are inactive up to e = 1e-2, in derivatives active
+(stiff_contacts.py); of a cluster of many points up to 10, with their stiffness in the matrix (corner_laws.py).
+Derivation: docs/theory/inactive_contacts.md.
 
 Columns of `inactive` and `cluster`: Inactive and Cluster of sim/model/record_columns.py.
 """

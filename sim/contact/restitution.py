@@ -1,30 +1,16 @@
 """Restitution: Moreau's impact law on the velocity of the gap, joined to the condition on the gap itself.
 
-A contact that closes, and whose extrapolated gap is negative, is an impact:
-
     phi2 < phi1,   2 phi2 - phi1 < 0        then   phi3 - phi2 >= -e (phi2 - phi1),   complementary to its impulse
 
-The mean velocities of the gap over the two intervals stand for those before and after, so the body turns back at most
-the way of one step above the ground. It is the usual law, with a floor that impacts raise,
+as a floor that such impacts raise, unless they are slower than max(2 g h, sqrt(kappa / (m h))):
 
     s = phi3 - floor,   s gamma = kappa,      floor = (1 - e) phi2 + e phi1 of an impact, 0 otherwise
 
-so everything else is unchanged, including friction and bodies at rest: they do not approach. An approach
-slower than max(2 g h, sqrt(kappa / (m h))) is not an impact: it would be back within a few steps, or the forces of the
-central path would keep it off the ground. With friction and several contacts Newton's law may feed energy in (Kane's
-example); so does the turning of bodies, of first order in the time step: the impulse acts along the normal at the end
-of the step, the gap changes along those on the way. Where the impulses f of a step did work in all,
+Restitutions are lowered by the same part as long as the impulses f of the step do work in all,
 
-    sum of 1/2 f.(u + u') > 0,     u, u' the relative velocities of the two bodies where f acts, after and before,
+    sum of 1/2 f.(u + u') > 0,     u, u' the relative velocities of the two bodies where f acts, after and before.
 
-its restitutions are lowered, all of them by the same part, and it is solved again, until they do none: without
-restitution they do not.
-
-The impulses do no work, but the energy at the nodes may change by a part of first order in the time step: an impact is
-somewhere within one. A frictionless chain of three bodies with e = 1 gained up to 1.0e-3 of its energy in two impacts
-at 2 ms, 1.5e-4 at .25 ms, and lost .3 % and .05 % (median of eight falls); between impacts, 1.7e-5 and 3e-7.
-
-Derivatives: restitution_gradient.py.
+Derivation: docs/theory/restitution.md; derivatives: restitution_gradient.py.
 
 Scenes without restitution do not compile these kernels.
 """

@@ -4,20 +4,8 @@ A sub-step of length h from a node is accepted where its estimate e of the error
 
     e <= accuracy h/(1 s)        [m, rad],  accuracy in m and rad per second of motion
 
-order 8    e from the embedded formulas of order 5 and 3 of Dormand and Prince (Hairer, Norsett, Wanner, II.10)
-order 2    e = |q - q'|/2 of two steps of h/2 and one of h, node_step.py; in contact eight times that, with an impact
-           |v - v'| t besides, t the rest of the step, half a second at least
-order 6    that of order 2 along loops and gears, extrapolated_step.py: e of its last two columns, times four
-
-and the next one has the length h (e/allowed)^-1/k times a PI controller's share (Gustafsson, ACM TOMS 17, 1991).
-
-Where a contact or limit is reached, the length is cut: the step that begins after that has a gap of at most accuracy/8,
-so impacts happen at nodes, at their times. Error that a kink in the forces forces on a step at once, as where a block
-comes to rest, is allowed once for all: a twentieth of the accuracy.
-
-No step of order 2 is shorter than the shortest length, whatever its error (`errors` of results sums up the estimates):
-on the central path a contact is a force kappa/(h gap), a spring without damping to steps that are short enough to
-follow it.
+The next one has the length h (e/allowed)^-1/k times a PI controller's share. Where a contact or limit is reached, the
+length is cut, so that impacts happen at nodes. Estimates, kinks and the shortest length: docs/theory/error_control.md.
 
     goal    (8,) columns of AccuracyGoal
 """
@@ -48,7 +36,7 @@ from solvers.types import Vector
 NEAR = -1  # in place of a Status: a contact or limit is near at the end of the step
 
 _SOLVED = int(Status.SOLVED)
-_TOLERANCE_STEP = int(Status.ACCURACY_NOT_REACHED)
+_ACCURACY_NOT_REACHED = int(Status.ACCURACY_NOT_REACHED)
 _NOT_FINITE, _CONTACT_SUNK = int(Status.NOT_FINITE), int(Status.CONTACT_SUNK)
 _KINK, _KINKS = 0.05, 0.2  # error of a step with a kink, and of all in a step, in accuracies
 _INSTANT = 1e-13  # [s] between a landing and the node before it
@@ -152,7 +140,7 @@ def _go_beyond(clock: Vector, h: float, rest: float, shortest: float, status: in
     if clock[Clock.ANY] == 0.0:
         clock[Clock.ANY], clock[Clock.BEYOND] = 1.0, 1.7 * shortest
         return _SOLVED
-    return _TOLERANCE_STEP if status == _SOLVED or status == LANDS else status
+    return _ACCURACY_NOT_REACHED if status == _SOLVED or status == LANDS else status
 
 
 @kernel
@@ -190,7 +178,7 @@ def take_short(
     elif status == _SOLVED:
         clock[Clock.SHORT] = max(min(next_length(h, ratio, 1.0, _power(clock)), 0.9 * h), shortest)
     elif status == LANDS:
-        return _SOLVED if h > _INSTANT else _TOLERANCE_STEP
+        return _SOLVED if h > _INSTANT else _ACCURACY_NOT_REACHED
     elif h <= shortest:
         clock[Clock.BEYOND] = 1.7 * h
     else:

@@ -49,8 +49,8 @@ from solvers.types import Matrix, Vector
 _SOLVED = int(Status.SOLVED)
 _NOT_FINITE = int(Status.NOT_FINITE)
 _SINGULAR = int(Status.SINGULAR)
-_ANGULAR_STEP = int(Status.TURN_TOO_LARGE)
-_ENERGY_STEP = int(Status.ENERGY_GAIN)
+_TURN_TOO_LARGE = int(Status.TURN_TOO_LARGE)
+_ENERGY_GAIN = int(Status.ENERGY_GAIN)
 
 
 @kernel
@@ -108,7 +108,7 @@ def advance(model: Model, data: Data, h: float, u: Vector, x: Vector, tangents: 
     q, v = x[:nq], x[nq:]
     s = model.stage_b.shape[0]
     if not joints_below_turn(model, v, h):
-        return _ANGULAR_STEP
+        return _TURN_TOO_LARGE
     before = node_energy(model, data)
     given = 0.0
     for d in range(v.shape[0]):
@@ -139,11 +139,11 @@ def advance(model: Model, data: Data, h: float, u: Vector, x: Vector, tangents: 
     if not abs(total) < 1e300:
         return _NOT_FINITE
     if not joints_below_turn(model, data.stage_shift, 1.0):
-        return _ANGULAR_STEP
+        return _TURN_TOO_LARGE
     after = node_energy(model, data)
     stored = abs(after[1] - before[1])
     gain = after[0] + after[1] - before[0] - before[1] - given
-    return _ENERGY_STEP if gain > LARGEST_GAIN * max(before[0], stored + abs(given)) else _SOLVED
+    return _ENERGY_GAIN if gain > LARGEST_GAIN * max(before[0], stored + abs(given)) else _SOLVED
 
 
 @kernel

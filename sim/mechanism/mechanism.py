@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim import drawn
 from sim.mechanism import checks
 from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision, shape_by_shape
@@ -27,7 +28,6 @@ from sim.mechanism.renamed import renamed
 from sim.mechanism.self_collisions import self_collisions
 from sim.mechanism.shape_contacts import shape_contacts
 from sim.mechanism.shapes import Solid, Sphere, rotation_matrix
-from sim.mechanism.short_repr import drawn
 from sim.mechanism.terrain import Terrain
 from sim.mechanism.tree import check_axes, check_loops, check_masses, sort_tree
 from sim.mechanism.visual import Visual

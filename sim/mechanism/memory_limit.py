@@ -36,7 +36,7 @@ def memory() -> float:
     return min(bytes_ for bytes_ in found if bytes_ > 0.0)
 
 
-def check_room(call: str, number: int, each: float, remedy: str = "take fewer") -> None:
+def check_room(call: str, number: int, each: float, remedy: str = "take fewer", noun: str = "rows") -> None:
     """Refuse arrays that are larger than the memory.
 
     Args:
@@ -44,18 +44,21 @@ def check_room(call: str, number: int, each: float, remedy: str = "take fewer") 
         number: of rows, steps, knots, runs.
         each: bytes that one of them takes at least.
         remedy: end of the message.
+        noun: their name in the message.
 
     Raises:
         ValueError: they do not fit.
     """
     if number * each > memory():
         raise ValueError(
-            f"{call}: {number:.6g} of them need at least {number * each / 2**30:.3g} GiB of memory; "
+            f"{call}: {number:.6g} {noun} need at least {number * each / 2**30:.3g} GiB of memory; "
             f"{memory() / 2**30:.3g} GiB are available: {remedy}"
         )
 
 
-def room_for(call: str, value: Any, each: float, *, least: int = 1, remedy: str = "take fewer") -> int:
+def room_for(
+    call: str, value: Any, each: float, *, least: int = 1, remedy: str = "take fewer", noun: str = "rows"
+) -> int:
     """A whole number of rows, steps, knots or runs that fit the memory.
 
     Args:
@@ -64,6 +67,7 @@ def room_for(call: str, value: Any, each: float, *, least: int = 1, remedy: str 
         each: bytes that one of them takes at least.
         least: smallest number.
         remedy: end of the message.
+        noun: their name in the message.
 
     Returns:
         The number.
@@ -72,5 +76,5 @@ def room_for(call: str, value: Any, each: float, *, least: int = 1, remedy: str 
         ValueError: it is no whole number, less than `least`, or they do not fit.
     """
     out = whole_number(call, value, least)
-    check_room(call, out, each, remedy)
+    check_room(call, out, each, remedy, noun)
     return out

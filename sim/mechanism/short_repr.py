@@ -5,12 +5,11 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-__all__ = ["short_repr", "short_table", "drawn"]
+__all__ = ["short_repr", "short_table"]
 
 _FEW = 6  # length of the longest array or list that is printed in full
 _LETTERS = 120  # of a part
@@ -45,18 +44,6 @@ def _plain(values: Iterable[Any]) -> bool:
     """Whether there are few, and all of them numbers or words."""
     listed = list(values)
     return len(listed) <= _FEW and all(isinstance(v, str | int | float | np.generic | None) for v in listed)
-
-
-def drawn(result: Any) -> str:
-    """HTML for a notebook: the animation of a motion; "" where the drawing is not installed, or has nothing to draw.
-
-    Drawing is looked up by name: the simulation does not depend on it.
-    """
-    try:
-        inline = import_module("dojo_opt.viewer.notebook")
-        return str(inline.inline_html(result))
-    except (ImportError, TypeError, ValueError, RuntimeError):
-        return ""
 
 
 def short_table(title: str, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

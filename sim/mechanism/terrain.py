@@ -185,7 +185,7 @@ class Terrain:
         margin = 0.5 * edge + _MARGIN * dx
         lines = ((len(jumps) - 1) * depth + 2.0 * margin) / dx + 1.0
         remedy = "choose a wider edge, or less depth"
-        check_room(f"{call}(depth=..., edge=...): grid lines", int(min(lines, 1e300)), 32.0 * len(jumps), remedy)
+        check_room(f"{call}(depth=..., edge=...)", int(min(lines, 1e300)), 32.0 * len(jumps), remedy, "grid lines")
         s = np.arange(-margin, (len(jumps) - 1) * depth + margin + 0.5 * dx, dx)
         t = np.clip((s[:, None] - depth * np.arange(len(jumps))) / edge + 0.5, 0.0, 1.0)
         heights = (t**3 * (10.0 - 15.0 * t + 6.0 * t**2)) @ jumps
@@ -334,7 +334,7 @@ class Terrain:
         spacing, direction = np.asarray(self.spacing), np.asarray(self.direction)
         wider = np.where(np.equal(self.shape, 1), 0.0, np.ceil(radius / spacing) + _MARGIN)
         points = float(np.prod(self.shape + 2.0 * wider))
-        check_room("Terrain.offset(radius): grid points", int(min(points, 1e300)), 64.0, "choose a smaller radius")
+        check_room("Terrain.offset(radius)", int(min(points, 1e300)), 64.0, "choose a smaller radius", "grid points")
         pads = [int(p) for p in wider]
         lines = [d * np.arange(-p, n + p) for n, d, p in zip(self.shape, spacing, pads, strict=True)]
         here = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)

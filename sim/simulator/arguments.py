@@ -100,7 +100,13 @@ class Arguments:
     def check_room(self, method: str, name: str, rows: int, slopes: int) -> None:
         """Refuse more steps than the memory holds: states, inputs, reports, contacts and derivatives."""
         each = self.nx + self.nu + REPORT + CONTACT * self._engine.sizes.ncontact + slopes
-        check_room(f"Simulator.{method}({name})", rows, 8.0 * each, "go on from the last state of shorter parts")
+        check_room(
+            f"Simulator.{method}({name})",
+            rows,
+            8.0 * each,
+            "go on from the last state of shorter parts",
+            "rows or steps",
+        )
 
     def kappa(self, method: str, kappa: float | None) -> float | None:
         """A positive kappa, or None for that of the simulator."""

@@ -90,7 +90,7 @@ def read_npz(call: str, path: str | PathLike[str], name: str = "meta") -> tuple[
     added = file.with_name(f"{file.name}.npz")
     file = added if not file.exists() and added.exists() else file
     with file.open("rb") as opened, ZipFile(opened) as members:
-        check_room(f"{call}: {path}: bytes", sum(member.file_size for member in members.infolist()), 1.0, "damaged?")
+        check_room(f"{call}: {path}", sum(m.file_size for m in members.infolist()), 1.0, "damaged?", "bytes")
     with np.load(file, allow_pickle=False) as data:
         arrays = {key: data[key] for key in data.files}
     head = json.loads(str(arrays.pop(name)))

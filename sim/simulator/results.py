@@ -15,13 +15,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from sim import drawn
 from sim.contact.collision.witness import ABSENT
 from sim.contact.pairs.limited_reach import BEYOND
 from sim.integrators.feedback import Path
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.renamed import renamed
-from sim.mechanism.short_repr import drawn, short_repr
+from sim.mechanism.short_repr import short_repr
 from sim.model.record_columns import ContactRow, StepReport
 from sim.model.state_columns import BodyState
 from sim.simulator.motion_file import archived, contact_rows, export, opened, restored, with_new_names

@@ -23,11 +23,23 @@ from sim.simulator.results import fastest_body, status_message
 from sim.simulator.settings import Settings
 from sim.simulator.task_space.task_space import TaskSpace
 from solvers.status import Status
-from solvers.types import Floats
+from solvers.types import Floats, Integers
 
 if TYPE_CHECKING:
     from sim.derivatives.parameters.parameters import Parameters
     from sim.simulator.simulator_parameters import SimulatorParameters
+
+
+def strategy_solves(space: StateSpace) -> Integers:
+    """Solutions by start strategy (solve/globalization.py) of all steps of a simulator so far, of this thread.
+
+    Args:
+        space: the simulator.
+
+    Returns:
+        (64,) numbers, those of the parts of divided steps included.
+    """
+    return space._engine.strategy_solves()
 
 
 class StateSpace:

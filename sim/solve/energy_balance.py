@@ -1,38 +1,17 @@
 """The energy balance of a solved step, which distinguishes the solution that continues the motion from others.
 
-The equations of a step have several solutions. One is reached as the step grows from zero; in others, bodies turn far,
-and constraints that do no work along the motion do work along arcs: joints and impulses of contacts wind one another
-up, to any energy. No solution is accepted that gains more than a tenth of the kinetic energy, or a thousandth as a part
-of a divided step.
+A solution is refused if it gains more than a tenth of the kinetic energy, as a part of a divided step a thousandth:
 
     K23 - K12 - W > max(0.09 K, 0.001 |G|) + |D| + slack
-
-K12, K23: kinetic energies at configurations 2 and 3, of the momenta with which the bodies arrive there and half the
-impulses of dampers (dynamics/energy.py). K: that of the node at 2, after half the impulse of gravity, which is what
-`Simulator.kinetic_energy` reports. W: work of gravity, springs and inputs at 2, at the mean of the velocities of
-both intervals. |G|: that of gravity, for motions from rest; |D|: that of the drives, the sum of its parts, each input
-and spring; where contacts make velocities jump against them, as a foot does that is set down, their work is known to
-its size only. Dampers and friction lose. Contacts and limits may give
-
     slack = sum over contacts and limits of gamma max(0, gap3 - gap2)/h + kappa/h
 
-that of those that remove the overlap at the beginning of the step; others have gap2 >= 0 and gamma gap3 = kappa. Loops
-may give the work that closes them if they were open. Where only dampers lose, a simulator that divides steps limits
-losses in the same way: such a step does not follow the motion either.
-
-Each of these energies costs a factorisation of the mass matrix. They are computed if constraints did work,
+K12, K23: kinetic energies at configurations 2 and 3; K: that of the node at 2; W: work of gravity, springs and inputs
+at 2; |G|, |D|: sizes of the work of gravity and of each drive. The energies are computed if constraints did work,
 
     work = sum over bodies of b.(V + V')/2 - sum over dofs of S2^T (subtree sums of w) (v + v')/2 > 0.009 K12 + noise
 
-b, w the wrenches that the momenta of a body leave over without and with those of contacts: the rest, without springs,
-dampers, inputs and limits, is the work of joints, loops and contacts, and none of third order in a motion
-that time steps can follow. It is that of mean velocities, which differs from the gain by a tenth of it where bodies
-turn by a third of a radian: a tenth of the limit decides, as K may be less than K12, and the energies are also computed
-in every step in which a body turns by .3 rad, and in every part of a divided step in which one turns by .1 rad. They
-are skipped if the ground is flat and no body turns by .15 rad, with contacts by .01 rad: of the motions of
-benchmarks/attacks.py, none that is accepted in this way gains a tenth.
-
-Their bound without joints saves factorisations in the many steps that lose energy, or gain less than drives may give.
+b, w: wrenches that the momenta of a body leave over without and with those of contacts; or if bodies turn far.
+Derivation: docs/theory/energy_balance.md.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def test_a_backflip_is_found_and_lands():
 
 
 def test_a_backflip_to_the_moon_is_refused():
-    with pytest.raises(ValueError, match=r"problems.backflip\(height=..., time_step=...\): knots"):
+    with pytest.raises(ValueError, match=r"problems.backflip\(height=..., time_step=...\): .* knots need"):
         problems.backflip(height=1e18)
     with pytest.raises(ValueError, match=r"problems.backflip\(height=...\)"):
         problems.backflip(height=0.0)

@@ -1,22 +1,9 @@
 """The active features of two shapes: the faces, edges and corners in contact. A discrete choice, made once per attempt.
 
-A step finds the pose at its end; the features that touch there are not known before. If they were chosen anew at every
-iterate, gaps and normals would jump, and at a corner that slides over an edge there may be no solution at all. So they
-are chosen where an attempt starts, and kept: the equations are smooth. A solution at which the shapes overlap in other
-features is refused; these become active, and the step is solved again.
-
-If the solution with one set of features overlaps in another set, and the solution with that set overlaps in the first,
-both sets become active.
-
-Only features that did not overlap when the step began are chosen: a contact pushes along its normal at the end of the
-step, and where its two features, extended to lines and planes, had to move apart to get there, it adds energy. That is
-so where they overlapped along the normal at the beginning, and along the one at the end. (Shapes that overlap at the
-beginning have no others; they are pushed out, and that adds energy.) Where a point of a collision with a cylinder is
-lost in this way, and has no other feature, all features of the collision are those of the beginning.
-
-Shapes may slide from one feature to another within a step. The feature that they reach was below the other at the
-beginning, is not chosen, and overlaps in the end. Where several attempts end so (`overlap_allowed`), normals may have
-turned on the way (`left_behind`), and a small overlap is left to the next step.
+They are chosen where an attempt starts, and kept. A solution at which the shapes overlap in other features is refused;
+these become active, and the step is solved again; both sets, if each solution overlaps in the other set. Only features
+that did not overlap when the step began are chosen. A small overlap of a feature that is reached within the step is
+left to the next step (`overlap_allowed`, `left_behind`). Reasons: docs/theory/active_features.md.
 """
 
 from __future__ import annotations

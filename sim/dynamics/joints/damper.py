@@ -1,25 +1,11 @@
 """Dampers: weights of the velocities before and after a configuration, by which a damper is of second order.
 
     impulse = h d nu - lag (nu - v),      lag = 3 h d/(6 + z + z^2),      z = h d/I
+    (M + C) v2 = p,                       C = 3 h d/(6 - 2 z + z^2)
 
-v, nu: velocities of the intervals 1-2 and 2-3; I: the inertia that the damper sees, a constant of the mechanism
-(mechanism/damper_inertia.py). Where h d is small beside I the lag is h d/2, and the damper acts on the mean of both
-velocities: the trapezoidal rule. Where h d is large it acts on nu, as in the implicit method of Euler. A body of the
-inertia I, with nothing but the damper, slows down by
-
-    nu/v = (6 - 2 z + z^2)/(6 + 4 z + 2 z^2 + z^3)
-
-in a step: exp(-z) to third order, positive for every z, and zero in the limit.
-
-The lag is at most h d/2. With a = h d/2 - lag >= 0 the impulse is h d (v + nu)/2 + a (nu - v): a damper that takes
-h d |v + nu|^2/4, and a rotor of inertia a, which keeps its share. So kinetic energy and a v^2/2 together only fall,
-whatever h, d and I are.
-
-In all a damper takes d times the way of a body from it, if the momentum of the body at a node is I v - lag v, with
-half the impulse behind it. The velocity of the node is that of this momentum, I v2 = (I - lag) v, written such that the
-mass matrix M may be any, also one beside which the lag is large:
-
-    (M + C) v2 = p,    C = 3 h d/(6 - 2 z + z^2)        p: momentum that arrives (energy.py)
+v, nu: velocities of the intervals 1-2 and 2-3; v2: velocity of the node, p: momentum that arrives there (energy.py);
+I: the inertia that the damper sees, a constant of the mechanism (mechanism/damper_inertia.py).
+Derivation: docs/theory/dampers.md.
 """
 
 from __future__ import annotations

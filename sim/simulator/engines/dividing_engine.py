@@ -88,13 +88,13 @@ class DividingEngine(Engine):
         self._ended = threading.local()  # `parts`: the engine of the last step of this thread, if that was divided
 
     def undivided(self) -> Engine:
-        """As Engine.whole."""
+        """As Engine.undivided: the engine that refuses steps that fail as a whole."""
         if 1 not in self._engines:
             self._engines[1] = Engine(self.model, self.settings._replace(loss=math.inf))
         return self._engines[1]
 
     def refresh(self) -> None:
-        """As Engine.renew."""
+        """As LinkedModel.refresh, with the engines of the parts."""
         super().refresh()
         for engine in self._engines.values():
             engine.refresh()
@@ -202,6 +202,10 @@ class DividingEngine(Engine):
     def forget_parts(self) -> None:
         """As Engine.forget_parts."""
         self._ended.parts = None
+
+    def strategy_solves(self) -> Integers:
+        """As Engine.strategy_solves, with the parts of divided steps."""
+        return sum((engine.strategy_solves() for engine in self._engines.values()), super().strategy_solves())
 
     def last(self) -> Data:
         """Data of the last step of this thread, or of its last part."""

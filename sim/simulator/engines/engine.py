@@ -402,6 +402,10 @@ class Engine(LinkedModel):
         """Data of the last step of this thread."""
         return data_view(self._scratch.table())
 
+    def strategy_solves(self) -> Integers:
+        """Solutions by start strategy (solve/globalization.py) of all steps of this thread so far, (64,)."""
+        return data_view(self._scratch.table()).strategy_solves.copy()
+
     def open_loops(self) -> list[float]:
         """Gaps of loops, then gears, in the last iterate of this thread [m, or sine of an angle]."""
         ends = self.model.coupling_row[len(self.model.coupling_body) - self.sizes.nloop :]
