@@ -15,7 +15,7 @@ _MAX_CARRIED_STEPS = 16  # steps until poses are computed from coordinates
 
 
 @kernel
-def follows_on(data: Data, q: Vector, v: Vector) -> bool:
+def continues_motion(data: Data, q: Vector, v: Vector) -> bool:
     """Whether (q, v) is where the last step of this motion ended, with its configurations still in `data`."""
     if data.carry.steps[0] == 0:
         return False

@@ -7,7 +7,7 @@ both states describe the same pair of configurations and the maps are inverse to
 
 from __future__ import annotations
 
-from sim.dynamics.displacements import move_back
+from sim.dynamics.displacements import previous_displacements
 from sim.dynamics.joints.coordinates import joint_coordinates
 from sim.dynamics.kinematics import tree_poses
 from sim.model.data import Data
@@ -27,7 +27,7 @@ def node_poses(model: Model, data: Data, h: float, x: Vector) -> None:
     for k in range(3):
         data.origin[k] = 0.0
     tree_poses(model, data, x[:nq])
-    move_back(model, data, h, x[:nq], x[nq:])
+    previous_displacements(model, data, h, x[:nq], x[nq:])
 
 
 @kernel

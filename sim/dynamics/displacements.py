@@ -44,7 +44,7 @@ def parent_move(data: Data, i: int, p: int, move: Matrix, turn: Matrix) -> tuple
 
 
 @kernel
-def tree_moves(model: Model, data: Data, by: Increment, third: bool) -> None:
+def tree_displacements(model: Model, data: Data, by: Increment, third: bool) -> None:
     """Positions of all bodies at configuration 3, or 1, from configuration 2, turns, and unit joint columns.
 
     Fills theta3, pos3, S3, and over the interval 2-3 move and turn; or theta1, pos1, S1, and over the interval 1-2
@@ -91,7 +91,7 @@ def tree_moves(model: Model, data: Data, by: Increment, third: bool) -> None:
 
 @kernel
 def turn_bodies(data: Data, out: Matrix) -> None:
-    """out = R2 + E R2 of all bodies, with the turn matrices of the last `tree_moves`.   out: (nbody, 9)."""
+    """out = R2 + E R2 of all bodies, with the turn matrices of the last `tree_displacements`.   out: (nbody, 9)."""
     for i in range(out.shape[0]):
         E = rows_of(data.turn_matrix, i)
         R = rows_of(data.rot2, i)
@@ -105,9 +105,9 @@ def turn_bodies(data: Data, out: Matrix) -> None:
 
 
 @kernel
-def move_back(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
+def previous_displacements(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
     """Configuration 1, and the interval 1-2, of the state (q, v) whose configuration 2 is in `data`."""
-    tree_moves(model, data, Increment(q, v, -h), False)
+    tree_displacements(model, data, Increment(q, v, -h), False)
     turn_bodies(data, data.rot1)
     for i in range(data.move_in.shape[0]):  # from 2 to 1 so far
         for k in range(3):

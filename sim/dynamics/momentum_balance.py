@@ -12,8 +12,8 @@ about a fixed axis is right to fourth order) and keeps the barrier at a half tur
 from __future__ import annotations
 
 from sim.dynamics.angular_momentum import angular_momentum, angular_momentum_jacobian
-from sim.dynamics.carry_over import advance, follows_on
-from sim.dynamics.displacements import move_back, tree_moves
+from sim.dynamics.carry_over import advance, continues_motion
+from sim.dynamics.displacements import previous_displacements, tree_displacements
 from sim.dynamics.joints.damper import damper_lag
 from sim.dynamics.joints.joint_motion import Increment
 from sim.dynamics.kinematics import tree_poses
@@ -62,13 +62,13 @@ def begin_step(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vect
     """
     before = (data.origin[0], data.origin[1], data.origin[2])
     place_origin(model, data, q)
-    if follows_on(data, q, v):
+    if continues_motion(data, q, v):
         advance(model, data, h, q, v, before)
         world_inertia(model, data.rot2, data.inertia_world)
     else:
         data.carry.steps[0] = 0
         tree_poses(model, data, q)
-        move_back(model, data, h, q, v)
+        previous_displacements(model, data, h, q, v)
         world_inertia(model, data.rot2, data.inertia_world)
         mean_momenta(model, data, h)
     for i in range(model.body_parent.shape[0]):
@@ -178,7 +178,7 @@ def momentum_balance(model: Model, data: Data, h: float, q: Vector) -> bool:
     False when a body would turn by half a turn or more.   Fills configuration 3, move, turn, momentum_out, balance;
     rotation matrices are left to `turn_bodies`, for the balance has no use for them.
     """
-    tree_moves(model, data, Increment(q, data.nu, h), True)
+    tree_displacements(model, data, Increment(q, data.nu, h), True)
     inside = joints_below_turn(model, data.nu, h)
     for i in range(model.body_parent.shape[0]):
         c, x, y, z = data.turn[i, 0], data.turn[i, 1], data.turn[i, 2], data.turn[i, 3]

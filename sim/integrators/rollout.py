@@ -98,13 +98,15 @@ def begin(data: Data) -> None:
     """Forget the motion before."""
     carry = data.carry
     carry.steps[0] = 0
-    carry.ways_known[0] = 0
+    carry.travel_known[0] = 0
     carry.inactive_kappa[0] = 0.0
     clear(carry.cone_step)
     clear(carry.bound_step)
     clear(carry.dry_step)
     for row in range(carry.couple_force.shape[0]):
         carry.couple_force[row] = 0.0
+    for d in range(carry.next_velocity.shape[0]):
+        carry.next_velocity[d] = 0.0
 
 
 @kernel

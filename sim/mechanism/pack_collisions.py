@@ -37,7 +37,7 @@ def pack_collisions(mech: Mechanism, model: Model) -> None:
 
 
 def _pack_far(found: Sequence[ContactCandidate], model: Model) -> None:
-    """pair_far and body_reach."""
+    """pair_bound and body_reach."""
     firsts = [j for j, candidate in enumerate(found) if candidate.feature == 0]
     if not firsts:
         return
@@ -56,7 +56,7 @@ def _pack_far(found: Sequence[ContactCandidate], model: Model) -> None:
             turning += arm / least if free else np.inf
             model.body_reach[i] = max(model.body_reach[i], arm)
         most = max(degree[i] for i in candidate.bodies if i >= 0)
-        model.pair_far[j] = sum(candidate.radii), *arms, mobility, turning, most, end - j, candidate.reach
+        model.pair_bound[j] = sum(candidate.radii), *arms, mobility, turning, most, end - j, candidate.reach
 
 
 def tables_of(found: Sequence[ContactCandidate]) -> list[Floats]:

@@ -11,7 +11,7 @@ class Carry(NamedTuple):
     """State between the steps of a motion; a new motion clears all of it."""
 
     steps: Integers  # (1,) steps of this motion, 0 where configurations have to be computed, see carry_over.py
-    ways_known: Integers  # (1,) whether pair_clear and body_way are those of this motion
+    travel_known: Integers  # (1,) whether pair_clear and body_travel are those of this motion
     external: Matrix  # (nbody, 6) external force at the centre of mass and torque in this step, world axes [N, N m]
     inactive_kappa: Vector  # (1,) kappa of the impulses of inactive contacts, 0 where none are known
     cone_step: Matrix  # (ncontact, 12) last directions of the cone variables
@@ -140,9 +140,9 @@ class Data(NamedTuple):
     inactive_pose: Matrix  # (nbody, 7) poses where the inactive collisions were evaluated
     inactive_wrench: Matrix  # (nbody, 6) their wrenches about O
     pair_fade: Matrix  # (npair, 2) PairFade: the part of the impulse that acts
-    pair_clear: Vector  # (npair,) at its first pair: last measured distance of the shapes, plus Way.BEFORE then [m]
-    pair_margin: Vector  # (1,) sum of Way of two bodies up to which no other collision comes within its reach [m]
-    body_way: Matrix  # (nbody, 9) Way
+    pair_clear: Vector  # (npair,) at its first pair: last measured distance of the shapes, plus Travel.BEFORE then [m]
+    pair_margin: Vector  # (1,) sum of Travel of two bodies up to which no other collision comes within its reach [m]
+    body_travel: Matrix  # (nbody, 9) Travel
     pair_apart: Matrix  # (npair, 2) Apart of the node, at its first pair, in steps of higher order (pairs/clearance.py)
     pair_trial: Matrix  # (1, 43) last result of `collide`, of a feature pair that is not kept
     pair_frame: Matrix  # (npair, 12) rows n, t1, t2 and the contact point, world axes

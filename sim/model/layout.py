@@ -49,7 +49,7 @@ MODEL_FLOATS = _shapes(
     dof_spring nv, dof_damper nv, dof_seen nv, dof_armature nv, dof_rest nv,
     contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_restitution ncontact,
     contact_frame nground 9, terrain_place nterrain 8, terrain_heights nheight, terrain_rates nheight,
-    contact_height nground, cluster nground 10, pair_sizes npair 8, pair_place 2npair 12, pair_far npair 8,
+    contact_height nground, cluster nground 10, pair_sizes npair 8, pair_place 2npair 12, pair_bound npair 8,
     body_reach nbody, hull nhull 4, loop_point nloop 6, loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9,
     gear_ratio ngear, gear_offset ngear, limit_sign nlimit, limit_bound nlimit, dry_force ndry, dry_middle ndry,
     dry_gain ndry 3,
@@ -57,7 +57,7 @@ MODEL_FLOATS = _shapes(
     """
 )
 
-CARRY_INTS = _shapes("steps 1, ways_known 1")
+CARRY_INTS = _shapes("steps 1, travel_known 1")
 CARRY_FLOATS = _shapes(
     """
     external nbody 6, inactive_kappa 1, cone_step ncontact 12, bound_step nlimit 2, dry_step ndry 4, couple_force nrow,
@@ -98,7 +98,7 @@ DATA_FLOATS = _shapes(
     pair_frame npair 12, pair_trial 1 43,
     pair_before npair 13, pair_activation npair, pair_travel 1, pair_evaluated 1, pair_change 1,
     inactive_pose nbody 7, inactive_wrench nbody 6, pair_fade npair 2, pair_clear npair, pair_margin 1,
-    body_way nbody 9, pair_apart npair 2,
+    body_travel nbody 9, pair_apart npair 2,
     pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
     couple_R nrow 12, couple_E nrow, couple_Y nv 8ncouple, couple_Z 6nbody 8, couple_T nrow 8ncouple,

@@ -237,7 +237,7 @@ class RelativePose(Code):
 
 
 class PairBound(Code):
-    """pair_far: the data that decide whether a collision is active (pairs/inactive_pairs.py), at its first pair."""
+    """pair_bound: the data that decide whether a collision is active (pairs/inactive_pairs.py), at its first pair."""
 
     RADII = 0  # sum of those of the balls around the shapes
     DISTANCE = 1  # (2,) largest distances of the shapes from the centres of mass
@@ -255,8 +255,8 @@ class PairFade(Code):
     RATE = 1  # d(log w)/d(gap)
 
 
-class Way(Code):
-    """body_way: how far points of a body with collisions have moved, at most (pairs/limited_reach.py)."""
+class Travel(Code):
+    """body_travel: how far points of a body with collisions have moved, at most (pairs/limited_reach.py)."""
 
     BEFORE = 0  # since the motion began, along the configurations where steps began
     AHEAD = 1  # in this step, if it is like the one before

@@ -43,7 +43,13 @@ from sim.contact.pairs.cylinder_pairs import (
     cylinder_before,
     cylinder_distance,
 )
-from sim.contact.pairs.inactive_pairs import all_near, begin_pairs, enlist_pairs, far_pair_impulses, pairs_came_near
+from sim.contact.pairs.inactive_pairs import (
+    all_near,
+    begin_pairs,
+    enlist_pairs,
+    inactive_pair_impulses,
+    pairs_activated,
+)
 from sim.contact.pairs.pair_contact import pair_kinematics
 from sim.contact.pairs.pair_energy import pair_slack, pairs_gained
 from sim.contact.pairs.pair_jacobian import pair_rate
@@ -99,11 +105,11 @@ from sim.dynamics.joints.limits import add_limit_derivatives
 from sim.dynamics.joints.servo_gradient import add_drive_derivatives, add_drive_inputs
 from sim.dynamics.joints.swing import swing_curvature, swing_pose, swing_turn
 from sim.dynamics.loops.branch_motion import (
-    is_farther,
-    lead_again,
+    crosses_bifurcation,
+    is_other_branch,
     loops_regular,
-    meet_ahead,
     predict_loops,
+    recompute_bifurcation,
     stay_regular,
 )
 from sim.dynamics.loops.closure import apply_loops, keep_loops, move_loops, start_loops
@@ -197,9 +203,9 @@ _MOTION_OF_LOOPS = (
     loops_regular,
     stay_regular,
     predict_loops,
-    meet_ahead,
-    is_farther,
-    lead_again,
+    crosses_bifurcation,
+    is_other_branch,
+    recompute_bifurcation,
     loops_gained,
     loop_slack,
 )
@@ -215,8 +221,8 @@ _PAIRS = (
     open_pairs,
     begin_pairs,
     enlist_pairs,
-    far_pair_impulses,
-    pairs_came_near,
+    inactive_pair_impulses,
+    pairs_activated,
     pairs_finite,
     pairs_gained,
     pair_slack,

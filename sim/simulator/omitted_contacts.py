@@ -26,7 +26,7 @@ def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDA
         out[first : model.cluster_end[first]] = b + np.sqrt(b * b + 4.0 * c)
     ground = len(model.contact_height)
     for j in np.flatnonzero(model.pair_feature == 0):
-        bound = model.pair_far[j]
+        bound = model.pair_bound[j]
         points, limit = int(bound[PairBound.POINTS]), bound[PairBound.REACH]
         if not np.isfinite(bound[PairBound.MOBILITY]):  # a string, whose gap has no ball around it: always active
             out[ground + j : ground + j + points] = limit

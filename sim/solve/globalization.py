@@ -148,7 +148,7 @@ def from_last_iterate(s: Strategy) -> Strategy:
 
 
 @kernel
-def led(s: Strategy) -> Strategy:
+def with_continuation(s: Strategy) -> Strategy:
     """The repetition of a strategy with its friction smoothing led down step by step."""
     return Strategy(s.start, True, s.undamped, s.features, s.replace_features, s.overlap, s.velocity_fraction, s.growth)
 
@@ -197,7 +197,7 @@ def warm_or_predicted(
     While the same contacts press, velocities change smoothly: a line through the last two often saves an iteration,
     or the prediction.
     """
-    if goes_on(model, data, inputs[1], velocity):
+    if continues_in_contact(model, data, inputs[1], velocity):
         balance = with_last_impulses(model, data, options, inputs, data.carry.next_velocity)
         if balance[0] < _GOES_ON * total_impulse(model, data) and not lands(data):
             return KnownStart(True, options.kappa, balance, _AHEAD)
@@ -208,7 +208,7 @@ def warm_or_predicted(
 
 
 @inlined
-def goes_on(model: Model, data: Data, v: Vector, velocity: Vector) -> bool:
+def continues_in_contact(model: Model, data: Data, v: Vector, velocity: Vector) -> bool:
     """Whether the step follows another one, touches the ground, and has no better guess than its incoming velocity v.
 
     The first step of a motion has other inputs than the one before: its change of velocity says nothing of the next.

@@ -22,7 +22,7 @@ from sim.contact.active_contacts import (
     start_contacts,
 )
 from sim.contact.inactive import choose_active, has_activated
-from sim.contact.pairs.inactive_pairs import begin_pairs, enlist_pairs, far_pair_impulses, pairs_came_near
+from sim.contact.pairs.inactive_pairs import begin_pairs, enlist_pairs, inactive_pair_impulses, pairs_activated
 from sim.contact.pairs.pair_contact import pair_kinematics
 from sim.contact.pairs.pair_stiffness import apply_pairs, condense_pairs
 from sim.contact.restitution import subtract_floors
@@ -73,7 +73,7 @@ def choose_inequalities(model: Model, data: Data, options: StepOptions) -> None:
 @kernel
 def inequalities_activated(model: Model, data: Data) -> bool:
     """Whether inactive contacts have become active at configuration 3; they are from now on."""
-    pairs = pairs_came_near(model, data)
+    pairs = pairs_activated(model, data)
     ground = has_activated(model, data)
     if pairs or ground:
         enlist_pairs(model, data)
@@ -85,7 +85,7 @@ def inequality_kinematics(model: Model, data: Data, h: float) -> None:
     """Gaps and slips of active contacts, impulses of inactive ones, gaps of limits, at configuration 3."""
     contacts_kinematics(model, data, h)
     pair_kinematics(model, data, h)
-    far_pair_impulses(model, data, h, data.carry.inactive_kappa[0])
+    inactive_pair_impulses(model, data, h, data.carry.inactive_kappa[0])
     subtract_floors(model, data)
     limit_gaps(model, data, h)
     dry_kinematics(model, data, h)

@@ -42,9 +42,9 @@ from sim.solve.globalization import (
     Strategy,
     from_last_iterate,
     known_start,
-    led,
     start_on_path,
     strategy,
+    with_continuation,
 )
 from sim.solve.inequalities import choose_inequalities, inequalities_activated
 from sim.solve.merit import Merit, follow, is_near, judge, residuals
@@ -202,7 +202,7 @@ def attempt_known(
     if verdict == Verdict.VALID and out.status == Status.NO_PROGRESS and has_corners(model):
         again = known_start(model, data, options, inputs, guess)
         if again.found:
-            out, verdict = attempt(model, data, options, inputs, led(s), out.iterations, again)
+            out, verdict = attempt(model, data, options, inputs, with_continuation(s), out.iterations, again)
     return out, verdict
 
 

@@ -7,11 +7,11 @@ pose branches meet (bifurcation.py): the motion continues along the one on which
 from __future__ import annotations
 
 from sim.dynamics.loops.branch_motion import (
-    is_farther,
-    lead_again,
+    crosses_bifurcation,
+    is_other_branch,
     loops_regular,
-    meet_ahead,
     predict_loops,
+    recompute_bifurcation,
     stay_regular,
 )
 from sim.model.data import Data
@@ -46,12 +46,12 @@ def solve_loops(
     if predict_loops(model, data, options.h, q, v, guess.velocity):
         guess = Guess(data.loop_velocity, guess.impulses)
     r = _after(r, solve_step(model, data, options, q, v, u, guess))
-    if r.status == Status.SOLVED and meet_ahead(model, data):
+    if r.status == Status.SOLVED and crosses_bifurcation(model, data):
         r = _after(r, solve_step(model, data, options, q, v, u, Guess(data.loop_start, guess.impulses)))
-        if is_farther(model, data, r.status):
+        if is_other_branch(model, data, r.status):
             r = _after(r, solve_step(model, data, options, q, v, u, Guess(data.loop_start, guess.impulses)))
     for _ in range(_LEADS):
-        if r.status != Status.SOLVED or not lead_again(model, data, options.h, q):
+        if r.status != Status.SOLVED or not recompute_bifurcation(model, data, options.h, q):
             break
         r = _after(r, solve_step(model, data, options, q, v, u, Guess(data.loop_velocity, guess.impulses)))
     return r

@@ -116,7 +116,7 @@ def balls(count: int, spacing: float) -> Mechanism:
 def test_far_pairs_are_the_same_as_near_ones(kappa: float) -> None:
     """The law of a far pair is evaluated, not omitted; momentum is kept, and derivatives include all pairs."""
     sim, other = (dojo.Simulator(balls(4, 0.7), time_step=0.01, kappa=kappa, tolerance=1e-11) for _ in range(2))
-    other._engine.model.pair_far[:, 3] = np.inf  # nothing is far for bodies without inertia
+    other._engine.model.pair_bound[:, 3] = np.inf  # nothing is far for bodies without inertia
     x = sim.neutral()
     x[sim.nq :] = np.random.default_rng(0).normal(size=sim.nv)
     runs = [s.rollout(x, np.zeros((10, 0)), throw=True) for s in (sim, other)]

@@ -44,7 +44,7 @@ def _pair_gap(model: Model, data: Data, j: int) -> float:
     """Lower bound of the gaps of the collision that begins at pair j, at configuration 2 [m]."""
     place_shapes(model, data, j, data.pos2, data.rot2)
     x, y, z = three(data.pair_relative[j], RelativePose.CENTER)
-    radii = model.pair_far[j, PairBound.RADII]
+    radii = model.pair_bound[j, PairBound.RADII]
     apart = sqrt(x * x + y * y + z * z) - radii
     return apart if apart > radii else open_pairs(model, data, j)
 
@@ -56,7 +56,7 @@ def _pair_speed(model: Model, data: Data, j: int) -> float:
     for side in range(2):
         i = model.coupling_body[model.pair_coupling[j], side]
         if i >= 0:
-            speed += largest_speed(data, i, model.pair_far[j, PairBound.DISTANCE + side])
+            speed += largest_speed(data, i, model.pair_bound[j, PairBound.DISTANCE + side])
     return speed
 
 
@@ -71,7 +71,7 @@ def omitted_pairs(model: Model, data: Data, kappa: float, h: float) -> float:
         gap, speed, row = _pair_gap(model, data, j), _pair_speed(model, data, j), data.pair_apart[j]
         g = least_gap(gap, speed, row[Apart.GAP], row[Apart.SPEED], h)
         row[Apart.GAP], row[Apart.SPEED] = gap, speed
-        total = total + model.pair_far[j, PairBound.POINTS] * kappa / g if g > 0.0 else 1e300
+        total = total + model.pair_bound[j, PairBound.POINTS] * kappa / g if g > 0.0 else 1e300
         j = end_of(model, j)
     return total
 

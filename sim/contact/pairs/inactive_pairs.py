@@ -13,7 +13,7 @@ for its n points at the activation gap a, half the gap ahead; M and T as in inac
 collisions that one of its bodies has, so that the sum over them holds. A gap below a at the solution activates the
 collision, and the step is solved again. Derivatives take all collisions as active (`all_near`): they are exact.
 
-Columns of model.pair_far: PairBound of sim/model/record_columns.py.
+Columns of model.pair_bound: PairBound of sim/model/record_columns.py.
 """
 
 from __future__ import annotations
@@ -93,11 +93,11 @@ def _begin_pair(model: Model, data: Data, options: StepOptions, j: int) -> float
     place_shapes(model, data, j, data.pos2, data.rot2)
     x, y, z = three(data.pair_relative[j], RelativePose.CENTER)
     travel = _travel(model, data, j)
-    apart = (x * x + y * y + z * z) ** 0.5 - model.pair_far[j, PairBound.RADII]
+    apart = (x * x + y * y + z * z) ** 0.5 - model.pair_bound[j, PairBound.RADII]
     keep_distance(model, data, j, apart)
     if is_beyond(model, data, j):
         return FAR
-    if model.pair_far[j, PairBound.REACH] < 1e300:  # the distance itself takes as long as a step
+    if model.pair_bound[j, PairBound.REACH] < 1e300:  # the distance itself takes as long as a step
         apart = max(apart, _bound(model, data, j))
         keep_distance(model, data, j, apart)
         if is_beyond(model, data, j):
@@ -130,14 +130,14 @@ def _travel(model: Model, data: Data, j: int) -> float:
         if i >= 0:
             for k in range(3):
                 d += abs(data.move_in[i, k])
-                d += 2.0 * model.pair_far[j, PairBound.DISTANCE + side] * abs(data.turn_in[i, 1 + k])
+                d += 2.0 * model.pair_bound[j, PairBound.DISTANCE + side] * abs(data.turn_in[i, 1 + k])
     return d
 
 
 @kernel
 def _far_enough(model: Model, options: StepOptions, j: int, a: float) -> float:
     """a where a collision with this half gap is inactive, its reach where it has no force, 0 where it is active."""
-    f = model.pair_far[j]
+    f = model.pair_bound[j]
     if 2.0 * a >= f[PairBound.REACH]:
         return f[PairBound.REACH]
     mu = model.contact_friction[model.contact_height.shape[0] + j]
@@ -152,7 +152,7 @@ def _far_enough(model: Model, options: StepOptions, j: int, a: float) -> float:
 @kernel
 def _change(model: Model, data: Data, options: StepOptions, j: int, a: float) -> float:
     """Bound of the change of an inactive collision's wrench per displacement d of its bodies; slips change by 2 d/h."""
-    f = model.pair_far[j]
+    f = model.pair_bound[j]
     mu = model.contact_friction[model.contact_height.shape[0] + j]
     lever = 1.0
     for side in range(2):
@@ -165,8 +165,8 @@ def _change(model: Model, data: Data, options: StepOptions, j: int, a: float) ->
     return 2.0 * lever * push * (1.0 + (1.0 + mu + 2.0 * mu * mu / options.h) / a + STEEPEST / f[PairBound.REACH])
 
 
-@optional(Slot.FAR_PAIR_IMPULSES, seldom=True)
-def far_pair_impulses(model: Model, data: Data, h: float, kappa: float) -> None:
+@optional(Slot.INACTIVE_PAIR_IMPULSES, seldom=True)
+def inactive_pair_impulses(model: Model, data: Data, h: float, kappa: float) -> None:
     """Wrenches of the inactive collisions at configuration 3, evaluated again where they may have changed."""
     if data.pair_change[0] == 0.0 or not _moved(model, data):
         return
@@ -231,8 +231,8 @@ def add_inactive_pairs(data: Data) -> None:
             data.wrench[i, k] += data.inactive_wrench[i, k]
 
 
-@optional(Slot.PAIRS_CAME_NEAR, default=False, seldom=True)
-def pairs_came_near(model: Model, data: Data) -> bool:
+@optional(Slot.PAIRS_ACTIVATED, default=False, seldom=True)
+def pairs_activated(model: Model, data: Data) -> bool:
     """Whether an inactive collision has become active at configuration 3; it is active from now on."""
     found = False
     for m in range(data.near_count[0]):
@@ -265,7 +265,7 @@ def _came_within_reach(model: Model, data: Data) -> bool:
     while j < model.pair_kind.shape[0]:
         if data.pair_activation[j] == FAR and not is_beyond(model, data, j):
             place_shapes(model, data, j, data.pos3, data.rot3)
-            reach = model.pair_far[j, PairBound.REACH]
+            reach = model.pair_bound[j, PairBound.REACH]
             if _bound(model, data, j) < reach and distance(model, data, j) < reach:
                 found = True
                 _activate(model, data, j)

@@ -22,7 +22,7 @@ from math import sqrt
 from sim.contact.inactive_bounds import ANGLE
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import PairBound, PairFade, Way, Witness
+from sim.model.record_columns import PairBound, PairFade, Travel, Witness
 from sim.model.shape_kinds import SWAPPED, Pair
 from solvers.compiler import inner_kernel, kernel
 from solvers.rotation import Vec3, rotate
@@ -36,7 +36,7 @@ _HALF_ANGLE = 3.2  # an angle is at most so many times the sine of its half
 @kernel
 def fit_fade(model: Model, data: Data, j: int) -> None:
     """pair_fade of pair j at its present gap."""
-    reach = model.pair_far[j - model.pair_feature[j], PairBound.REACH]
+    reach = model.pair_bound[j - model.pair_feature[j], PairBound.REACH]
     fade = data.pair_fade[j]
     fade[PairFade.PART], fade[PairFade.RATE] = 1.0, 0.0
     t = 2.0 * data.pair_out[j, Witness.GAP] / reach - 1.0
@@ -58,45 +58,45 @@ def with_fade(data: Data, j: int, gap: float, rate: Vec3, p: Vec3) -> Vec3:
 
 @kernel
 def follow_ways(model: Model, data: Data) -> None:
-    """body_way at configuration 2, where a step begins; a new motion forgets the distances of its collisions."""
-    if data.carry.ways_known[0] == 0:
-        data.carry.ways_known[0] = 1
+    """body_travel at configuration 2, where a step begins; a new motion forgets the distances of its collisions."""
+    if data.carry.travel_known[0] == 0:
+        data.carry.travel_known[0] = 1
         data.pair_margin[0] = -1.0
         for j in range(model.pair_kind.shape[0]):
             data.pair_clear[j] = 0.0
-        for i in range(data.body_way.shape[0]):
-            data.body_way[i, Way.BEFORE] = 0.0
+        for i in range(data.body_travel.shape[0]):
+            data.body_travel[i, Travel.BEFORE] = 0.0
             _keep_pose(data, i)
-    for i in range(data.body_way.shape[0]):
+    for i in range(data.body_travel.shape[0]):
         way, ahead, turn, turning = 0.0, 0.0, 0.0, 0.0
         for k in range(3):
-            way += abs(data.pos2[i, k] - data.body_way[i, Way.POSE + k])
+            way += abs(data.pos2[i, k] - data.body_travel[i, Travel.POSE + k])
             ahead += abs(data.move_in[i, k])
             turning += abs(data.turn_in[i, 1 + k])
         for k in range(4):
-            turn += abs(data.quat2[i, k] - data.body_way[i, Way.POSE + 3 + k])
-        data.body_way[i, Way.BEFORE] += way + model.body_reach[i] * ANGLE * turn
-        data.body_way[i, Way.AHEAD] = ahead + model.body_reach[i] * _HALF_ANGLE * turning
+            turn += abs(data.quat2[i, k] - data.body_travel[i, Travel.POSE + 3 + k])
+        data.body_travel[i, Travel.BEFORE] += way + model.body_reach[i] * ANGLE * turn
+        data.body_travel[i, Travel.AHEAD] = ahead + model.body_reach[i] * _HALF_ANGLE * turning
         _keep_pose(data, i)
 
 
 @kernel
 def _keep_pose(data: Data, i: int) -> None:
     for k in range(3):
-        data.body_way[i, Way.POSE + k] = data.pos2[i, k]
+        data.body_travel[i, Travel.POSE + k] = data.pos2[i, k]
     for k in range(4):
-        data.body_way[i, Way.POSE + 3 + k] = data.quat2[i, k]
+        data.body_travel[i, Travel.POSE + 3 + k] = data.quat2[i, k]
 
 
 @kernel
 def follow_step(model: Model, data: Data) -> None:
-    """Way.AHEAD of the solution, configuration 3."""
-    for i in range(data.body_way.shape[0]):
+    """Travel.AHEAD of the solution, configuration 3."""
+    for i in range(data.body_travel.shape[0]):
         ahead, turning = 0.0, 0.0
         for k in range(3):
             ahead += abs(data.move[i, k])
             turning += abs(data.turn[i, 1 + k])
-        data.body_way[i, Way.AHEAD] = ahead + model.body_reach[i] * _HALF_ANGLE * turning
+        data.body_travel[i, Travel.AHEAD] = ahead + model.body_reach[i] * _HALF_ANGLE * turning
 
 
 @kernel
@@ -106,27 +106,27 @@ def _ways(model: Model, data: Data, j: int, column: int) -> float:
     for side in range(2):
         i = model.coupling_body[model.pair_coupling[j], side]
         if i >= 0:
-            total += data.body_way[i, column]
+            total += data.body_travel[i, column]
     return total
 
 
 @kernel
 def keep_distance(model: Model, data: Data, j: int, apart: float) -> None:
     """The shapes of the collision that begins at pair j are so far apart at configuration 2, at least."""
-    data.pair_clear[j] = max(data.pair_clear[j], apart + _ways(model, data, j, Way.BEFORE.value))
+    data.pair_clear[j] = max(data.pair_clear[j], apart + _ways(model, data, j, Travel.BEFORE.value))
 
 
 @inner_kernel
 def _least_clear(model: Model, j: int) -> float:
     """Distance from which on no gap of the collision that begins at pair j is within its reach."""
-    reach = model.pair_far[j, PairBound.REACH]
+    reach = model.pair_bound[j, PairBound.REACH]
     return reach if model.pair_kind[j] % SWAPPED == Pair.POLYTOPE_POLYTOPE else _APART * reach
 
 
 @kernel
 def is_beyond(model: Model, data: Data, j: int) -> bool:
     """Whether the collision that begins at pair j stays beyond its reach on the ways ahead, by the last measurement."""
-    ways = _ways(model, data, j, Way.BEFORE.value) + _ways(model, data, j, Way.AHEAD.value)
+    ways = _ways(model, data, j, Travel.BEFORE.value) + _ways(model, data, j, Travel.AHEAD.value)
     return data.pair_clear[j] - ways > _least_clear(model, j)
 
 
@@ -134,8 +134,8 @@ def is_beyond(model: Model, data: Data, j: int) -> bool:
 def stay_beyond(data: Data) -> bool:
     """Whether all collisions that are beyond their reach stay there, as no two bodies have moved by their margin."""
     first, second = 0.0, 0.0
-    for i in range(data.body_way.shape[0]):
-        way = data.body_way[i, Way.BEFORE] + data.body_way[i, Way.AHEAD]
+    for i in range(data.body_travel.shape[0]):
+        way = data.body_travel[i, Travel.BEFORE] + data.body_travel[i, Travel.AHEAD]
         if not way <= first:
             first, second = way, first
         elif way > second:
@@ -156,7 +156,7 @@ def _balls_apart(model: Model, data: Data, j: int) -> float:
         u, v, w = rotate(data.rot2, b, q[0], q[1], q[2])
         u, v, w = u + data.pos2[b, 0], v + data.pos2[b, 1], w + data.pos2[b, 2]
     x, y, z = x - u, y - v, z - w
-    return sqrt(x * x + y * y + z * z) - model.pair_far[j, PairBound.RADII]
+    return sqrt(x * x + y * y + z * z) - model.pair_bound[j, PairBound.RADII]
 
 
 @kernel
@@ -167,7 +167,7 @@ def sort_pairs(model: Model, data: Data) -> None:
     data.pair_margin[0] = 1e300
     while j < model.pair_kind.shape[0]:
         beyond = is_beyond(model, data, j)
-        if not beyond and model.pair_far[j, PairBound.REACH] < 1e300:
+        if not beyond and model.pair_bound[j, PairBound.REACH] < 1e300:
             keep_distance(model, data, j, _balls_apart(model, data, j))
             beyond = is_beyond(model, data, j)
         if beyond:
@@ -209,11 +209,11 @@ def enlist_near(model: Model, data: Data) -> None:
         if data.pair_activation[j] != FAR:
             data.near_first[n] = j
             n += 1
-        j += int(model.pair_far[j, PairBound.POINTS])
+        j += int(model.pair_bound[j, PairBound.POINTS])
     data.near_count[0] = n
 
 
 @kernel
 def end_of(model: Model, j: int) -> int:
     """End of the points of the collision that begins at pair j."""
-    return j + int(model.pair_far[j, PairBound.POINTS])
+    return j + int(model.pair_bound[j, PairBound.POINTS])

@@ -12,7 +12,7 @@ to 3.
 
 from __future__ import annotations
 
-from sim.dynamics.displacements import tree_moves, turn_bodies
+from sim.dynamics.displacements import tree_displacements, turn_bodies
 from sim.dynamics.joints.joint_motion import Increment
 from sim.dynamics.loops.closure import loop_rows
 from sim.dynamics.loops.constraint_rows import add_along_path
@@ -88,7 +88,7 @@ def _set_rows(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
         for d in range(data.bifurcation_direction.shape[1]):
             data.bifurcation_row[row, d] = 0.0
             data.bifurcation_direction[row, d] = 0.0
-    tree_moves(model, data, Increment(q, v, h), True)
+    tree_displacements(model, data, Increment(q, v, h), True)
     turn_bodies(data, data.rot3)
     _add_directions(model, data.S2, data.couple_B, 1.0, data.bifurcation_row)
     for m in range(model.loop_ntrans.shape[0]):

@@ -87,8 +87,8 @@ def predict_loops(model: Model, data: Data, h: float, q: Vector, v: Vector, gues
     return not given
 
 
-@optional(Slot.LEAD_AGAIN, default=False)
-def lead_again(model: Model, data: Data, h: float, q: Vector) -> bool:
+@optional(Slot.RECOMPUTE_BIFURCATION, default=False)
+def recompute_bifurcation(model: Model, data: Data, h: float, q: Vector) -> bool:
     """Where directions were led, those by the velocity of the solution, which loop_velocity keeps; False elsewhere."""
     if data.bifurcation_count[0] == 0:
         return False
@@ -100,8 +100,8 @@ def lead_again(model: Model, data: Data, h: float, q: Vector) -> bool:
     return True
 
 
-@optional(Slot.MEET_AHEAD, default=False)
-def meet_ahead(model: Model, data: Data) -> bool:
+@optional(Slot.CROSSES_BIFURCATION, default=False)
+def crosses_bifurcation(model: Model, data: Data) -> bool:
     """Whether the solution is closer to the bifurcation than configuration 2, and so may be on another branch.
 
     Then loop_start is a start on the other side of the prediction, and loop_kept the solution.
@@ -115,8 +115,8 @@ def meet_ahead(model: Model, data: Data) -> bool:
     return True
 
 
-@optional(Slot.IS_FARTHER, default=False)
-def is_farther(model: Model, data: Data, status: int) -> bool:
+@optional(Slot.IS_OTHER_BRANCH, default=False)
+def is_other_branch(model: Model, data: Data, status: int) -> bool:
     """Whether the solution is none, or farther from the prediction than the one kept, which loop_start is then."""
     kept = 0.0
     found = 0.0

@@ -15,7 +15,7 @@ from sim.contact.ground_contact import contact_jacobian, contact_kinematics
 from sim.contact.stiff_contacts import take_corners
 from sim.derivatives.parameters.contact_columns import is_active
 from sim.derivatives.step_gradient import gradient
-from sim.dynamics.displacements import tree_moves, turn_bodies
+from sim.dynamics.displacements import tree_displacements, turn_bodies
 from sim.dynamics.joints.joint_motion import Increment
 from sim.dynamics.kinematics import displace, tree_poses, velocity_columns
 from sim.integrators.rollout import options_of
@@ -47,7 +47,7 @@ def interval_of(model: Model, data: Data, h: float, x: Vector) -> None:
         data.origin[k] = 0.0
     displace(model, x[:nq], x[nq:], -h, data.theta1)
     tree_poses(model, data, data.theta1)
-    tree_moves(model, data, Increment(data.theta1, x[nq:], h), True)
+    tree_displacements(model, data, Increment(data.theta1, x[nq:], h), True)
     turn_bodies(data, data.rot3)
     velocity_columns(model, data.S3, x[nq:], h, data.S3nu)
 
