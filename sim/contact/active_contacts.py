@@ -183,6 +183,17 @@ def recover_contacts(model: Model, data: Data, gap_fraction: float) -> None:
         recover_contact(model, data, c, rate, gap_fraction)
 
 
+@optional(Slot.LANDS, default=False)
+def lands(model: Model, data: Data) -> bool:
+    """Whether a contact that does not press yet has reached the ground at the trial velocity."""
+    for m in range(data.active_ground_count[0]):
+        c = data.active[m]
+        z = data.cone[c]
+        if data.contact_kin[c, Kin.GAP] < 0.0 and z[Cone.IMPULSE] < z[Cone.SLACK]:
+            return True
+    return False
+
+
 @optional(Slot.KEEP_CONTACTS)
 def keep_contacts(model: Model, data: Data) -> None:
     """Remember the cone variables from which the line search starts."""

@@ -17,7 +17,7 @@ from __future__ import annotations
 from sim.contact.terrain_contact import place_on_terrain, turn_on_terrain
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import Cone, Kin
+from sim.model.record_columns import Kin
 from solvers.compiler import kernel
 from solvers.rotation import cross, put_three, rotate, three, transposed_times
 from solvers.types import Matrix, Vector
@@ -169,14 +169,3 @@ def contact_rate(model: Model, data: Data, c: int) -> tuple[float, float, float]
     k = data.contact_kin[c]
     t = data.twist[model.contact_body[c]]
     return _rate(k, 0, t), _rate(k, 1, t), _rate(k, 2, t)
-
-
-@kernel
-def lands(data: Data) -> bool:
-    """Whether a contact that does not press yet has reached the ground at the trial velocity."""
-    for m in range(data.active_ground_count[0]):
-        c = data.active[m]
-        z = data.cone[c]
-        if data.contact_kin[c, Kin.GAP] < 0.0 and z[Cone.IMPULSE] < z[Cone.SLACK]:
-            return True
-    return False

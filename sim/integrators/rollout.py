@@ -103,10 +103,9 @@ def begin(data: Data) -> None:
     clear(carry.cone_step)
     clear(carry.bound_step)
     clear(carry.dry_step)
-    for row in range(carry.couple_force.shape[0]):
-        carry.couple_force[row] = 0.0
-    for d in range(carry.next_velocity.shape[0]):
-        carry.next_velocity[d] = 0.0
+    for numbers in (carry.couple_force, carry.next_velocity):
+        for k in range(numbers.shape[0]):
+            numbers[k] = 0.0
 
 
 @kernel

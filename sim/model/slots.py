@@ -233,3 +233,5 @@ class Slot(Code):
     CYLINDER_APART = 186
     # nodes of extrapolated steps with closed loops and gears
     CLOSE_NODE = 187
+    # the start of a step: whether contacts begin within it
+    LANDS = 189

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.contact.ground_contact import lands
+from sim.contact.active_contacts import lands
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice, Guess, StepOptions
@@ -170,16 +170,12 @@ def known_start(
     q, v, u = inputs
     h = options.h
     kappa = options.kappa
-    if (
-        data.active_count[0] + model.limit_dof.shape[0] + model.dry_dof.shape[0] == 0
-    ):  # nothing to be on the central path of
+    if data.active_count[0] + model.limit_dof.shape[0] + model.dry_dof.shape[0] == 0:  # without a central path
         if set_trial_velocity(model, data, h, q, guess.velocity, 1.0):
             return KnownStart(True, kappa, residuals(model, data, h, q, v, u), 1.0)
         return KnownStart(False, kappa, INFEASIBLE, 1.0)
     keep_inequalities(model, data)
-    if (
-        guess.impulses and data.active_count[0] == data.active_ground_count[0]
-    ):  # pairs may have other points than before
+    if guess.impulses and data.active_count[0] == data.active_ground_count[0]:  # pairs may have other points now
         if predictable(model, data):
             start = warm_or_predicted(model, data, options, inputs, guess.velocity)
             if start.found:
@@ -199,7 +195,7 @@ def warm_or_predicted(
     """
     if continues_in_contact(model, data, inputs[1], velocity):
         balance = with_last_impulses(model, data, options, inputs, data.carry.next_velocity)
-        if balance[0] < _GOES_ON * total_impulse(model, data) and not lands(data):
+        if balance[0] < _GOES_ON * total_impulse(model, data) and not lands(model, data):
             return KnownStart(True, options.kappa, balance, _AHEAD)
     balance = with_last_impulses(model, data, options, inputs, velocity)
     if balance[0] < 1e300 and balance[0] > _GOES_ON * total_impulse(model, data):
