@@ -85,7 +85,7 @@ def test_derivatives_of_a_knot_are_chained_over_its_steps():
     def end(dx, du):
         moved, pushed = xs.copy(), us.copy()
         moved[0], pushed[0] = hop.sim.integrate(xs[0], dx), us[0] + du
-        return hop.sim.difference(solver._rollout(moved, pushed, None, None, None, 1.0)[0][1], xs[1])
+        return hop.sim.difference(solver.rollout(moved, pushed, None, None, None, 1.0)[0][1], xs[1])
 
     eps, still, idle = 1e-5, np.zeros(hop.sim.ndx), np.zeros(hop.sim.nu)
     for i, dx in enumerate(eps * np.eye(hop.sim.ndx)):

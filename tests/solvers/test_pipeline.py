@@ -15,7 +15,7 @@ from support.programs import python
 SIMULATION = """
 import json, numpy as np, dojo_opt as dojo
 from solvers.compiler.pipeline import FAST
-sim = dojo.Simulator(dojo.models.hopper() if {whole} else dojo.models.pendulum(), 0.02)
+sim = dojo.Simulator(dojo.models.hopper() if {whole} else dojo.models.pendulum(), 0.02, divide={whole})
 x = sim.neutral()
 found = [*sim.maximal(x).ravel(), *sim.integrate(x, 0.3 * np.ones(sim.ndx))]
 if {whole}:
