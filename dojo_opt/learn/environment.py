@@ -133,16 +133,16 @@ class _ProblemEpisode:
     def step(self, action: Vector) -> Outcome:
         """One knot with the input held."""
         t = self._knot
-        if t >= self.problem.horizon:
+        if t >= self.steps:
             raise RuntimeError("Environment.step: the episode is over, or has not begun; call reset()")
         us, plant = self._us, self.plant
-        us[t] = self._middle + self._half * _numbers(action, self.problem.sim.nu)
+        us[t] = self._middle + self._half * _numbers(action, us.shape[1])
         message = plant.hold(us[t], self._substeps)
         self._knot = t + 1
         self._xs[t + 1] = plant.x
         if plant.fallen(plant.x):
             message = "The robot has fallen."
-        over = self._knot == self.problem.horizon
+        over = self._knot == self.steps
         reward = -self._cost(t, self._xs, us) - (self._cost(t + 1, self._xs, us) if over else 0.0)
         info: dict[str, Any] = {"message": message} if message else {}
         if over:
@@ -233,7 +233,8 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
     def step(self, action: Vector) -> Outcome:
         """One action: (observation, reward, terminated, truncated, info)."""
         outcome = self._episode.step(action)
-        self._show()
+        if self.render_mode == "human":
+            self._show()
         return outcome
 
     def _show(self) -> None:

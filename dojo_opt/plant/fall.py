@@ -94,7 +94,8 @@ class FallCheck:
         if not self.applies:
             return False
         upright, height = _posture(self._forms, self._slope, x, self._rotation)
-        return bool(upright < _TILTED or self._above(x, height) < self._lowest)
+        stands = upright >= _TILTED and self._above(x, height) >= self._lowest  # not of a state that is not finite
+        return not stands
 
     def _above(self, x: Vector, height: float) -> float:
         if self._hill is None:

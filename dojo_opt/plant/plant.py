@@ -69,6 +69,7 @@ class Plant:
             raise ValueError(
                 f"Plant(delay=...): expected a multiple of the time step {sim.time_step:g} s, got {p.delay:g} s"
             )
+        self._direct = self.simulator.has_stepper and not self._late and not p.pushes  # commands act as they are given
         x = self.start
         if np.size(p.offset):
             x = sim.integrate(x, checks.array("Plant(offset=...)", p.offset, (sim.ndx,)))
@@ -158,7 +159,7 @@ class Plant:
         Raises:
             ValueError: the shape of the command is wrong, or a number is not finite.
         """
-        if self.simulator.has_stepper and not self._late and not self.perturbation.pushes:
+        if self._direct:
             row = self.simulator.stepper(steps)
             if is_plain(command, (self.nominal.nu,)) and row.advance(self.x, self._within_limits(command)):
                 self.x = row.end.copy()
@@ -195,7 +196,8 @@ class Plant:
         Returns:
             True if it has fallen. Always False for a robot whose base neither floats nor moves in a vertical plane.
         """
-        return self._has_fallen(checks.array("Plant.fallen(x)", x, (self.nominal.nx,)))
+        plain = is_plain(x, (self.nominal.nx,))
+        return self._has_fallen(x if plain else checks.array("Plant.fallen(x)", x, (self.nominal.nx,)))
 
 
 def _spread(call: str, value: ArrayLike, size: int) -> Vector:
