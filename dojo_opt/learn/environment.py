@@ -233,8 +233,7 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
     def step(self, action: Vector) -> Outcome:
         """One action: (observation, reward, terminated, truncated, info)."""
         outcome = self._episode.step(action)
-        if self.render_mode == "human":
-            self._show()
+        self._show()
         return outcome
 
     def _show(self) -> None:
