@@ -33,7 +33,7 @@ from robustness import TIME_STEPS as EXTREME_STEPS
 import dojo_opt as dojo
 from dojo_opt.report.result import Cell, Report, Table
 from sim.simulator.state_space import strategy_solves
-from sim.solve.globalization import ATTEMPTS, STRATEGIES, Start
+from sim.solve.globalization import ATTEMPTS, STRATEGIES, UNKNOWN, Start
 
 Counts = NDArray[np.int64]
 
@@ -103,7 +103,7 @@ def run(args: argparse.Namespace) -> Report:
     report.rows = [
         number("solutions", int(whole.sum())),
         number("by the first strategy", 100.0 * whole[0] / whole.sum(), unit="%"),
-        number("by rescues, the third strategy and later ones", int(whole[2:].sum())),
+        number("by rescues, all but KNOWN and INCOMING", int(whole.sum() - whole[0] - whole[UNKNOWN])),
         number("strategies without a solution", int((whole == 0).sum())),
         number("last strategy with a solution, from 0", int(np.flatnonzero(whole)[-1])),
     ]

@@ -26,7 +26,7 @@ Controller = Callable[[float, Vector], ArrayLike]
 
 __all__ = ["ClosedLoop", "closed_loop", "steps_of"]
 
-_LEVEL = GroundPlane()
+_LEVEL, _SOLVED = GroundPlane(), Status.SOLVED
 _RECORD = 500.0  # bytes of the objects that keep a step
 
 
@@ -181,7 +181,7 @@ def closed_loop(
             raise TypeError(f"closed_loop({name}=...): expected a function, got {checks.shown(function)}")
     run = _LoopRecord([plant.x])
     try:
-        _drive(run, controller, plant, steps, every, plant.fallen if fallen is None else _test(fallen), finished)
+        _drive(run, controller, plant, steps, every, plant.fall_check if fallen is None else _test(fallen), finished)
     except KeyboardInterrupt:
         run.survived, run.message = False, MESSAGES[Status.INTERRUPTED]
         raise Interrupted(_closed_loop(run, controller, plant, reference)) from None
@@ -274,7 +274,7 @@ def _drive(
         run.planes.append(_LEVEL if own is None else own.plane)
         u, result = plant.step(command)
         run.status.append(int(result.status))
-        if result.status != Status.SOLVED:
+        if result.status != _SOLVED:
             run.message, run.survived = f"Plant, step {k}: {MESSAGES[result.status]}", False
             break
         run.contacts.append(result.scene[2])

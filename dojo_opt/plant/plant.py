@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,12 @@ from sim.mechanism import checks
 from sim.simulator.arguments import is_plain
 from sim.simulator.results import StepResult
 from sim.simulator.simulator import Simulator
+from solvers.status import Status
 from solvers.types import Vector
 
 __all__ = ["Plant"]
 
+_SOLVED = Status.SOLVED
 _SOFTER = (10.0, 100.0, 1000.0)  # times the smoothing of a step that is not solved at its own
 
 
@@ -26,7 +29,8 @@ class Plant:
     """A simulated robot that is measured, commanded and pushed.
 
     `simulator` is the perturbed one. It has three more inputs for every body that is pushed. An unsolved step is
-    repeated with softer contact, up to a thousand times its kappa; `softened` counts these steps.
+    repeated with softer contact, up to a thousand times its kappa; `softened` counts these steps. `fall_check` is the
+    function of a state that `fallen` asks, without checks of its argument.
 
     Args:
         sim: mechanism, time step and smoothing of the plant before the perturbation: usually those of the model with a
@@ -76,7 +80,7 @@ class Plant:
         self._x0 = p.on_ground(sim.mechanism, x)
         if p.terrain is not None:
             self._x0 = Feet(self.simulator, self.simulator.mechanism.contact_names).put_down(x)
-        self._has_fallen = FallCheck(self.simulator.mechanism, self._x0, self.normal)
+        self.fall_check = FallCheck(self.simulator.mechanism, self._x0, self.normal)
         self.reset()
 
     def perturbed(self, perturbation: Perturbation) -> Plant:
@@ -129,7 +133,9 @@ class Plant:
         Raises:
             ValueError: the shape of the command is wrong, or a number is not finite.
         """
-        u = self._within_limits(checks.array("Plant.step(command)", command, (self.nominal.nu,)))
+        if not (is_plain(command, (self.nominal.nu,)) and isfinite(command.dot(command))):
+            command = checks.array("Plant.step(command)", command, (self.nominal.nu,))
+        u = self._within_limits(command)
         if self._late:
             self._waiting.append(u)
             late = len(self._waiting) > self._late
@@ -138,9 +144,9 @@ class Plant:
             end = self.time + self.nominal.time_step
             u = np.concatenate([u, self.perturbation.push_forces(self.nominal.mechanism, self.time, end)])
         result = self.simulator.step(self.x, u)
-        if not result.success:
+        if result.status != _SOLVED:
             result = self._soften(u, result)
-            if not result.success:
+            if result.status != _SOLVED:
                 return u, result
         self.x = result.x
         self.steps += 1
@@ -159,13 +165,14 @@ class Plant:
         Raises:
             ValueError: the shape of the command is wrong, or a number is not finite.
         """
-        if self._direct:
+        done = 0
+        if self._direct and is_plain(command, (self.nominal.nu,)):
             row = self.simulator.stepper(steps)
-            if is_plain(command, (self.nominal.nu,)) and row.advance(self.x, self._within_limits(command)):
-                self.x = row.end.copy()
-                self.steps += steps
-                return ""
-        for _ in range(steps):
+            row.advance(self.x, self._within_limits(command))
+            done = row.solved_steps
+            self.x = row.states[done].copy()
+            self.steps += done
+        for _ in range(steps - done):
             _, result = self.step(command)
             if not result.success:
                 return result.message
@@ -197,7 +204,7 @@ class Plant:
             True if it has fallen. Always False for a robot whose base neither floats nor moves in a vertical plane.
         """
         plain = is_plain(x, (self.nominal.nx,))
-        return self._has_fallen(x if plain else checks.array("Plant.fallen(x)", x, (self.nominal.nx,)))
+        return self.fall_check(x if plain else checks.array("Plant.fallen(x)", x, (self.nominal.nx,)))
 
 
 def _spread(call: str, value: ArrayLike, size: int) -> Vector:

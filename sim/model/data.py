@@ -92,8 +92,8 @@ class Data(NamedTuple):
     bifurcation_replaces: Integers  # (1,) 1 where they stand in place of constraints, too
     loop_used: Integers  # (nrow,) scratch
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with active pairs
-    near_count: Integers  # (1,)
-    near_first: Integers  # (npair,) first pairs of the collisions within their reach, see pairs/limited_reach.py
+    near_collision_count: Integers  # (1,)
+    near_collisions: Integers  # (npair,) first pairs of the collisions within their reach, see pairs/limited_reach.py
     couple_live: IntegerMatrix  # (nrow, 2) rows of the system of couplings, with their couplings; see coupling_order.py
     couple_seen: Integers  # (ncouple,) 1 for the active couplings and gears for which order and links hold
     couple_order: Integers  # (ncouple,) the active ones in the order of their elimination

@@ -72,7 +72,7 @@ DATA_INTS = _shapes(
     pair_sides npair, pair_code npair, pair_previous npair,
     feature_choice 1, strategy_solves 64, overlap_allowed 1, bifurcation_count 1, bifurcation_replaces 1,
     loop_used nrow, reach_of nreach,
-    coupling_live ncoupling, near_count 1, near_first npair,
+    coupling_live ncoupling, near_collision_count 1, near_collisions npair,
     couple_live nrow 2, couple_seen ncouple, couple_order ncouple, couple_count 1, node_count 1, couple_degree ncouple,
     couple_dof nv, couple_linked ncouple ncouple, couple_start ncouple+1, node_row ncouple+1,
     node_span ncouple ncouple+2

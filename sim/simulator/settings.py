@@ -14,9 +14,10 @@ from sim.model.record_columns import StepSetting
 from sim.solve.energy_balance import LARGEST_GAIN
 from solvers.types import Vector
 
-__all__ = ["LEAST_ACCURACY", "Settings", "default_kappa", "free_parts", "of_call", "with_accuracy"]
+__all__ = ["LEAST_ACCURACY", "Settings", "checked_settings", "default_kappa", "free_parts", "of_call", "with_accuracy"]
 
 LEAST_ACCURACY = 1e-12  # [m/s, rad/s]
+_ORDERS = (2, 4, 6, 8)
 _CREEP = 1e-9  # [m/s]
 _PUSH = 3e-4  # (speed at which an opening contact is pushed away, over the accuracy)^2
 _FAST = 1e100  # [m/s, rad/s] beyond any speed; its square is a float
@@ -46,6 +47,27 @@ class Settings(NamedTuple):
         level = self.kappa if kappa is None else kappa
         limits = self.max_iterations, inf, self.gain, self.loss, 0.0
         return np.array((self.time_step, level, self.tolerance, *limits), dtype=np.float64)
+
+
+def checked_settings(
+    mechanism: Mechanism,
+    time_step: float,
+    kappa: float | None,
+    tolerance: float,
+    max_iterations: int,
+    order: int,
+    divide: bool,
+) -> Settings:
+    """Settings from arguments of `Simulator`, which describes them; kappa: checked, None for the default."""
+    limit = checks.whole_number("Simulator(max_iterations=...)", max_iterations)
+    if not isinstance(divide, bool | np.bool_):
+        raise TypeError(f"Simulator(divide=...): expected True or False, got {divide!r}")
+    if not isinstance(order, int | np.integer) or order not in _ORDERS:
+        raise ValueError(f"Simulator(order=...): expected one of {_ORDERS}, got {order!r}")
+    h = checks.number("Simulator(time_step=...)", time_step, above=0.0)
+    level = default_kappa(mechanism, h) if kappa is None else kappa
+    residual = checks.number("Simulator(tolerance=...)", tolerance, above=0.0)
+    return Settings(h, level, residual, int(limit), int(order), bool(divide))
 
 
 def of_call(settings: Vector, kappa: float | None, max_iterations: int | None) -> Vector:

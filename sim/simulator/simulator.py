@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace as changed
-from typing import Any
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,40 +15,40 @@ from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory_limit import room_for
 from sim.mechanism.renamed import renamed
-from sim.model.record_columns import StepReport
 from sim.simulator.arguments import is_plain
 from sim.simulator.contact_settings import with_contacts
 from sim.simulator.derivative_results import Gradient, Jacobian, Linearization
-from sim.simulator.engines.engine import REPORT, Rolled
 from sim.simulator.feedback_rollout import Feedback, roll_policy
 from sim.simulator.horizon import Horizon
+from sim.simulator.knot_stepper import KnotStepper
 from sim.simulator.reactions import Reactions, reactions
 from sim.simulator.results import (
-    STATUSES,
     FeedbackRollout,
     RolloutBatch,
     StepResult,
     Trajectory,
     checked,
-    contacts_of,
     converted,
-    reservation,
     states_and_inputs,
-    status_message,
 )
+from sim.simulator.rolled_results import step_result, trajectory
 from sim.simulator.rollout_duration import simulator_for_duration
-from sim.simulator.settings import Settings, default_kappa, with_accuracy
-from sim.simulator.step_batch import BatchStepping
-from solvers.status import Status
+from sim.simulator.row_impulses import RowImpulses
+from sim.simulator.row_steps import RowSteps
+from sim.simulator.settings import checked_settings, with_accuracy
+from sim.simulator.state_space import StateSpace
+from sim.simulator.step_batch import StepBatch
 from solvers.types import Floats
+
+if TYPE_CHECKING:
+    from sim.simulator.linearizer import Linearizer
 
 Wrenches = ArrayLike | Mapping[str, ArrayLike]
 
 _SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order", "divide", "accuracy")
-_ORDERS = (2, 4, 6, 8)
 
 
-class Simulator(BatchStepping):
+class Simulator(StateSpace):
     """A mechanism, a time step, and the accuracy of its steps.
 
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.
@@ -94,17 +95,9 @@ class Simulator(BatchStepping):
     ) -> None:
         if not isinstance(mechanism, Mechanism):
             raise TypeError(f"Simulator(mechanism): expected a Mechanism, got {mechanism!r}")
-        whole_number("Simulator(max_iterations=...)", max_iterations)
-        if not isinstance(divide, bool | np.bool_):
-            raise TypeError(f"Simulator(divide=...): expected True or False, got {divide!r}")
-        if not isinstance(order, int | np.integer) or order not in _ORDERS:
-            raise ValueError(f"Simulator(order=...): expected one of {_ORDERS}, got {order!r}")
-        h = checks.number("Simulator(time_step=...)", time_step, above=0.0)
         self._kappa = None if kappa is None else checks.number("Simulator(kappa=...)", kappa, above=0.0)
-        level = default_kappa(mechanism, h) if self._kappa is None else self._kappa
-        residual = checks.number("Simulator(tolerance=...)", tolerance, above=0.0)
-        settings = Settings(h, level, residual, int(max_iterations), int(order), bool(divide))
-        super().__init__(mechanism, with_accuracy(settings, accuracy, None if self._kappa else mechanism))
+        steps = checked_settings(mechanism, time_step, self._kappa, tolerance, max_iterations, order, divide)
+        super().__init__(mechanism, with_accuracy(steps, accuracy, None if self._kappa else mechanism))
 
     def __reduce__(self) -> Any:
         return Simulator, (self.mechanism, *self._given().values())
@@ -158,23 +151,19 @@ class Simulator(BatchStepping):
         Returns:
             StepResult with the state after the step; for an unsolved step, the state before it.
         """
-        check = self._arguments
         start: Any = x
         control: Any = self._no_input if u is None else u
         plain = self._engine.in_one_kernel and is_plain(start, (self.nx,)) and is_plain(control, (self.nu,))
-        if plain and wrenches is None and (row := self.stepper(1, True)).advance(start, control):
-            return checked(row.last_step(), throw)
-        state, us = check.state("step", x), check.inputs("step", "u", control, (self.nu,))
-        external = None if wrenches is None else check.wrenches("step", wrenches, 1)
+        if plain and wrenches is None:
+            row = self._rows.stepper(1, True)
+            if row.advance(start, control):
+                return checked(row.last_step(), throw)
+            if row.began:
+                return checked(row.unsolved_step(partial(self._sentence, "Simulator.step")), throw)
+        state, us = self._arguments.state("step", x), self._arguments.inputs("step", "u", control, (self.nu,))
+        external = self._arguments.wrenches("step", wrenches, 1)
         rolled = self._engine.roll(state, us[None], external)
-        status, iterations, residual, violation, _, _ = rolled.reports[0].tolist()
-        scene, end = (self.mechanism, self.time_step, rolled.contacts[0]), rolled.xs[1 if rolled.solved_steps else 0]
-        (parts, share, error), fraction = rolled.division, float(rolled.division.momentum_fractions[0])
-        solved = STATUSES[int(status)], int(iterations), residual, violation
-        detail = "" if rolled.solved_steps else self._sentence("Simulator.step", rolled.reports[0], end)
-        if fraction < 1.0 or error[0] > 1.0:
-            detail = reservation(share, error)
-        return checked(StepResult(end, *solved, scene, int(parts[0]), fraction, float(error[0]), detail), throw)
+        return checked(step_result(self.mechanism, self.time_step, rolled, self._sentence), throw)
 
     def rollout(
         self,
@@ -205,44 +194,18 @@ class Simulator(BatchStepping):
             return sim.rollout(x, us, steps=steps, throw=throw, wrenches=wrenches)
         state = self._arguments.state("rollout", x)
         if callable(us):
-            count = self._arguments.steps("rollout", steps)
+            count, policy = self._arguments.steps("rollout", steps), us
             external = self._arguments.wrenches("rollout", wrenches, count)
-            taken, policy = (lambda found: self._trajectory(found[0], found[1], external)), us
-            return checked(converted(lambda: roll_policy(self._engine, state, policy, count, external), taken), throw)
+            taken: Any = partial(trajectory, self, external, self._sentence)
+            made = converted(lambda: roll_policy(self._engine, state, policy, count, external), lambda f: taken(*f))
+            return checked(made, throw)
         if us is None:
             inputs = np.zeros((self._arguments.steps("rollout", steps), self.nu))
         else:
             inputs = self._arguments.inputs("rollout", "us", us, ("T" if steps is None else steps, self.nu))
         external = self._arguments.wrenches("rollout", wrenches, len(inputs))
-        found = converted(
-            lambda: self._engine.roll(state, inputs, external),
-            lambda rolled: self._trajectory(inputs, rolled, external),
-        )
-        return checked(found, throw)
-
-    def _trajectory(self, inputs: Floats, rolled: Rolled, wrenches: Floats | None) -> Trajectory:
-        """A rollout under the inputs (T, nu)."""
-        knot, xs, reports = rolled.solved_steps, rolled.xs, rolled.reports
-        last = reports[min(knot, len(reports) - 1)] if len(reports) else np.zeros(REPORT)
-        status, (parts, fractions, errors) = STATUSES[int(last[StepReport.STATUS])], rolled.division
-        where, solved = f"Simulator.rollout: step {knot}", status == Status.SOLVED
-        detail = reservation(fractions, errors) if solved else self._sentence(where, last, xs[knot])
-        return Trajectory(
-            simulator=self,
-            x=xs[: knot + 1],
-            u=inputs[:knot],
-            time=self.time_step * np.arange(knot + 1.0),
-            status=status,
-            solved_steps=knot,
-            residual=float(last[StepReport.RESIDUAL]),
-            iterations=reports[:knot, StepReport.ITERATIONS].astype(np.int64),
-            contacts=contacts_of(self.mechanism, self.time_step, rolled.contacts[:knot]),
-            parts=parts[:knot],
-            momentum_fractions=fractions[:knot],
-            errors=errors[:knot],
-            detail=detail,
-            wrenches=None if wrenches is None else wrenches[:knot],
-        )
+        taken = partial(trajectory, self, external, self._sentence, inputs)
+        return checked(converted(lambda: self._engine.roll(state, inputs, external), taken), throw)
 
     def rollout_batch(self, x0s: ArrayLike, us: ArrayLike, *, throw: bool = False) -> RolloutBatch:
         """Rollouts over all cores.
@@ -259,6 +222,83 @@ class Simulator(BatchStepping):
         inputs = self._arguments.inputs("rollout_batch", "us", us, ("n", "T", self.nu))
         starts = self._arguments.states(f"{call}(x0s)", checks.array(f"{call}(x0s)", x0s, (len(inputs), self.nx)))
         return checked(converted(lambda: self._engine.roll_batch(starts, inputs), RolloutBatch.of), throw)
+
+    def step_batch(  # noqa: PLR0913
+        self,
+        X: ArrayLike,
+        U: ArrayLike,
+        substeps: int = 1,
+        derivatives: bool = False,
+        kappa: ArrayLike | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        *,
+        contacts: bool = False,
+        impulses: RowImpulses | None = None,
+        throw: bool = False,
+    ) -> StepBatch:
+        """One knot of independent rows, over all cores: row i goes from X[i] by `substeps` steps with U[i] held.
+
+        A row starts from its own state alone, so its result depends neither on the other rows nor on the cores.
+
+        Args:
+            X: (n, nx) states.
+            U: (n, nu) inputs [N, N m].
+            substeps: time steps per knot.
+            derivatives: whether to return those of every row by its state and input, too.
+            kappa: central-path parameter, one or (n,); that of the simulator by default. Order 2 only.
+            parameters: {name: (n,) or (n, components), or one row for all}, as in `parameters`: the rows are those of
+                `with_parameters`, with the kappa of this simulator. A model is made once for each row of new values,
+                and kept.
+            contacts: whether to return those of the last step of every row, too; without derivatives.
+            impulses: those with which the last steps of these rows ended, of `row_impulses`; written, so that a motion
+                of many calls starts each knot where the last one ended, with fewer iterations. `forget` rows that jump
+                (default None: every row starts from its state alone).
+            throw: raise SimulationError where a step is not solved.
+
+        Returns:
+            StepBatch with the states after the knot, and A (n, ndx, ndx), B (n, ndx, nu).
+        """
+        return checked(self._rows.step(X, U, substeps, derivatives, kappa, parameters, contacts, impulses), throw)
+
+    def row_impulses(self, count: int) -> RowImpulses:
+        """Room for the impulses of independent rows between calls of `step_batch`; in the beginning, none are known.
+
+        Args:
+            count: number of rows.
+
+        Returns:
+            RowImpulses.
+        """
+        return self._rows.impulses(count)
+
+    def stepper(self, substeps: int = 1, contacts: bool = False) -> KnotStepper:
+        """Steps of a single state, as `step_batch` takes them, without checks of arguments: for many short calls.
+
+        Args:
+            substeps: time steps per knot.
+            contacts: whether those of the last step are kept.
+
+        Returns:
+            KnotStepper of this thread, whose `step(X, U)` takes finite (1, nx) and (1, nu).
+
+        Raises:
+            ValueError: the simulator has no stepper.
+        """
+        return self._rows.stepper(substeps, contacts)
+
+    @property
+    def has_stepper(self) -> bool:
+        """Whether there is a `stepper`: steps of one order in compiled loops, without an accuracy."""
+        return self._engine.in_one_kernel
+
+    single_row = renamed("stepper")
+    has_single_rows = renamed("has_stepper")
+
+    @cached_property
+    def _rows(self) -> RowSteps:
+        """Steps of rows, with what they keep between calls."""
+        size, make = (lambda name: len(self.parameters((name,)).values)), self.with_parameters
+        return RowSteps(self.mechanism, self._engine, self._arguments, size, lambda values: make(values)._engine)
 
     def rollout_feedback(  # noqa: PLR0913
         self,
@@ -306,10 +346,8 @@ class Simulator(BatchStepping):
         external = self._arguments.wrenches(call, wrenches, len(inputs))
         policy = self._arguments.policy(name, state, inputs, external, (xs, ks, Ks, gaps))
         count, level = whole_number(f"{name}(substeps=...)", substeps), self._arguments.kappa(call, kappa)
-        found = converted(
-            lambda: self._engine.roll_feedback(state, policy, factor, bounds, count, level), FeedbackRollout.of
-        )
-        return checked(found, throw)
+        roll = partial(self._engine.roll_feedback, state, policy, factor, bounds, count, level)
+        return checked(converted(roll, FeedbackRollout.of), throw)
 
     closed_loop = renamed("rollout_feedback")
 
@@ -341,9 +379,8 @@ class Simulator(BatchStepping):
         given = np.zeros((*lead, self.nu)) if u is None else u
         us = self._arguments.inputs("reactions", "u", given, (*lead, self.nu)).reshape(len(states), self.nu)
         if wrenches is not None and len(lead) > 1:
-            raise ValueError(
-                f"Simulator.reactions(wrenches=...): expected x of shape (nx,) or (T, nx), got {np.shape(x)}"
-            )
+            call = "Simulator.reactions(wrenches=...)"
+            raise ValueError(f"{call}: expected x of shape (nx,) or (T, nx), got {np.shape(x)}")
         external = self._arguments.wrenches("reactions", wrenches, len(states))
         found = reactions(self.mechanism, self._engine, (states, us, external), lead, frame, self._sentence)
         return checked(found, throw)
@@ -408,24 +445,11 @@ class Simulator(BatchStepping):
         Returns:
             Jacobian: `A, B = sim.linearize(x, u)`, (ndx, ndx) and (ndx, nu), or by name, each (ndx, n).
         """
-        call = "Simulator.linearize"
         state = self._arguments.state("linearize", x)
         us = self._arguments.inputs("linearize", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
         level = self._arguments.kappa("linearize", kappa)
         external = self._arguments.wrenches("linearize", wrenches, 1)
-        selected = None if wrt is None else self._by_parameters.select(f"{call}(wrt=...)", wrt)
-        if selected is None or not selected[1].names:
-            A, B, x_next, report = self._engine.linearize_one(state, us, level, external)
-            blocks = {"state": A, "input": B}
-        else:
-            rolled, J = self._by_parameters.roll(state, us[None], selected[1:], level, external)
-            (A,), (B,), x_next, report = rolled.A, rolled.B, rolled.xs[1], rolled.reports[0]
-            blocks = {"state": A, "input": B} | {name: J[0][:, rows] for name, rows in selected[1].rows.items()}
-        status, accuracy = STATUSES[int(report[StepReport.STATUS])], float(report[StepReport.ACCURACY])
-        detail = "" if status == Status.SOLVED else status_message(self.mechanism, call, report, self.tolerance)
-        if selected is not None and status == Status.SOLVED:
-            blocks = {name: blocks[name] for name in selected[0]}
-        return checked(Jacobian(blocks, x_next, status, accuracy, detail), throw)
+        return checked(self._linearizer.step(state, us, wrt, level, external), throw)
 
     def linearize_rollout(
         self,
@@ -453,22 +477,8 @@ class Simulator(BatchStepping):
         call = "linearize_rollout"
         state, inputs = self._arguments.state(call, x), self._arguments.inputs(call, "us", us, ("T", self.nu))
         level, external = self._arguments.kappa(call, kappa), self._arguments.wrenches(call, wrenches, len(inputs))
-        chosen = self._by_parameters.select(f"Simulator.{call}(wrt=...)", wrt)[1:]
-        if chosen[0].names:
-            rolled, J = self._by_parameters.roll(state, inputs, chosen, level, external)
-            blocks = {name: J[:, :, rows] for name, rows in chosen[0].rows.items()}
-        else:
-            rolled, blocks = self._engine.roll(state, inputs, external, kappa=level, derivatives=True), {}
-        knot, reports, detail = rolled.solved_steps, rolled.reports, ""
-        if knot < len(inputs):
-            detail = status_message(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)
-            reports[knot:, StepReport.STATUS] = reports[knot, StepReport.STATUS]
-            rolled.xs[knot + 1 :] = rolled.xs[knot]
-            for array in (rolled.A, rolled.B, *blocks.values()):
-                array[knot:] = 0.0
-        statuses, accuracy = reports[:, StepReport.STATUS].astype(np.int64), reports[:, StepReport.ACCURACY]
-        linear = Linearization(rolled.A, rolled.B, rolled.xs[1:], statuses, blocks, accuracy, detail)
-        return rolled.xs, checked(linear, throw)
+        xs, linear = self._linearizer.rollout(state, inputs, wrt, level, external)
+        return xs, checked(linear, throw)
 
     def linearize_trajectory(
         self,
@@ -504,13 +514,7 @@ class Simulator(BatchStepping):
         steps = whole_number(f"{call}(substeps=...)", substeps)
         level = self._arguments.kappa("linearize_trajectory", kappa)
         external = self._arguments.wrenches("linearize_trajectory", wrenches, len(inputs))
-        A, B, x_next, reports = self._engine.linearize(states, inputs, steps, level, None, external)
-        statuses, detail = reports[:, StepReport.STATUS].astype(np.int64), ""
-        if statuses.any():
-            t = int(np.flatnonzero(statuses)[0])
-            detail = status_message(self.mechanism, f"{call}: knot {t}", reports[t], self.tolerance)
-        linear = Linearization(A, B, x_next, statuses, accuracy=reports[:, StepReport.ACCURACY], detail=detail)
-        return checked(linear, throw)
+        return checked(self._linearizer.knots(states, inputs, steps, level, external), throw)
 
     def linearize_maximal(
         self, z: ArrayLike, u: ArrayLike | None = None, *, kappa: float | None = None, throw: bool = False
@@ -533,9 +537,8 @@ class Simulator(BatchStepping):
         found = self.linearize(self.minimal(bodies), u, kappa=kappa, throw=throw)
         if not found.success:
             return found
-        out = self.maximal_jacobian(found.x_next)
-        blocks = {"state": out @ found.A @ self.minimal_jacobian(bodies), "input": out @ found.B}
-        return changed(found, blocks=blocks)
+        out, into = self.maximal_jacobian(found.x_next), self.minimal_jacobian(bodies)
+        return changed(found, blocks={"state": out @ found.A @ into, "input": out @ found.B})
 
     def vjp(
         self,
@@ -569,18 +572,16 @@ class Simulator(BatchStepping):
         inputs = self._arguments.inputs("vjp", "trajectory", us, ("T", self.nu))
         rows = checks.array(f"{call}(trajectory)", xs, (len(inputs) + 1, self.nx))
         loss = checks.array(f"{call}(dL_dx)", dL_dx, (len(inputs) + 1, self.ndx))
-        asked, found, plan = self._by_parameters.select(f"{call}(wrt=...)", wrt)
         path = (self._arguments.states(f"{call}(trajectory)", rows), inputs)
-        external = self._arguments.wrenches("vjp", wrenches, len(inputs))
-        level = self._arguments.kappa("vjp", kappa)
-        knot, line = self._by_parameters.sweep(path, loss, (found, plan), level, external)
-        blocks = {"state": line.costate[0], "input": line.inputs}
-        blocks = {name: blocks[name] if name in blocks else line.parameters[found.rows[name]] for name in asked}
-        if knot >= 0:
-            detail = status_message(self.mechanism, f"{call}: step {knot}", line.report[0], self.tolerance)
-            return checked(Gradient(blocks, Status(int(line.report[0, StepReport.STATUS])), detail), throw)
-        finite = all(np.isfinite(block).all() for block in blocks.values())
-        return checked(Gradient(blocks, Status.SOLVED if finite else Status.NOT_FINITE), throw)
+        external, level = self._arguments.wrenches("vjp", wrenches, len(inputs)), self._arguments.kappa("vjp", kappa)
+        return checked(self._linearizer.gradient(path, loss, wrt, level, external), throw)
+
+    @cached_property
+    def _linearizer(self) -> Linearizer:
+        """Derivatives; their modules are imported on first use."""
+        from sim.simulator.linearizer import Linearizer
+
+        return Linearizer(self.mechanism, self._engine, self._by_parameters)
 
     def with_parameters(self, values: Mapping[str, ArrayLike]) -> Simulator:
         """The same simulator, including its kappa, with other values of parameters.

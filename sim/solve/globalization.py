@@ -5,7 +5,7 @@ ends in a fold of the central path is given up, and the next one starts elsewher
 beyond folds, such as those of legs that jam between a joint limit and the ground.
 
 `STRATEGIES` is the list. `benchmarks/start_strategies.py` counts the solutions that each of them finds:
-of 178,000, the first two find all but 1,345, and every row of this list, also in its last rounds, finds some.
+of 178,000, KNOWN and INCOMING find all but 1,345, and every row of this list, also in its last rounds, finds some.
 `benchmarks/robustness.py` measures the list on 60,000 random extreme states (seeds 0 to 2).
 """
 
@@ -65,6 +65,7 @@ class Strategy(NamedTuple):
     features: int = int(FeatureChoice.ONCE)
     replace_features: bool = False  # the first repetition drops the previous features; later ones keep those that press
     overlap: bool = False  # accept small overlaps in features that would have to pull
+    on_corners: bool = False  # only where feet have corners, and the attempt before made no progress
     velocity_fraction: float = 1.0  # of the incoming velocity
     growth: float = 1.0  # of kappa0
 
@@ -73,6 +74,9 @@ _EVERY_POSE = int(FeatureChoice.EVERY_POSE)
 _FIRST = (
     # most steps end here
     Strategy(Start.KNOWN, replace_features=True),
+    # where a foot rocks, which of its corners stick changes within a step: friction at kappa jams on that; on a
+    # smoother law the impulses of the step before, or of the last attempt, are still near the solution
+    Strategy(Start.KNOWN, continuation=True, replace_features=True, on_corners=True),
     # the usual start of a step of which nothing is known
     Strategy(Start.INCOMING, replace_features=True),
     # with friction tied to the impulses thin cones jam; from here on its smoothing is lowered by continuation
@@ -95,12 +99,14 @@ _ROUND = (
     Strategy(Start.BEHIND_FOLD, continuation=True, features=_EVERY_POSE, overlap=True),
 )
 _ROUNDS = 13
+UNKNOWN = 2  # the first strategy of a step of which nothing is known
 
 
 def _numbered(k: int, strategy: Strategy) -> Strategy:
     """Strategy k of the list: shares advance by the golden ratio, modulo 1, and kappa0 grows."""
-    fraction = _GOLDEN * (k - 2) % 1.0 if strategy.start == Start.FRACTION else 1.0
-    return strategy._replace(velocity_fraction=fraction, growth=_GROWTH ** ((k - 1) % _GROWTHS) if k > 0 else 1.0)
+    place = k - UNKNOWN
+    fraction = _GOLDEN * (place - 1) % 1.0 if strategy.start == Start.FRACTION else 1.0
+    return strategy._replace(velocity_fraction=fraction, growth=_GROWTH ** (place % _GROWTHS) if place >= 0 else 1.0)
 
 
 STRATEGIES = tuple(_numbered(k, s) for k, s in enumerate(_FIRST + _ROUNDS * _ROUND))
@@ -113,14 +119,15 @@ _UNDAMPED = np.array([s.undamped for s in STRATEGIES], dtype=np.int64)
 _FEATURES = np.array([s.features for s in STRATEGIES], dtype=np.int64)
 _REPLACE_FEATURES = np.array([s.replace_features for s in STRATEGIES], dtype=np.int64)
 _OVERLAP = np.array([s.overlap for s in STRATEGIES], dtype=np.int64)
+_ON_CORNERS = np.array([s.on_corners for s in STRATEGIES], dtype=np.int64)
 _FRACTION = np.array([s.velocity_fraction for s in STRATEGIES])
 _KAPPA_GROWTH = np.array([s.growth for s in STRATEGIES])
 
 
 class KnownStart(NamedTuple):
-    """The start of the first strategy, whose iterate is in `data`."""
+    """The start of the strategies KNOWN, whose iterate is in `data`."""
 
-    found: bool  # otherwise the list begins with the second strategy
+    found: bool  # otherwise the list begins with UNKNOWN
     kappa: float  # of the central path on which it is
     balance: tuple[float, float]  # residuals there
     share: float  # of the tolerance, within which its first iteration has to end
@@ -136,6 +143,7 @@ def strategy(k: int) -> Strategy:
         _FEATURES[k],
         _REPLACE_FEATURES[k] != 0,
         _OVERLAP[k] != 0,
+        _ON_CORNERS[k] != 0,
         _FRACTION[k],
         _KAPPA_GROWTH[k],
     )
@@ -144,13 +152,7 @@ def strategy(k: int) -> Strategy:
 @kernel
 def from_last_iterate(s: Strategy) -> Strategy:
     """The repetition of a strategy with other features: from where it ended, on the path of the usual kappa0."""
-    return Strategy(Start.LAST_ITERATE.value, False, False, s.features, s.replace_features, s.overlap, 1.0, 1.0)
-
-
-@kernel
-def with_continuation(s: Strategy) -> Strategy:
-    """The repetition of a strategy with its friction smoothing led down step by step."""
-    return Strategy(s.start, True, s.undamped, s.features, s.replace_features, s.overlap, s.velocity_fraction, s.growth)
+    return Strategy(Start.LAST_ITERATE.value, False, False, s.features, s.replace_features, s.overlap, False, 1.0, 1.0)
 
 
 @kernel
@@ -275,7 +277,7 @@ def at_kappa(
 
 @inlined
 def start_on_path(model: Model, data: Data, options: StepOptions, q: Vector, v: Vector, s: Strategy) -> float:
-    """Start of a strategy but the first, on the central path of its kappa0; returns kappa0, or 0 where that fails.
+    """Start of a strategy that is not KNOWN, on the central path of its kappa0; returns kappa0, or 0 where that fails.
 
     At a fold the Newton matrix is all but singular, and its null vector, the last Newton step, leads to the other side.
     """

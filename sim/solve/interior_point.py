@@ -7,17 +7,8 @@ Algorithm 1 of Howell et al. 2022 (Dojo), a primal-dual method with the predicto
         find the Newton direction: predictor, corrector, centring                         newton_direction.py
         search along it, and put pairs that leave their cones back onto the path          step_length.py
 
-It differs in these points (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
-
-* The friction cone has no variable. On the central path it is a smooth law of the slip, solved for beta by Newton, at a
-  `smoothing` that follows down to kappa (contact_law.py); conic scalings jam on thin cones.
-* The boundary of the cones stops no step: pairs that would leave return to the central path.
-* No body turns by more than .7 rad per iteration, beyond which the Jacobian of a gap does not predict it.
-* At folds of the path, the terms that can make the matrix indefinite count by 1/2, 1/4, ... (newton_direction.py).
-* On corners of meshes a known start from which friction jams is tried again, its smoothing led down step by step.
-* An attempt that ends in a fold is given up, and the next strategy starts elsewhere (globalization.py).
-* Equations of a step have several solutions. One in which shapes overlap in features that were not active, or which
-  gains energy, is refused (pairs/active_features.py, energy_balance.py).
+The friction cone has no variable: it is a law of the slip at a `smoothing` that follows down to kappa. Differences from
+the published method, and reasons: docs/theory/interior_point.md.
 """
 
 from __future__ import annotations
@@ -37,6 +28,7 @@ from sim.solve.complementarity import products
 from sim.solve.energy_balance import step_gained
 from sim.solve.globalization import (
     ATTEMPTS,
+    UNKNOWN,
     KnownStart,
     Start,
     Strategy,
@@ -44,7 +36,6 @@ from sim.solve.globalization import (
     known_start,
     start_on_path,
     strategy,
-    with_continuation,
 )
 from sim.solve.inequalities import choose_inequalities, inequalities_activated
 from sim.solve.merit import Merit, follow, is_near, judge, residuals
@@ -183,30 +174,6 @@ def attempt(
 
 
 @inlined
-def attempt_known(
-    model: Model,
-    data: Data,
-    options: StepOptions,
-    inputs: tuple[Vector, Vector, Vector],
-    guess: Guess,
-    s: Strategy,
-    iterations: int,
-    known: KnownStart,
-) -> tuple[Outcome, int]:
-    """The first strategy; where it makes no progress on corners, the same once more with continuation in friction.
-
-    Where a foot rocks from corner to corner, which of its corners stick changes within a step. Friction at kappa jams
-    on that; on a smoother law the impulses of the step before, or of this attempt, are still near the solution.
-    """
-    out, verdict = attempt(model, data, options, inputs, s, iterations, known)
-    if verdict == Verdict.VALID and out.status == Status.NO_PROGRESS and has_corners(model):
-        again = known_start(model, data, options, inputs, guess)
-        if again.found:
-            out, verdict = attempt(model, data, options, inputs, with_continuation(s), out.iterations, again)
-    return out, verdict
-
-
-@inlined
 def solve_active(
     model: Model,
     data: Data,
@@ -222,16 +189,18 @@ def solve_active(
     data.feature_choice[0] = FeatureChoice.ONCE
     data.overlap_allowed[0] = 0
     known = known_start(model, data, options, inputs, guess)
-    gained = False
-    for k in range(0 if known.found else 1, ATTEMPTS):
+    gained, corners = False, False
+    for k in range(0 if known.found else UNKNOWN, ATTEMPTS):
         s = strategy(k)
         if gained and s.start != Start.FRACTION:  # other solutions beyond folds gain energy as well
             continue
+        if s.on_corners:  # the last attempt has moved the iterate
+            known = known_start(model, data, options, inputs, guess) if corners else known
+            if not (corners and known.found):
+                continue
         data.overlap_allowed[0] = 1 if s.overlap else 0
-        if k == 0:
-            out, verdict = attempt_known(model, data, options, inputs, guess, s, out.iterations, known)
-        else:
-            out, verdict = attempt(model, data, options, inputs, s, out.iterations, known)
+        out, verdict = attempt(model, data, options, inputs, s, out.iterations, known)
+        corners = verdict == Verdict.VALID and out.status == Status.NO_PROGRESS and has_corners(model)
         if verdict == Verdict.VALID and (out.status == Status.SOLVED or out.status == Status.MAX_ITERATIONS):
             if out.status == Status.SOLVED:
                 data.strategy_solves[k] += 1

@@ -151,6 +151,11 @@ def signals_outside_locks(compilation: F) -> F:
 
 
 def hold_while_translating(engine: Any) -> None:
-    """Let Numba's engine, which calls Python from LLVM as it translates modules, do so with signals held."""
-    if "finalize_object" not in vars(engine):
-        engine.finalize_object = wraps(engine.finalize_object)(signals_held()(engine.finalize_object))
+    """Let Numba's engine, which calls Python from LLVM as it translates modules, do so with signals held while a kernel
+    is compiled; for other code of the process it stays as it is.
+    """
+    if "finalize_object" in vars(engine):
+        return
+    plain = engine.finalize_object
+    held = signals_held()(plain)
+    engine.finalize_object = wraps(plain)(lambda: held() if _SELECTIVE else plain())

@@ -128,6 +128,20 @@ def test_a_step_that_cannot_be_solved_is_softened_and_counted():
     assert loop.survived and loop.softened == 1
 
 
+def test_a_held_command_keeps_the_steps_before_one_that_is_not_solved():
+    """A block falls freely, which takes few iterations, and cannot be solved as it lands."""
+    sim = BLOCK.replace(max_iterations=4, divide=False)
+    plant, one = Plant(sim, sim.neutral()), Plant(sim, sim.neutral())
+    for each in (plant, one):
+        each.x[2] += 0.02
+        each._soften = lambda u, result: result
+    message = plant.hold(np.zeros(3), 40)
+    while one.step(np.zeros(3))[1].success:
+        pass
+    assert message and 0 < plant.steps < 40 and plant.steps == one.steps
+    np.testing.assert_allclose(plant.x, one.x, atol=1e-9)
+
+
 def test_functions_that_write_into_the_state_they_get_change_nothing():
     def controller(t, x):
         x[:] = 0.0

@@ -10,6 +10,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt import Status
+from sim.simulator.engines.engine import Engine
 
 HOPPER = dojo.Simulator(dojo.models.hopper(), 0.01, max_iterations=1)
 X = HOPPER.neutral() + 0.3 * np.eye(HOPPER.nx)[HOPPER.nq]  # no step from here is solved in one iteration
@@ -40,6 +41,28 @@ def test_an_unsolved_step_is_told_and_raised_only_when_asked_for(name: str) -> N
     with pytest.raises(dojo.SimulationError) as error:
         CALLS[name](throw=True)
     assert error.value.status == Status.MAX_ITERATIONS
+
+
+def test_an_unsolved_step_is_solved_for_once_and_told_alike_however_it_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sim = HOPPER.replace(divide=False)
+    slow = sim.step(X.tolist())
+    calls: list[int] = []
+    take = Engine.take_steps
+    monkeypatch.setattr(Engine, "take_steps", lambda self, *given: calls.append(1) or take(self, *given))
+    fast = sim.step(X)
+    assert len(calls) == 1
+    assert (fast.status, fast.iterations, fast.residual, fast.violation, fast.message) == (
+        slow.status,
+        slow.iterations,
+        slow.residual,
+        slow.violation,
+        slow.message,
+    )
+    np.testing.assert_array_equal(fast.x, X)
+    with pytest.raises(ValueError, match="finite"):
+        sim.step(np.full(sim.nx, np.nan))
 
 
 def test_derivatives_of_an_unsolved_step_cannot_be_taken_by_accident() -> None:

@@ -105,8 +105,8 @@ def choose_shapes(model: Model, data: Data, first: int) -> None:
 @optional(Slot.CHOOSE_PAIRS)
 def choose_pairs(model: Model, data: Data) -> None:
     """`choose_shapes` of the active collisions, at configuration 3."""
-    for m in range(data.near_count[0]):
-        j = data.near_first[m]
+    for m in range(data.near_collision_count[0]):
+        j = data.near_collisions[m]
         if data.pair_activation[j] == 0.0:
             place_shapes(model, data, j, data.pos3, data.rot3)
             choose_shapes(model, data, j)
@@ -153,8 +153,8 @@ def overlapping(model: Model, data: Data) -> int:
     point has passed through the other shape, or VALID.
     """
     found = Verdict.VALID.value
-    for m in range(data.near_count[0]):
-        j = data.near_first[m]
+    for m in range(data.near_collision_count[0]):
+        j = data.near_collisions[m]
         if data.pair_activation[j] == 0.0:
             signed = has_no_room(model.pair_kind[j])
             if signed and data.feature_choice[0] == FeatureChoice.EVERY_POSE:

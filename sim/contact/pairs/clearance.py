@@ -15,13 +15,13 @@ from math import sqrt
 from sim.contact.pairs.active_features import choose_shapes, open_pairs
 from sim.contact.pairs.limited_reach import end_of
 from sim.contact.pairs.pair_contact import point_kinematics
-from sim.contact.pairs.pair_pose import place_shapes
+from sim.contact.pairs.pair_pose import balls_apart, place_shapes
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import Apart, PairBound, RelativePose
+from sim.model.record_columns import Apart, PairBound
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
-from solvers.rotation import cross, three
+from solvers.rotation import cross
 
 
 @kernel
@@ -43,10 +43,8 @@ def largest_speed(data: Data, i: int, arm: float) -> float:
 def _pair_gap(model: Model, data: Data, j: int) -> float:
     """Lower bound of the gaps of the collision that begins at pair j, at configuration 2 [m]."""
     place_shapes(model, data, j, data.pos2, data.rot2)
-    x, y, z = three(data.pair_relative[j], RelativePose.CENTER)
-    radii = model.pair_bound[j, PairBound.RADII]
-    apart = sqrt(x * x + y * y + z * z) - radii
-    return apart if apart > radii else open_pairs(model, data, j)
+    apart = balls_apart(model, data, j)
+    return apart if apart > model.pair_bound[j, PairBound.RADII] else open_pairs(model, data, j)
 
 
 @kernel
@@ -95,7 +93,7 @@ def measure_pairs(model: Model, data: Data, h: float) -> None:
     n = 0
     j = 0
     while j < model.pair_kind.shape[0]:
-        data.near_first[n] = j
+        data.near_collisions[n] = j
         n += 1
         place_shapes(model, data, j, data.pos2, data.rot2)
         open_pairs(model, data, j)
@@ -104,4 +102,4 @@ def measure_pairs(model: Model, data: Data, h: float) -> None:
         for m in range(j, end_of(model, j)):
             point_kinematics(model, data, h, m)
         j = end_of(model, j)
-    data.near_count[0] = n
+    data.near_collision_count[0] = n

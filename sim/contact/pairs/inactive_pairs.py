@@ -37,7 +37,7 @@ from sim.contact.pairs.limited_reach import (
     stay_beyond,
 )
 from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, point_kinematics
-from sim.contact.pairs.pair_pose import place_shapes
+from sim.contact.pairs.pair_pose import balls_apart, place_shapes
 from sim.dynamics.displacements import third_quaternion
 from sim.model.data import Data
 from sim.model.model import Model
@@ -45,7 +45,6 @@ from sim.model.options import StepOptions
 from sim.model.record_columns import PairBound, RelativePose, Witness
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
-from solvers.rotation import three
 
 STEEPEST = 3.75  # reaches times the largest rate of the part that acts (limited_reach.py)
 COUPLED = 1e-2  # largest sum of e over the inactive collisions of a body
@@ -58,8 +57,8 @@ def enlist_pairs(model: Model, data: Data) -> None:
     n = data.active_ground_count[0]
     for k in range(model.coupling_body.shape[0]):
         data.coupling_live[k] = 0
-    for m in range(data.near_count[0]):
-        first = data.near_first[m]
+    for m in range(data.near_collision_count[0]):
+        first = data.near_collisions[m]
         if data.pair_activation[first] == 0.0:
             data.coupling_live[model.pair_coupling[first]] = 1
             for j in range(first, end_of(model, first)):
@@ -75,8 +74,8 @@ def begin_pairs(model: Model, data: Data, options: StepOptions) -> None:
     follow_ways(model, data)
     if not stay_beyond(data):
         sort_pairs(model, data)
-    for m in range(data.near_count[0]):
-        j = data.near_first[m]
+    for m in range(data.near_collision_count[0]):
+        j = data.near_collisions[m]
         a = FAR if is_beyond(model, data, j) else _begin_pair(model, data, options, j)
         data.pair_activation[j] = a
         if a > 0.0:
@@ -91,9 +90,8 @@ def begin_pairs(model: Model, data: Data, options: StepOptions) -> None:
 def _begin_pair(model: Model, data: Data, options: StepOptions, j: int) -> float:
     """pair_activation of the collision that begins at pair j."""
     place_shapes(model, data, j, data.pos2, data.rot2)
-    x, y, z = three(data.pair_relative[j], RelativePose.CENTER)
     travel = _travel(model, data, j)
-    apart = (x * x + y * y + z * z) ** 0.5 - model.pair_bound[j, PairBound.RADII]
+    apart = balls_apart(model, data, j)
     keep_distance(model, data, j, apart)
     if is_beyond(model, data, j):
         return FAR
@@ -179,8 +177,8 @@ def inactive_pair_impulses(model: Model, data: Data, h: float, kappa: float) -> 
             data.inactive_pose[i, 3 + k] = q[k]
         for k in range(6):
             data.inactive_wrench[i, k] = 0.0
-    for k in range(data.near_count[0]):
-        j = data.near_first[k]
+    for k in range(data.near_collision_count[0]):
+        j = data.near_collisions[k]
         a = data.pair_activation[j]
         if a > 0.0:
             place_shapes(model, data, j, data.pos3, data.rot3)
@@ -235,8 +233,8 @@ def add_inactive_pairs(data: Data) -> None:
 def pairs_activated(model: Model, data: Data) -> bool:
     """Whether an inactive collision has become active at configuration 3; it is active from now on."""
     found = False
-    for m in range(data.near_count[0]):
-        j = data.near_first[m]
+    for m in range(data.near_collision_count[0]):
+        j = data.near_collisions[m]
         least = 1e300
         for k in range(j, end_of(model, j)):
             least = min(least, data.pair_out[k, Witness.GAP])
@@ -278,6 +276,6 @@ def _came_within_reach(model: Model, data: Data) -> bool:
 @optional(Slot.ALL_NEAR)
 def all_near(model: Model, data: Data) -> None:
     """All collisions within their reach taken as active, for the derivatives of a step that has been solved."""
-    for m in range(data.near_count[0]):
-        data.pair_activation[data.near_first[m]] = 0.0
+    for m in range(data.near_collision_count[0]):
+        data.pair_activation[data.near_collisions[m]] = 0.0
     enlist_pairs(model, data)

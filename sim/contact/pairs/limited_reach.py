@@ -144,8 +144,8 @@ def stay_beyond(data: Data) -> bool:
 
 
 @kernel
-def _balls_apart(model: Model, data: Data, j: int) -> float:
-    """Distance of the balls around the shapes of the collision that begins at pair j, at configuration 2."""
+def _unplaced_balls_apart(model: Model, data: Data, j: int) -> float:
+    """`balls_apart` of the collision that begins at pair j at configuration 2, whose shapes are not placed."""
     k = model.pair_coupling[j]
     a, b = model.coupling_body[k, 0], model.coupling_body[k, 1]
     p, q = model.pair_place[2 * j], model.pair_place[2 * j + 1]
@@ -161,22 +161,22 @@ def _balls_apart(model: Model, data: Data, j: int) -> float:
 
 @kernel
 def sort_pairs(model: Model, data: Data) -> None:
-    """near_first: the collisions that may be within their reach; pair_activation FAR and pair_margin of the others."""
+    """near_collisions: those that may be within their reach; pair_activation FAR and pair_margin of the others."""
     n = 0
     j = 0
     data.pair_margin[0] = 1e300
     while j < model.pair_kind.shape[0]:
         beyond = is_beyond(model, data, j)
         if not beyond and model.pair_bound[j, PairBound.REACH] < 1e300:
-            keep_distance(model, data, j, _balls_apart(model, data, j))
+            keep_distance(model, data, j, _unplaced_balls_apart(model, data, j))
             beyond = is_beyond(model, data, j)
         if beyond:
             _leave(model, data, j)
         else:
-            data.near_first[n] = j
+            data.near_collisions[n] = j
             n += 1
         j = end_of(model, j)
-    data.near_count[0] = n
+    data.near_collision_count[0] = n
 
 
 @kernel
@@ -188,29 +188,29 @@ def _leave(model: Model, data: Data, j: int) -> None:
 
 @kernel
 def leave_beyond(model: Model, data: Data) -> None:
-    """near_first without the collisions that turned out to be beyond their reach."""
+    """near_collisions without the collisions that turned out to be beyond their reach."""
     n = 0
-    for m in range(data.near_count[0]):
-        j = data.near_first[m]
+    for m in range(data.near_collision_count[0]):
+        j = data.near_collisions[m]
         if data.pair_activation[j] == FAR:
             _leave(model, data, j)
         else:
-            data.near_first[n] = j
+            data.near_collisions[n] = j
             n += 1
-    data.near_count[0] = n
+    data.near_collision_count[0] = n
 
 
 @kernel
 def enlist_near(model: Model, data: Data) -> None:
-    """near_first: the first pairs of the collisions within their reach."""
+    """near_collisions: the first pairs of the collisions within their reach."""
     n = 0
     j = 0
     while j < model.pair_kind.shape[0]:
         if data.pair_activation[j] != FAR:
-            data.near_first[n] = j
+            data.near_collisions[n] = j
             n += 1
         j += int(model.pair_bound[j, PairBound.POINTS])
-    data.near_count[0] = n
+    data.near_collision_count[0] = n
 
 
 @kernel

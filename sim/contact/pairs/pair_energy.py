@@ -73,8 +73,8 @@ def pair_slack(model: Model, data: Data) -> float:
     Inactive collisions began apart, and have none.
     """
     total = 0.0
-    for m in range(data.near_count[0]):
-        first = data.near_first[m]
+    for m in range(data.near_collision_count[0]):
+        first = data.near_collisions[m]
         if data.pair_activation[first] != 0.0:
             continue
         overlap = _overlapped(model, data, first) + _LEFT * least_size(model, first) + rounding_of_rims(model, first)
@@ -90,8 +90,8 @@ def pairs_gained(model: Model, data: Data, options: StepOptions, v: Vector) -> b
     h = options.h
     ground = model.contact_height.shape[0]
     gain, power, allowed = 0.0, 0.0, 0.0
-    for m in range(data.near_count[0]):
-        first = data.near_first[m]
+    for m in range(data.near_collision_count[0]):
+        first = data.near_collisions[m]
         size = least_size(model, first)
         overlap = _overlapped(model, data, first)
         slack = overlap + _LEFT * size + rounding_of_rims(model, first) + options.tolerance

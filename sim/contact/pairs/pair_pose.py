@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 from sim.dynamics.frame_placement import place_frame
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import RelativePose
+from sim.model.record_columns import PairBound, RelativePose
 from sim.model.shape_kinds import SWAPPED
 from solvers.compiler import kernel
+from solvers.rotation import three
 from solvers.types import Matrix
 
 
@@ -41,3 +44,12 @@ def place_shapes(model: Model, data: Data, first: int, pos: Matrix, rot: Matrix)
     place_shape(model, data, 2 * first + 1, model.coupling_body[k, 1], pos, rot)
     swapped = 1 if model.pair_kind[first] >= SWAPPED else 0
     relative_pose(data, first, 2 * first + swapped, 2 * first + 1 - swapped)
+
+
+@kernel
+def balls_apart(model: Model, data: Data, j: int) -> float:
+    """Distance of the balls around the shapes of the collision that begins at pair j, at pair_relative: theirs is not
+    less.
+    """
+    x, y, z = three(data.pair_relative[j], RelativePose.CENTER)
+    return sqrt(x * x + y * y + z * z) - model.pair_bound[j, PairBound.RADII]

@@ -18,8 +18,8 @@ from solvers.types import Matrix
 def pairs_finite(model: Model, data: Data, rows: Matrix) -> bool:
     """Whether all numbers of the rows of the pairs are; those beyond their reach are constants."""
     ground = model.contact_height.shape[0]
-    for m in range(data.near_count[0]):
-        first = data.near_first[m]
+    for m in range(data.near_collision_count[0]):
+        first = data.near_collisions[m]
         for j in range(first, end_of(model, first)):
             if not is_finite(rows[ground + j]):
                 return False
@@ -33,10 +33,10 @@ def report_pairs(model: Model, data: Data, out: Matrix) -> None:
     a robot has takes longer than a step.
     """
     ground = model.contact_height.shape[0]
-    for m in range(data.near_count[0]):
-        first = data.near_first[m]
+    for m in range(data.near_collision_count[0]):
+        first = data.near_collisions[m]
         _report(model, data, first, end_of(model, first), out)
-    if data.near_count[0] == 0 or data.near_first[0] > 0:
+    if data.near_collision_count[0] == 0 or data.near_collisions[0] > 0:
         out[ground, ContactRow.GAP] = BEYOND
 
 

@@ -1,21 +1,11 @@
 """Couplings of branches of the tree, pairs of bodies in contact and closed loops, as a system of their forces.
 
-A coupling of the bodies a and b adds B f to the wrench on a and takes it from that on b, about O:
-
-    pairs in contact    (K_a, K_b) = B D R        f/D - R_a zeta_a - R_b zeta_b = 0
-    closed loop         B = G2^T                      - G3 zeta_a + G3 zeta_b = g
-
-K are the derivatives of the wrench by the twists of the bodies, of rank six at most; taking them apart keeps the
-stiffness D of contacts, up to 1e16, out of the sums. With the tree eliminated, twists are zeta = zeta_0 + Z f, where
-zeta_0 answers the right-hand side and Z the unit forces:
+With the tree eliminated, the twists of bodies are zeta = zeta_0 + Z f, Z the answers to unit forces:
 
     (E - R_a Z_a - R_b Z_b) f = g + R_a zeta_0a + R_b zeta_0b        E = 1/D or 0,  R = (G3, -G3) for a loop
 
-so trees stay linear, and pay nothing. Couplings that share no tree do not appear in one another's rows: those of
-contacts are eliminated one by one (coupling_order.py). Rows of couple_B, couple_R, ... follow coupling_row, those of
-gears (gears.py) come last; couple_live lists the rows of the system, without those of inactive pairs or zero stiffness.
-Redundant constraints (a planar loop in space) are found by the pivots, and their forces set to zero; their
-rows are rounding, and kept so by a scale that does not look at directions.
+Derivation: docs/theory/couplings.md. Rows of couple_B, couple_R, ... follow coupling_row, those of gears (gears.py)
+come last; couple_live lists the rows of the system, without those of inactive pairs or zero stiffness.
 """
 
 from __future__ import annotations

@@ -1,0 +1,54 @@
+"""Results of steps and rollouts, from the arrays that an engine returns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from sim.mechanism.mechanism import Mechanism
+from sim.model.record_columns import StepReport
+from sim.simulator.engines.engine import REPORT, Rolled
+from sim.simulator.results import STATUSES, StepResult, Trajectory, contacts_of, reservation
+from solvers.status import Status
+from solvers.types import Floats, Vector
+
+Explain = Callable[[str, Vector, Vector], str]  # sentence of (where, report (6,), state (nx,)) of an unsolved step
+
+
+def step_result(mechanism: Mechanism, time_step: float, rolled: Rolled, explain: Explain) -> StepResult:
+    """The result of a rollout of a single step."""
+    status, iterations, residual, violation, _, _ = rolled.reports[0].tolist()
+    scene, end = (mechanism, time_step, rolled.contacts[0]), rolled.xs[1 if rolled.solved_steps else 0]
+    (parts, share, error), fraction = rolled.division, float(rolled.division.momentum_fractions[0])
+    solved = STATUSES[int(status)], int(iterations), residual, violation
+    detail = "" if rolled.solved_steps else explain("Simulator.step", rolled.reports[0], end)
+    if fraction < 1.0 or error[0] > 1.0:
+        detail = reservation(share, error)
+    return StepResult(end, *solved, scene, int(parts[0]), fraction, float(error[0]), detail)
+
+
+def trajectory(sim: Any, wrenches: Floats | None, explain: Explain, inputs: Floats, rolled: Rolled) -> Trajectory:
+    """The result of a rollout of a Simulator under the inputs (T, nu) and external wrenches (T, nbody, 6)."""
+    knot, xs, reports = rolled.solved_steps, rolled.xs, rolled.reports
+    last = reports[min(knot, len(reports) - 1)] if len(reports) else np.zeros(REPORT)
+    status, (parts, fractions, errors) = STATUSES[int(last[StepReport.STATUS])], rolled.division
+    where, solved = f"Simulator.rollout: step {knot}", status == Status.SOLVED
+    detail = reservation(fractions, errors) if solved else explain(where, last, xs[knot])
+    return Trajectory(
+        simulator=sim,
+        x=xs[: knot + 1],
+        u=inputs[:knot],
+        time=sim.time_step * np.arange(knot + 1.0),
+        status=status,
+        solved_steps=knot,
+        residual=float(last[StepReport.RESIDUAL]),
+        iterations=reports[:knot, StepReport.ITERATIONS].astype(np.int64),
+        contacts=contacts_of(sim.mechanism, sim.time_step, rolled.contacts[:knot]),
+        parts=parts[:knot],
+        momentum_fractions=fractions[:knot],
+        errors=errors[:knot],
+        detail=detail,
+        wrenches=None if wrenches is None else wrenches[:knot],
+    )
