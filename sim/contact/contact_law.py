@@ -159,6 +159,19 @@ def keep_in_cone(model: Model, data: Data, c: int) -> None:
 
 
 @kernel
+def scale_contact(model: Model, data: Data, c: int, ratio: float) -> None:
+    """Impulses of contact c, normal and along the ground, times a ratio."""
+    z = data.cone[c]
+    z[Cone.IMPULSE] *= ratio
+    if law_of(model, c) == Law.LINEAR:
+        for k in range(Pyramid.CAP, Pyramid.SLIP):
+            z[k] *= ratio
+    else:
+        z[Cone.FRICTION1] *= ratio
+        z[Cone.FRICTION2] *= ratio
+
+
+@kernel
 def contact_boundary(model: Model, data: Data, c: int) -> float:
     """Largest step that keeps the cone variables of contact c in their cones, or 1e30."""
     z = data.cone[c]

@@ -17,11 +17,21 @@ from math import sqrt
 from sim.contact.pairs.clearance import pairs_reached
 from sim.dynamics.external_forces import set_external
 from sim.integrators.contact_events import NEVER
-from sim.integrators.halved_step import FAILED, LANDS, shorten_impact, try_short
+from sim.integrators.halved_step import FAILED, LANDS, try_short
 from sim.integrators.hamilton import coordinate_rates
 from sim.integrators.phases import leave, left_out, report_apart
 from sim.integrators.runge_kutta import advance
 from sim.integrators.runge_kutta import begin as begin_node
+from sim.integrators.substep_lengths import (
+    before_impact,
+    lengthen,
+    lengthen_kink,
+    next_length,
+    shorten,
+    shorten_impact,
+    shorten_unsolved,
+    shorter,
+)
 from sim.integrators.substeps import AccuracyGoal, Clock, Embedded, SubstepState, begin_substeps, keep, rest_contacts
 from sim.model.data import Data
 from sim.model.interruptible_loops import is_due, note_deadline
@@ -98,33 +108,14 @@ def try_long(
 
 
 @kernel
-def next_length(h: float, ratio: float, before: float, order: float) -> float:
-    """h times .9 r^-.7/k r0^.4/k, between 1/5 and 5: Gustafsson's controller for errors per length of order k."""
-    r = max(ratio, 1e-12)
-    return h * min(5.0, max(0.2, 0.9 * r ** (-0.7 / order) * max(before, 1e-4) ** (0.4 / order)))
-
-
-@kernel
-def shorter(h: float, ratio: float, order: float) -> float:
-    """h times .9 r^-1/k, at least h/10: the length at which a step that was refused has the error allowed."""
-    return h * max(0.1, 0.9 * ratio ** (-1.0 / order))
-
-
-@kernel
-def _power(clock: Vector) -> float:
-    """The power of the length with which the error of the step just tried, over its length, grows."""
-    return 2.0 if clock[Clock.ORDER] == 2.0 else 4.0
-
-
-@kernel
 def _allows(clock: Vector, h: float, shortest: float, ratio: float) -> bool:
-    """Whether a solved step of order 2 is kept. A step on a kink has a larger allowance, and so has one across lengths
-    that have no solution: where none of these meets it, the first that is solved is kept. After a rebound there is no
-    kink, for the velocity stays wrong.
+    """Whether a solved step of order 2 is kept. A step on a kink or an impact has a larger allowance, and so has one
+    across lengths that have no solution: where none of these meets it, the first that is solved is kept. After a
+    rebound there is no kink, for the velocity stays wrong.
     """
     error = ratio * h  # in accuracies
-    sudden = _SUDDEN * h < clock[Clock.RECENT] and clock[Clock.LEAST] > 0.0
-    kink = sudden and error < _KINK and error + clock[Clock.KINKS] < _KINKS
+    sudden = _SUDDEN * h < clock[Clock.RECENT] or clock[Clock.HIT] > 0.0
+    kink = sudden and clock[Clock.LEAST] > 0.0 and error < _KINK and error + clock[Clock.KINKS] < _KINKS
     beyond = clock[Clock.BEYOND] > 0.0 and (error < 1.0 or clock[Clock.ANY] > 0.0)
     return ratio <= 1.0 or kink or h <= shortest or beyond
 
@@ -157,32 +148,30 @@ def take_short(
     rebounds = clock[Clock.HIT] > 0.0 or clock[Clock.LEAST] == 0.0
     shortest = min(goal[AccuracyGoal.SETTLED], goal[AccuracyGoal.IMPACT] if rebounds else NEVER)
     if status == _SOLVED and _allows(clock, h, shortest, ratio):
-        beyond, kink = clock[Clock.BEYOND] > 0.0, ratio > 1.0
+        if ratio > 1.0:
+            lengthen_kink(clock, h, ratio, shortest)
+            clock[Clock.KINKS] += ratio * h
+        else:
+            lengthen(clock, h, ratio, shortest)
         keep(line, h, int(clock[Clock.ORDER]))
         clock[Clock.WAIT] = max(0.0, clock[Clock.WAIT] - 1.0)
         clock[Clock.ERROR] += ratio * h
-        if kink:
-            clock[Clock.KINKS] += ratio * h
-            clock[Clock.SHORT] = 5.0 * h if beyond else max(clock[Clock.RECENT], 5.0 * h)
-            return _SOLVED
-        length = next_length(h, ratio, clock[Clock.SHORT_RATIO], _power(clock))
-        clock[Clock.RECENT], clock[Clock.SHORT_RATIO] = h, max(ratio, 1e-4)
-        clock[Clock.SHORT] = max(length, clock[Clock.SHORT] if h < 0.99 * clock[Clock.SHORT] else shortest)
         return _SOLVED
     if status == _NOT_FINITE or status == _CONTACT_SUNK:
         return status
     if clock[Clock.BEYOND] > 0.0:
         return _go_beyond(clock, h, rest, goal[AccuracyGoal.IMPACT], status)
     if status == _SOLVED and clock[Clock.HIT] > 0.0:  # its error is h times the rest of the accuracy for it
-        shorten_impact(clock, h, max(h * min(0.5, max(0.01, 0.8 * _KINK / (ratio * h))), shortest))
+        left = min(_KINK, _KINKS - clock[Clock.KINKS])
+        shorten_impact(clock, h, max(h * min(0.5, max(0.01, 0.8 * left / (ratio * h))), shortest))
     elif status == _SOLVED:
-        clock[Clock.SHORT] = max(min(next_length(h, ratio, 1.0, _power(clock)), 0.9 * h), shortest)
+        shorten(clock, h, ratio, shortest)
     elif status == LANDS:
         return _SOLVED if h > _INSTANT else _ACCURACY_NOT_REACHED
     elif h <= shortest:
         clock[Clock.BEYOND] = 1.7 * h
     else:
-        clock[Clock.SHORT] = max(0.25 * h, shortest)
+        shorten_unsolved(clock, h, shortest)
     return _SOLVED
 
 
@@ -224,7 +213,7 @@ def attempt(
     long = min(clock[Clock.LONG], rest, reach)
     if long < rest < 2.0 * long:
         long = 0.5 * rest
-    short = min(clock[Clock.SHORT], clock[Clock.CUT], rest)
+    short = min(clock[Clock.SHORT], clock[Clock.CUT], rest, before_impact(clock))
     if clock[Clock.BEYOND] > 0.0:
         short, long = min(clock[Clock.BEYOND], rest), 0.0
     if short < rest < 2.0 * short and clock[Clock.BEYOND] == 0.0:

@@ -63,6 +63,17 @@ def _longest_rebound(model: Model, data: Data, h: float, accuracy: float, c: int
 
 
 @kernel
+def _time_to_land(model: Model, data: Data, h: float, c: int, on_ground: bool) -> float:
+    """Time until contact c is reached, on a parabola to the ground, at its speed to another body, from its gaps at
+    configurations 1 and 2 [s].
+    """
+    g, gap = model.gravity, data.bounce[c, Bounce.GAP2]
+    fall = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) if on_ground else 0.0
+    speed = (data.bounce[c, Bounce.GAP1] - gap) / h + 0.5 * fall * h
+    return 2.0 * gap / (speed + sqrt(speed * speed + 2.0 * fall * gap))
+
+
+@kernel
 def landing(
     model: Model, data: Data, options: StepOptions, accuracy: float, mean: Vector, slips: Vector
 ) -> Landing:  # fmt: skip
@@ -95,7 +106,7 @@ def landing(
             push = h * jump / mass if mass > 0.0 else NEVER
             error = max(error, min(2.0 * gap, push))
             if before > gap:
-                ahead = min(ahead, h * gap / (before - gap))
+                ahead = min(ahead, _time_to_land(model, data, h, c, m < data.active_ground_count[0]))
             if push > h * h * _ACCELERATION:
                 slips[c] = UNKNOWN
             hits = hits or push > h * h * _HIT

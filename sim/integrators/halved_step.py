@@ -1,20 +1,30 @@
-"""An attempt of order 2: one step of length h, its two halves, which are kept, and their difference.
+"""An attempt of order 2: one step of length h, its two halves, and their difference.
 
-Along loops and gears, without contacts and limits, the same step in three parts is extrapolated with both
-(extrapolated_step.py); the result is kept if its error is smaller.
+They are extrapolated to order 4 where the motion is smooth, or along loops and gears, without contacts and limits, to
+order 6 with the same step in three parts (extrapolated_step.py). Elsewhere the halves are kept.
 """
 
 from __future__ import annotations
 
 from sim.contact.contact_report import report_contacts
 from sim.dynamics.state_manifold import configuration_difference
-from sim.integrators.contact_events import landing
-from sim.integrators.extrapolated_step import extrapolate
-from sim.integrators.node_step import begin_part, mean_of_node, node_of_mean, part_of, step_mean
+from sim.integrators.contact_events import NEVER, Landing, landing
+from sim.integrators.extrapolated_step import CLOSED, NOISE, extrapolate, raise_order
+from sim.integrators.node_step import (
+    begin_part,
+    mean_of_node,
+    node_of_mean,
+    part_of,
+    scale_impulses,
+    step_mean,
+    within,
+)
 from sim.integrators.slip_stop import stopping_error
+from sim.integrators.substep_lengths import before_landing, shorten_impact
 from sim.integrators.substeps import AccuracyGoal, Clock, Embedded, SubstepState
 from sim.model.layout import data_view, model_view
-from sim.model.options import StepOptions
+from sim.model.model import Model
+from sim.model.options import Guess, StepOptions
 from solvers.compiler import Table, kernel
 from solvers.dense import copy_vector
 from solvers.status import Status
@@ -26,47 +36,82 @@ FAILED = 1e300
 _SOLVED = int(Status.SOLVED)
 _TOUCHING = 0.125  # gap of a contact that closes, in accuracies
 _PRESSED, _HELD = 8.0, 4.0
-# [m, rad] invisible error: the gap of a contact on the central path is no more exact, nor that of a loop
-_NOISE, _CLOSED = 1e-10, 1e-12
 _OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes deeper ones, whatever its length
 _LITTLE, _WAIT = 0.01, 4.0  # least ratio of a step that is extrapolated; steps without that after one in vain
+_NEAR_START = 0.01  # share of the tolerance
+_SETTLES = 4.0  # times the length in which contacts settle: in shorter steps their gaps oscillate
+_FEW = 40  # iterations of a step that may be shorter: at folds, the interior point would try all its starts
 _AHEAD = 1e-3  # [s] least length of the steps behind an impact whose velocities are compared
 
 
 @kernel
-def shorten_impact(clock: Vector, tried: float, h: float) -> None:
-    """Steps with an impact are no longer than h < tried; where it comes later than h/2, a step ends before it."""
-    clock[Clock.IMPACT], ahead = h, clock[Clock.AHEAD]
-    clock[Clock.CUT] = 0.98 * ahead if 0.5 * h < ahead < tried else h
+def _hands_on(model: Model) -> bool:
+    """Whether steps start near others of the same node: not with loops, gears and pairs of bodies, where the whole step
+    and its halves might end in different solutions.
+    """
+    return model.loop_ntrans.shape[0] + model.gear_dof.shape[0] + model.pair_kind.shape[0] == 0
+
+
+@kernel
+def _share(model: Model) -> float:
+    """Of the tolerance: a start near the solution ends just within it, one far away well within it."""
+    return _NEAR_START if _hands_on(model) else 1.0
+
+
+@kernel
+def _guess_half(line: SubstepState, nq: int, part: int) -> None:
+    """line.ahead = guess of the mean velocity of a half of the step from line.mean, or line.half, to line.whole: on the
+    parabola of that step, or after its impact.
+    """
+    v15, v25, one, hits = line.mean, line.whole, line.half, line.clock[Clock.HIT] > 0.0
+    for d in range(nq, v25.shape[0]):
+        if part == 0:
+            line.ahead[d] = v25[d] if hits else 0.75 * v25[d] + 0.25 * v15[d]
+        else:
+            line.ahead[d] = one[d] if hits else 2.0 * v25[d] - one[d]
 
 
 @kernel
 def _two_halves(model_at: Table, data_at: Table, options: StepOptions, line: SubstepState) -> int:
-    """line.trial = the node two steps after line.x, line.mean = its mean state, line.parts their contacts; Status."""
+    """line.trial = the node two steps after line.x, line.mean = its mean state, line.parts their contacts; Status.
+
+    Where _hands_on, they start near the undivided step, which is in line.whole and in the Data, with its forces.
+    """
     model, data, h = model_view(model_at), data_view(data_at), options.h
+    nq, near = data.theta1.shape[0], _hands_on(model)
+    _guess_half(line, nq, 0)
     begin_part(data, line.wrench)
     status = mean_of_node(model_at, data_at, h, line.u, line.x, line.mean)
     begin_part(data, line.wrench)
+    scale_impulses(model, data, 0.5 if line.clock[Clock.HIT] == 0.0 else 1.0)
     for part in range(2):
         if status == _SOLVED:
             one, other = (line.mean, line.half) if part == 0 else (line.half, line.mean)
-            status = step_mean(model, data, options, line.u, one, other, line.report)
+            guess = Guess(line.ahead[nq:] if near else one[nq:], part == 1 or near)
+            status = step_mean(model, data, options, line.u, one, guess, other, line.report)
             report_contacts(model, data, h, line.parts[part])
+            _guess_half(line, nq, 1)
     return node_of_mean(model, data, h, line.u, line.mean, line.trial) if status == _SOLVED else status
 
 
 @kernel
 def _step_ahead(
-    model_at: Table, data_at: Table, options: StepOptions, line: SubstepState, x: Vector, out: Vector
+    model_at: Table, data_at: Table, options: StepOptions, line: SubstepState, x: Vector, out: Vector, again: bool
 ) -> int:  # fmt: skip
-    """out = the mean state one step after the node x, in which the ground acts on both alike; the Status."""
+    """out = the mean state one step after the node x, in which the ground acts on both alike; the Status.
+
+    again: the step before was the same, to line.ahead, from a node nearby.
+    """
     model, data = model_view(model_at), data_view(data_at)
     begin_part(data, line.wrench)
     status = mean_of_node(model_at, data_at, options.h, line.u, x, line.half)
     if status != _SOLVED:
         return status
     begin_part(data, line.wrench)
-    return step_mean(model, data, options, line.u, line.half, out, line.report)
+    nq = data.theta1.shape[0]
+    near = again and _hands_on(model)
+    guess = Guess(line.ahead[nq:] if near else line.half[nq:], near)
+    return step_mean(model, data, options, line.u, line.half, guess, out, line.report)
 
 
 @kernel
@@ -85,11 +130,11 @@ def _difference(
     model, data = model_view(model_at), data_view(data_at)
     nq, hits = data.theta1.shape[0], line.clock[Clock.HIT] > 0.0
     one, other, presses = line.node, line.trial, data.active_count[0] > 0
-    if hits and _step_ahead(model_at, data_at, options, line, line.node, line.ahead) == _SOLVED:
-        if _step_ahead(model_at, data_at, options, line, line.trial, line.node) == _SOLVED:
+    if hits and _step_ahead(model_at, data_at, options, line, line.node, line.ahead, False) == _SOLVED:
+        if _step_ahead(model_at, data_at, options, line, line.trial, line.node, True) == _SOLVED:
             one, other = line.ahead, line.node
     configuration_difference(model, line.whole[:nq], line.mean[:nq], embedded.distance)
-    noise = _NOISE if model.contact_body.shape[0] + model.limit_dof.shape[0] > 0 else _CLOSED
+    noise = NOISE if model.contact_body.shape[0] + model.limit_dof.shape[0] > 0 else CLOSED
     error, time = 0.0, max(goal[AccuracyGoal.END] - line.clock[Clock.TIME], 0.5) if hits else 0.0
     for d in range(embedded.distance.shape[0]):
         moved, turned = 0.5 * abs(embedded.distance[d]), abs(one[nq + d] - other[nq + d])
@@ -118,7 +163,7 @@ def _extrapolated(
         return ratio
     if clock[Clock.BEYOND] + clock[Clock.WAIT] > 0.0 or not ratio > _LITTLE:
         return ratio
-    error = max(extrapolate(models[1], works[0], settings, goal, line, embedded, h) - _CLOSED, 0.0)
+    error = max(extrapolate(models[1], works[0], settings, goal, line, embedded, h) - CLOSED, 0.0)
     better = _HELD * error / (goal[AccuracyGoal.ACCURACY] * h)
     if better > 0.5 * ratio:
         clock[Clock.WAIT] = _WAIT
@@ -129,39 +174,98 @@ def _extrapolated(
 
 
 @kernel
+def _patient(model: Model, goal: Vector, settings: Vector, clock: Vector, h: float) -> StepOptions:
+    """Options of a step of length h in two parts: with few iterations where a shorter one can be tried instead."""
+    options = part_of(goal, settings, h, 2)
+    needed = h <= goal[AccuracyGoal.IMPACT] or clock[Clock.BEYOND] > 0.0
+    return within(options, options.max_iterations if needed else _FEW, _share(model))
+
+
+@kernel
+def _whole(model_at: Table, data_at: Table, options: StepOptions, line: SubstepState) -> int:
+    """line.whole = the mean state one step after the node line.x, line.mean = that before; the Status.
+
+    It starts with the forces of the step that stands in the Data, where they go on.
+    """
+    model, data, warm = model_view(model_at), data_view(data_at), line.clock[Clock.WARM]
+    line.clock[Clock.WARM] = 0.0
+    begin_part(data, line.wrench)
+    status = mean_of_node(model_at, data_at, options.h, line.u, line.x, line.mean)
+    if status != _SOLVED:
+        return status
+    begin_part(data, line.wrench)
+    if warm > 0.0:
+        scale_impulses(model, data, options.h / warm)
+    guess = Guess(line.mean[data.theta1.shape[0] :], warm > 0.0)
+    return step_mean(model, data, options, line.u, line.mean, guess, line.whole, line.report)
+
+
+@kernel
+def _ends_before(goal: Vector, line: SubstepState, found: Landing, h: float) -> bool:
+    """Whether the step, of length h, has to end before a contact or limit that it reaches, and is cut there."""
+    clock = line.clock
+    clock[Clock.HIT], clock[Clock.AHEAD] = 1.0 if found.hits else 0.0, found.ahead
+    if found.longest < NEVER:
+        clock[Clock.LEAST] = 0.0
+    if found.longest < h:
+        clock[Clock.CUT] = found.longest
+        return True
+    if found.hits and h > clock[Clock.IMPACT] and clock[Clock.BEYOND] == 0.0:
+        shorten_impact(clock, h, clock[Clock.IMPACT])
+        return True
+    if found.error > 2.0 * _TOUCHING * goal[AccuracyGoal.ACCURACY]:
+        clock[Clock.CUT] = before_landing(h, found.ahead)
+        return True
+    return False
+
+
+@kernel
+def _judged(
+    models: Table, works: Table, step: tuple[Vector, Vector, float], line: SubstepState, embedded: Embedded
+) -> float:  # fmt: skip
+    """Error over allowed of the best of the steps of order 2, 4 and 6, which is then in line.trial.
+
+    step: (goal, settings, length)
+    """
+    model, data, clock = model_view(models[1]), data_view(works[0]), line.clock
+    goal, settings, h = step
+    stop = stopping_error(model, line.parts, line.slips, h)
+    behind = part_of(goal, settings, max(0.5 * h, _AHEAD), 1)
+    error = max(stop, _difference(models[1], works[0], behind, goal, line, embedded))
+    allowed = goal[AccuracyGoal.ACCURACY] * h
+    settles = data.active_count[0] > 0 and h < _SETTLES * goal[AccuracyGoal.SETTLED]
+    if clock[Clock.HIT] + clock[Clock.BEYOND] == 0.0 and not settles:
+        raised = raise_order(model, data, line, embedded)
+        if raised < FAILED:
+            clock[Clock.ORDER] = 4.0
+            return max(raised, stop) / allowed
+    return _extrapolated(models, works, step, line, embedded, error / allowed)
+
+
+@kernel
 def try_short(
     models: Table, works: Table, settings: Vector, goal: Vector, line: SubstepState, embedded: Embedded, h: float
 ) -> tuple[int, float]:  # fmt: skip
-    """line.trial = the node one step of order 2, in two halves, after line.x; (Status or LANDS, error over allowed)."""
-    model, data, options = model_view(models[1]), data_view(works[0]), part_of(goal, settings, h, 2)
-    line.clock[Clock.ORDER] = 2.0
-    begin_part(data, line.wrench)
-    status = mean_of_node(models[1], works[0], h, line.u, line.x, line.mean)
-    if status == _SOLVED:
-        begin_part(data, line.wrench)
-        status = step_mean(model, data, options, line.u, line.mean, line.whole, line.report)
+    """line.trial = the node one step of length h after line.x; (Status or LANDS, error over allowed)."""
+    model, data, clock = model_view(models[1]), data_view(works[0]), line.clock
+    options = _patient(model, goal, settings, clock, h)
+    clock[Clock.ORDER] = 2.0
+    status = _whole(models[1], works[0], options, line)
     if status != _SOLVED:
         return status, FAILED
+    report_contacts(model, data, h, line.parts[2])
     found = landing(model, data, options, goal[AccuracyGoal.ACCURACY], line.mean, line.slips)
-    line.clock[Clock.HIT], line.clock[Clock.AHEAD] = 1.0 if found.hits else 0.0, found.ahead
+    clock[Clock.WARM] = h if _hands_on(model) and not found.hits else 0.0
     status = node_of_mean(model, data, h, line.u, line.whole, line.node)
-    if found.longest < h:
-        line.clock[Clock.CUT], line.clock[Clock.LEAST] = found.longest, 0.0
-        return LANDS, FAILED
-    if found.hits and h > line.clock[Clock.IMPACT] and line.clock[Clock.BEYOND] == 0.0:
-        shorten_impact(line.clock, h, line.clock[Clock.IMPACT])
-        return LANDS, FAILED
-    if found.error > 2.0 * _TOUCHING * goal[AccuracyGoal.ACCURACY]:
-        line.clock[Clock.CUT] = max(min(0.9 * found.ahead, 0.5 * h), 0.02 * h)
+    if _ends_before(goal, line, found, h):
         return LANDS, FAILED
     if status == _SOLVED:
-        status = _two_halves(models[1], works[0], part_of(goal, settings, 0.5 * h, 1), line)
+        parts = within(part_of(goal, settings, 0.5 * h, 1), options.max_iterations, _share(model))
+        clock[Clock.WARM] *= 0.5
+        status = _two_halves(models[1], works[0], parts, line)
     if status != _SOLVED:
+        clock[Clock.WARM] = 0.0
         return status, FAILED
     if found.depth > _OVERLAP:
         return _SOLVED, 0.0
-    error = stopping_error(model, line.parts, line.slips, h)
-    behind = part_of(goal, settings, max(0.5 * h, _AHEAD), 1)
-    error = max(error, _difference(models[1], works[0], behind, goal, line, embedded))
-    ratio = error / (goal[AccuracyGoal.ACCURACY] * h)
-    return _SOLVED, _extrapolated(models, works, (goal, settings, h), line, embedded, ratio)
+    return _SOLVED, _judged(models, works, (goal, settings, h), line, embedded)

@@ -17,6 +17,7 @@ begins there makes up for the gravity of both its halves, whatever their lengths
 
 from __future__ import annotations
 
+from sim.contact.contact_law import scale_contact
 from sim.dynamics.elimination import add_children, dot_six
 from sim.dynamics.energy import solve_mass_matrix
 from sim.dynamics.external_forces import input_wrench, set_external
@@ -28,7 +29,7 @@ from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import InputKind, Model
 from sim.model.options import Guess, StepOptions
-from sim.model.record_columns import StepReport, StepSetting
+from sim.model.record_columns import Bound, StepReport, StepSetting
 from sim.solve.start_velocity import meet_momentum, momentum_error, momentum_of_velocity
 from sim.step import step
 from solvers.compiler import Table, kernel
@@ -128,19 +129,39 @@ def part_of(goal: Vector, settings: Vector, h: float, parts: int) -> StepOptions
 
 
 @kernel
+def within(options: StepOptions, most: int, share: float) -> StepOptions:
+    """The options with at most so many iterations, and a share of the tolerance."""
+    iterations, tolerance = min(options.max_iterations, most), share * options.tolerance
+    return StepOptions(options.h, options.kappa, tolerance, iterations, options.gain, options.loss)
+
+
+@kernel
 def step_mean(
-    model: Model, data: Data, options: StepOptions, u: Vector, mean: Vector, out: Vector, report: Vector
+    model: Model, data: Data, options: StepOptions, u: Vector, mean: Vector, guess: Guess, out: Vector, report: Vector
 ) -> int:
     """out = (q, v25) one step after mean = (q, v15); the Status. Iterations are added up, the rest is the largest."""
-    nq = data.theta1.shape[0]
     iterations = report[StepReport.ITERATIONS]
     residual, violation = report[StepReport.RESIDUAL], report[StepReport.VIOLATION]
-    follows = data.carry.steps[0] > 0
-    status = step(model, data, options, mean, u, Guess(mean[nq:], follows), out, report)
+    status = step(model, data, options, mean, u, guess, out, report)
     report[StepReport.ITERATIONS] += iterations
     report[StepReport.RESIDUAL] = max(report[StepReport.RESIDUAL], residual)
     report[StepReport.VIOLATION] = max(report[StepReport.VIOLATION], violation)
     return status
+
+
+@kernel
+def followed(data: Data, mean: Vector) -> Guess:
+    """Guess of a step after mean = (q, v15): its velocity, with the impulses of the step before where there is one."""
+    return Guess(mean[data.theta1.shape[0] :], data.carry.steps[0] > 0)
+
+
+@kernel
+def scale_impulses(model: Model, data: Data, ratio: float) -> None:
+    """Impulses of the last step times the ratio of lengths: those of a step in which the same forces act."""
+    for c in range(data.cone.shape[0]):
+        scale_contact(model, data, c, ratio)
+    for k in range(data.bound.shape[0]):
+        data.bound[k, Bound.IMPULSE] *= ratio
 
 
 @kernel

@@ -1,6 +1,6 @@
 """Errors at the end of sliding, which the comparison of a step with its two halves does not show.
 
-parts    (2, ncontact, 11) contacts of both halves, as in rollout.py
+parts    (3, ncontact, 11) contacts of both halves and of the whole step, as in rollout.py
 slips    (ncontact,) at the node where the step begins; UNKNOWN, or BEGINS where nothing went before
 """
 
@@ -14,6 +14,16 @@ from sim.model.record_columns import ContactRow
 from solvers.compiler import kernel
 from solvers.types import Cube, Vector
 
+_TURN = 1e-3  # change of the friction over the normal impulse
+_SLIPS = 1e-3  # [m/s]
+
+
+@kernel
+def _normal_impulse(row: Vector) -> float:
+    """That of a contact [N s], from its row (11,)."""
+    p, n = row[ContactRow.IMPULSE : ContactRow.POINT], row[ContactRow.NORMAL :]
+    return p[0] * n[0] + p[1] * n[1] + p[2] * n[2]
+
 
 @kernel
 def _first_stop(model: Model, parts: Cube, c: int, h: float) -> float:
@@ -23,8 +33,7 @@ def _first_stop(model: Model, parts: Cube, c: int, h: float) -> float:
     """
     f, n = (0.0, 0.0), (0.0, 0.0)
     for half in range(2):
-        p, m = parts[half, c, ContactRow.IMPULSE : ContactRow.POINT], parts[half, c, ContactRow.NORMAL :]
-        normal = p[0] * m[0] + p[1] * m[1] + p[2] * m[2]
+        p, normal = parts[half, c, ContactRow.IMPULSE : ContactRow.POINT], _normal_impulse(parts[half, c])
         size = p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - normal * normal
         f, n = (f[1], sqrt(max(size, 0.0))), (n[1], normal)
     mass, mu = model.body_mass[model.contact_body[c]], model.contact_friction[c]
@@ -52,3 +61,25 @@ def stopping_error(model: Model, parts: Cube, slips: Vector, h: float) -> float:
         elif before == BEGINS:
             error = max(error, _first_stop(model, parts, c, h))
     return error
+
+
+@kernel
+def friction_turns(parts: Cube) -> bool:
+    """Whether the friction of a contact that slides, over its normal impulse, differs in both halves.
+
+    It acts along the slip in the end of a step. Where that turns, the error is of order 1, and alike in a step and its
+    halves.
+    """
+    for c in range(parts.shape[1]):
+        one, other = parts[0, c], parts[1, c]
+        before, after = _normal_impulse(one), _normal_impulse(other)
+        if before <= 0.0 or after <= 0.0 or min(one[ContactRow.SLIP], other[ContactRow.SLIP]) < _SLIPS:
+            continue
+        turned = 0.0
+        for k in range(3):
+            n1, n2 = one[ContactRow.NORMAL + k], other[ContactRow.NORMAL + k]
+            change = other[ContactRow.IMPULSE + k] / after - n2 - one[ContactRow.IMPULSE + k] / before + n1
+            turned += change * change
+        if turned > _TURN * _TURN:
+            return True
+    return False

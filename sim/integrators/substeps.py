@@ -33,8 +33,13 @@ class Clock(Code):
     IMPACT = 14  # longest length of a step with an impact
     BEGUN = 15  # 0 before the first sub-step
     ANY = 16  # 1 where no length beyond the shortest has an error that is allowed: whatever error is kept
-    ORDER = 17  # of the step in the trial: 2, or 6 where it is extrapolated
+    ORDER = 17  # of the step in the trial: 2, or 4 or 6 where it is extrapolated
     WAIT = 18  # steps of order 2 until the next extrapolation is tried
+    WARM = 19  # length of the step whose impulses are in the Data of order 2, 0 where they are of no use [s]
+    LANDING = 20  # time of the impact that IMPACT is for [s]
+    CEILING = 21  # longest length: half of one without a solution, and more after every step since [s]
+    REFUSED = 22  # 1 where the error of a step from this node was too large
+    MISSES = 23  # steps of the shortest length in a row whose error is too large
 
 
 class AccuracyGoal(Code):
@@ -62,9 +67,9 @@ class SubstepState(NamedTuple):
     half: Vector
     node: Vector  # (nx,) scratch: the node after the undivided step
     ahead: Vector  # (nx,) scratch: mean state of a step from there
-    clock: Vector  # (19,) in place
+    clock: Vector  # (24,) in place
     report: Vector  # (6,)
-    parts: Cube  # (2, ncontact, 11) scratch
+    parts: Cube  # (3, ncontact, 11) scratch: contacts of both halves, and of the whole step
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the step
     contacts: Matrix  # (ncontact, 11) in place: impulses so far, the rest of the last step
     starts: Matrix  # (n, nx) nodes where the sub-steps begin, of those since the last pause
@@ -94,6 +99,7 @@ def begin_substeps(line: SubstepState, end: float) -> None:
     clock[Clock.SHORT] = clock[Clock.LONG] = end
     clock[Clock.SHORT_RATIO] = clock[Clock.LONG_RATIO] = 1.0
     clock[Clock.LEAST] = clock[Clock.CUT] = clock[Clock.IMPACT] = NEVER
+    clock[Clock.CEILING] = NEVER
     clock[Clock.BEGUN] = 1.0
     for c in range(line.slips.shape[0]):
         line.slips[c] = BEGINS
@@ -109,6 +115,7 @@ def keep(line: SubstepState, h: float, order: int) -> None:
     copy_vector(line.trial, line.x)
     line.clock[Clock.TIME] += h
     line.clock[Clock.CUT] = line.clock[Clock.LEAST] = NEVER
+    line.clock[Clock.REFUSED] = 0.0
     line.clock[Clock.BEYOND] = line.clock[Clock.ANY] = 0.0
     if order == 8 or line.clock[Clock.HIT] > 0.0:
         line.clock[Clock.IMPACT] = NEVER

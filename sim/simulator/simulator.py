@@ -108,8 +108,9 @@ class Simulator(StateSpace):
         return {**given, "order": 2 if self.accuracy else self.order, "kappa": self._kappa, "accuracy": self.accuracy}
 
     def __repr__(self) -> str:
-        shown = zip(_SETTINGS[: None if self.accuracy else -1], self._engine.settings, strict=False)
-        return f"Simulator({self.mechanism.name}, {', '.join(f'{name}={value:g}' for name, value in shown)})"
+        names = _SETTINGS[: None if self.accuracy else -1]
+        shown = ", ".join(f"{name}={getattr(self._engine.settings, name):g}" for name in names)
+        return f"Simulator({self.mechanism.name}, {shown})"
 
     def replace(self, **settings: Any) -> Simulator:
         """The same simulator with other settings. Compiled code is shared, and a default kappa remains the default.

@@ -13,7 +13,10 @@ from scipy.integrate import solve_ivp
 import dojo_opt as dojo
 from dojo_opt import models
 from sim.integrators.adaptive import _allows, _go_beyond
+from sim.integrators.slip_stop import friction_turns
+from sim.integrators.substep_lengths import lengthen, lengthen_kink, shorten, shorten_unsolved
 from sim.integrators.substeps import Clock
+from sim.model.record_columns import ContactRow
 from sim.simulator.engines.adaptive_engine import AdaptiveEngine
 from support.linkage import plain_fourbar
 from support.scenes import ball, block
@@ -163,6 +166,65 @@ def test_orders_agree_on_dampers() -> None:
     assert errors[1] < 0.3 * errors[0]
 
 
+def test_substeps_in_contact_are_of_fourth_order() -> None:
+    """A hopper that sways on its foot: at half the length a quarter of the error of order 2, extrapolated far less."""
+    sim = dojo.Simulator(models.hopper(), accuracy=1e-3)
+    x = sim.neutral()
+    x[sim.nq :] = 0.0, 0.0, 0.9, 0.6, -1.2, 0.6
+    x = sim.rollout(x, steps=2, duration=0.03, throw=True).x[-1]
+    fine, *ends = (
+        replayed(sim, x, np.zeros(sim.nu), (np.full(n, 0.016 / n), np.full(n, order)))
+        for n, order in ((8, 4), (1, 2), (2, 2), (1, 4))
+    )
+    one, two, raised = (np.abs(end - fine)[: sim.nq].max() for end in ends)
+    assert 3.0 < one / two < 5.0
+    assert raised < 0.2 * two
+
+
+def test_impulses_are_those_of_the_momentum() -> None:
+    """Those of a sliding ball, of halves raised to order 4, add up to its change of momentum."""
+    sim = dojo.Simulator(ball(), accuracy=1e-4)
+    motion = sim.rollout(placed(sim, 0.1, 2.0), duration=0.1, throw=True)
+    path = engine(sim).take(motion.x[0], np.zeros(sim.nu), engine(sim).no_wrenches)
+    assert 4 in path.orders
+    gained = motion.x[-1][sim.nq : sim.nq + 3] - motion.x[0][sim.nq : sim.nq + 3]
+    impulse = motion.contacts.impulse.sum(axis=(0, 1)) + [0.0, 0.0, -0.1 * G]
+    np.testing.assert_allclose(impulse, gained, rtol=0.0, atol=1e-8)
+
+
+def test_friction_that_turns_is_seen() -> None:
+    """Rows of both halves: friction over the normal impulse is compared where the contact slides."""
+    parts = np.zeros((3, 1, 11))
+    parts[:, 0, ContactRow.NORMAL + 2], parts[:, 0, ContactRow.SLIP] = 1.0, 0.5
+    parts[0, 0, :3], parts[1, 0, :3] = (0.3, 0.0, 1.0), (0.6, 0.0, 2.0)
+    assert not friction_turns(parts)
+    parts[1, 0, 1] = 0.01
+    assert friction_turns(parts)
+    parts[:, 0, ContactRow.SLIP] = 0.0
+    assert not friction_turns(parts)
+
+
+def test_lengths_that_fail_are_not_tried_again_at_once() -> None:
+    clock = np.zeros(len(Clock))
+    clock[Clock.CEILING], clock[Clock.SHORT_RATIO] = np.inf, 1.0
+    shorten_unsolved(clock, 0.1, 1e-6)
+    assert clock[Clock.SHORT] == 0.025
+    lengthen(clock, 0.025, 1e-6, 1e-6)
+    assert clock[Clock.SHORT] == pytest.approx(0.0625)  # not five times as long
+    shorten(clock, 0.01, 1.1, 1e-6)
+    assert 0.005 < clock[Clock.SHORT] < 0.01
+    shorten(clock, 0.01, 1.1, 1e-6)
+    assert clock[Clock.SHORT] == 0.005
+    tried = []
+    for _ in range(5):  # contacts oscillate: the shortest length misses the accuracy
+        lengthen_kink(clock, 1e-6, 2.0, 1e-6)
+        tried.append(clock[Clock.SHORT])
+    np.testing.assert_allclose(tried, [5e-6, 25e-6, 125e-6, 625e-6, 5e-6])
+    clock[Clock.HIT] = 1.0
+    lengthen(clock, 1e-6, 0.01, 1e-6)
+    assert clock[Clock.SHORT] == 1e-6  # the next impact of a cascade may follow
+
+
 GEARED = dojo.Mechanism(
     [dojo.Body("wheel", 1.0, (0.1, 0.2, 0.3)), dojo.Body("pendulum", 2.0, (0.05, 0.1, 0.1))],
     [
@@ -287,6 +349,7 @@ def test_impossible_accuracies_are_refused() -> None:
     with pytest.raises(ValueError, match="expected a simulator with an accuracy"):
         dojo.Simulator(mech).rollout(np.zeros(4), duration=1.0)
     assert dojo.Simulator(mech, accuracy=1e-3).replace(accuracy=None).order == 2
+    assert repr(dojo.Simulator(mech, accuracy=1e-3)).endswith("divide=1, accuracy=0.001)")
 
 
 def test_contacts_refuse_an_accuracy_that_they_do_not_have() -> None:

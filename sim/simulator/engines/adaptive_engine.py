@@ -54,7 +54,7 @@ _CONVERGED = 1e-6  # tolerance of steps with loops or gears, in accuracies
 _ROWS = 256  # sub-steps between two pauses
 _MOST = 1_000_000  # sub-steps of a step: an input is not held for ever
 
-_DIVISIONS = range(1, PARTS + 1)
+_DIVISIONS = {4: (1, 2), 6: tuple(range(1, PARTS + 1))}  # of extrapolated steps, by their order
 _NUDGE = 1e-3  # of states and inputs, in differences
 
 Held = tuple[Vector, Cube]  # input (nu,) and external wrenches (1 or 0, nbody, 6) of a step
@@ -107,7 +107,7 @@ class AdaptiveEngine(PythonLoopEngine):
                 ahead,
                 np.zeros(len(Clock)),
                 np.zeros(REPORT),
-                np.zeros((2, ncontact, CONTACT)),
+                np.zeros((3, ncontact, CONTACT)),
                 np.zeros(ncontact),
                 np.zeros((ncontact, CONTACT)),
                 np.zeros((_ROWS, nx)),
@@ -168,8 +168,8 @@ class AdaptiveEngine(PythonLoopEngine):
         """The node one sub-step of a length and order after x (nx,); NaN where it is not solved."""
         if order == 8:
             return self._long(x, held, h, False)[0]
-        if order == 6:
-            return self._combined(np.stack([self._equal(x, held, h, n, kappa) for n in _DIVISIONS]))
+        if order != 2:
+            return self._combined(np.stack([self._equal(x, held, h, n, kappa) for n in _DIVISIONS[order]]))
         return self._equal(x, held, h, 2, kappa)
 
     def _equal(self, x: Vector, held: Held, h: float, parts: int, kappa: float | None) -> Vector:
@@ -203,7 +203,7 @@ class AdaptiveEngine(PythonLoopEngine):
             return self._long(x, held, h, True)
         if order == 2:
             return self._equal_slopes(x, held, h, 2, kappa)
-        found = [self._equal_slopes(x, held, h, n, kappa) for n in _DIVISIONS]
+        found = [self._equal_slopes(x, held, h, n, kappa) for n in _DIVISIONS[order]]
         ends = np.stack([end for end, *_ in found])
         shares = np.split(self._combined_slopes(ends), len(ends), axis=1)
         by_x = sum((C @ A for C, (_, A, _, _) in zip(shares, found, strict=True)), np.zeros((self.ndx, self.ndx)))
