@@ -73,8 +73,8 @@ def _settings(given: Sequence[str]) -> list[str]:
     kept: list[str] = []
     words = iter(given)
     for word in words:
-        if word == "--out":
+        if word in ("--out", "--keep"):
             next(words)
-        elif word != "--json" and not word.startswith("--out="):
+        elif word != "--json" and not word.startswith(("--out=", "--keep=")):
             kept.append(word)
     return kept

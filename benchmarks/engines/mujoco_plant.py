@@ -13,6 +13,7 @@ from dojo_opt.plant.plant import Plant
 from sim.mechanism.collision import Collision
 from sim.mechanism.contact import Contact
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere
 from sim.mechanism.terrain import Terrain
 from sim.simulator.results import StepResult
@@ -106,7 +107,9 @@ def _scene(sim: Simulator, options: dict[str, str]) -> tuple[Any, dict[frozenset
         geoms = []
         for side, (name, shape) in enumerate(_sides(sim.mechanism, collision)):
             body = spec.worldbody if name == "world" else spec.body(f"body{names.index(name)}")
-            geom = body.add_geom(name=f"collision{k}_{side}", contype=0, conaffinity=0, mass=0.0, **_geom(shape))
+            place = {"pos": np.asarray(shape.center), "quat": np.asarray(shape.orientation), "mass": 0.0}
+            kind = _mesh(spec, shape) if isinstance(shape, Polytope) else _geom(shape)
+            geom = body.add_geom(name=f"collision{k}_{side}", contype=0, conaffinity=0, **kind, **place)
             geoms.append(geom.name)
         mu = float(collision.friction or 0.0)
         friction = [mu, mu, 0.005, 1e-4, 1e-4]
@@ -206,21 +209,31 @@ def _sides(mechanism: Mechanism, collision: Collision) -> list[tuple[str, Solid]
     return out
 
 
+def _mesh(spec: Any, shape: Polytope) -> dict[str, Any]:
+    """Type and mesh of a geom whose convex hull is a polytope; the mesh is added once per polytope."""
+    import mujoco
+
+    corners = np.ravel(shape.vertices)
+    name = f"hull{hash(shape.vertices)}"
+    if spec.mesh(name) is None:
+        spec.add_mesh(name=name, uservert=corners)
+    return {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": name}
+
+
 def _geom(shape: Solid) -> dict[str, Any]:
-    """Type, size and place of a geom."""
+    """Type and size of a geom."""
     import mujoco
 
     kinds = mujoco.mjtGeom
-    place = {"pos": np.asarray(shape.center), "quat": np.asarray(shape.orientation)}
     match shape:
         case Sphere():
-            return {"type": kinds.mjGEOM_SPHERE, "size": [shape.radius, 0.0, 0.0], **place}
+            return {"type": kinds.mjGEOM_SPHERE, "size": [shape.radius, 0.0, 0.0]}
         case Capsule():
-            return {"type": kinds.mjGEOM_CAPSULE, "size": [shape.radius, 0.5 * shape.length, 0.0], **place}
+            return {"type": kinds.mjGEOM_CAPSULE, "size": [shape.radius, 0.5 * shape.length, 0.0]}
         case Cylinder():
-            return {"type": kinds.mjGEOM_CYLINDER, "size": [shape.radius, 0.5 * shape.length, 0.0], **place}
+            return {"type": kinds.mjGEOM_CYLINDER, "size": [shape.radius, 0.5 * shape.length, 0.0]}
         case Box():
-            return {"type": kinds.mjGEOM_BOX, "size": [0.5 * shape.x, 0.5 * shape.y, 0.5 * shape.z], **place}
+            return {"type": kinds.mjGEOM_BOX, "size": [0.5 * shape.x, 0.5 * shape.y, 0.5 * shape.z]}
         case HalfSpace():
-            return {"type": kinds.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0], **place}
+            return {"type": kinds.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0]}
     raise ValueError(f"MujocoPlant: no geom for a {type(shape).__name__}")

@@ -193,25 +193,28 @@ def quadratic(
     return Tracking(reference, np.vstack([np.tile(dt * rows[0], (horizon, 1)), rows[1]]))
 
 
-def servo_effort(sim: Simulator, own: Mechanism, weight: ArrayLike, horizon: int) -> ResidualCost:
-    """sum_t tau_t' R tau_t of the forces tau = u - kp (q - rest) - kd v of servos in the model.
+def servo_effort(
+    sim: Simulator, own: Mechanism, weight: ArrayLike, horizon: int, reference: ArrayLike = 0.0
+) -> ResidualCost:
+    """sum_t (tau_t - r)' R (tau_t - r) of the forces tau = u - kp (q - rest) - kd v of servos in the model.
 
     Args:
         sim: simulator of a model whose driven joints have springs and dampers.
         own: mechanism of the robot, without them.
         weight: R, a number or (nu,) [1/N^2, 1/(N m)^2].
         horizon: number T of knots.
+        reference: r, a number or (nu,) [N, N m] (default 0).
 
     Returns:
         The cost.
     """
-    servo = ModelServo(sim, own)
+    servo, wanted = ModelServo(sim, own), np.array(np.broadcast_to(reference, (sim.nu,)), dtype=np.float64)
     kp, kd, rest, nu, ndx = servo.kp, servo.kd, servo.rest, sim.nu, sim.ndx
     place, velocity, dof, nv = servo.place, servo.velocity, servo.dof, sim.nv
 
     def force(x, u, out):  # type: ignore[no-untyped-def]
         for i in range(nu):
-            out[i] = u[i] - kp[i] * (x[place[i]] - rest[i]) - kd[i] * x[velocity[i]]
+            out[i] = u[i] - kp[i] * (x[place[i]] - rest[i]) - kd[i] * x[velocity[i]] - wanted[i]
 
     def slope(x, u, out):  # type: ignore[no-untyped-def]
         for i in range(nu):

@@ -13,7 +13,9 @@ from dojo_opt.mpc.moving_reference import AnchoredReference
 from dojo_opt.mpc.servo import ModelServo
 from dojo_opt.planning.iterate import Iteration
 from dojo_opt.tasks.free_gait import Lead
+from dojo_opt.tasks.idto.allegro_ball import squeezing
 from dojo_opt.tasks.idto.mini_cheetah import with_cylinders
+from dojo_opt.tasks.jin import palm_up
 from dojo_opt.tasks.suite import servo_effort
 from sim.mechanism.overlaps import overlaps
 from solvers.status import Status
@@ -105,6 +107,25 @@ def test_a_hand_turns_a_ball_below_its_palm():
     outcome = task.outcome(loop)
     assert outcome.measures["angle off [deg]"] < 70.0  # of 90
     assert outcome.penetration < 1e-4
+
+
+def test_squeezing_torques_are_those_of_a_force_on_the_ball():
+    """Their power is that of 2 N along the gaps that the simulator sees, which shrink by it; abduction included."""
+    task = dojo.tasks.idto.allegro_upside_down()
+    sim, q = task.model.replace(time_step=1e-6), task.start[:23]
+    torques, step = squeezing(sim.mechanism, q, 2.0), 1e-5
+
+    def gap(x):
+        return sim.step(x).contacts.gap.ravel()
+
+    for first in range(0, 16, 4):
+        moved = task.start.copy()
+        moved[first : first + 4] += step * torques[first : first + 4]
+        before, after = gap(task.start), gap(moved)
+        power = -np.sum(torques[first : first + 4] ** 2)
+        nearest = np.flatnonzero(np.abs(before - after) > 1e-10)
+        nearest = nearest[np.argmin(before[nearest])]  # of this finger: those of the others do not move
+        assert 2.0 * (after - before)[nearest] / step == pytest.approx(power, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -393,3 +414,21 @@ def test_a_task_runs_on_the_plant_of_mujoco():
     assert task.outcome(ours).penetration < 1e-6
     with pytest.raises(ValueError, match="only the start"):
         plants[0].perturbed(dojo.Perturbation())
+
+
+def test_mujoco_has_the_hull_of_a_polytope():
+    """A torus 1 mm deep in the palm of a hand, which is level, and stands on an edge of its hull when it is turned."""
+    pytest.importorskip("mujoco")
+    from benchmarks.engines.mujoco_plant import MujocoPlant
+
+    sim = dojo.Simulator(palm_up.mechanism("torus"), time_step=2e-3)
+    corners = np.asarray(palm_up.SHAPES["torus"].vertices)
+    for turn in ((1.0, 0.0, 0.0, 0.0), (0.8, 0.6, 0.0, 0.0)):
+        start = np.zeros(sim.nx)
+        start[3:7] = turn
+        lowest = min(turned(np.asarray(turn), corner)[2] for corner in corners)
+        start[2] = 0.0111 - lowest - 1e-3  # the palm is 11.1 mm above the middle of the hand
+        start[0] = -0.01
+        plant = MujocoPlant(sim, start)
+        _, result = plant.step(np.zeros(sim.nu))
+        assert result.contacts.gap.min() == pytest.approx(-1e-3, abs=1e-4)

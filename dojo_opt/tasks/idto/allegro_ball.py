@@ -15,11 +15,15 @@ from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.tasks.idto.allegro_hand import JOINTS, STIFFNESS, Angles, mechanism
 from dojo_opt.tasks.suite import SuiteTask, quadratic, servo_effort, timed
+from sim.mechanism.collision import Collision
+from sim.mechanism.forward_kinematics import body_poses
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.shapes import Sphere
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
 from solvers.types import Vector
 
-__all__ = ["BallTurn", "turning"]
+__all__ = ["BallTurn", "squeezing", "turning"]
 
 _KNOT, _HORIZON, _RATE, _DURATION = 0.05, 40, 10.0, 10.0  # [s], knots, [Hz], [s]
 _ANGLE = np.radians(15.0)  # [rad] off the goal at the end
@@ -47,6 +51,7 @@ class BallTurn:
         end: weights of (fingers, ball, velocities of the fingers, of the ball) at the last knot.
         smoothing: those of rollouts and of derivatives in the stages of the first plan [N s m].
         reach: smallest and largest height at which the fingers hold the ball [m].
+        squeeze: force of each finger on the ball whose torques cost nothing [N] (default 0).
     """
 
     name: str
@@ -60,6 +65,7 @@ class BallTurn:
     end: tuple[float, float, float, float]
     smoothing: tuple[tuple[float, float], ...]
     reach: tuple[float, float]
+    squeeze: float = 0.0
 
     __repr__ = short_repr
 
@@ -86,7 +92,9 @@ def turning(task: BallTurn, settings: Mapping[str, Any]) -> SuiteTask:
     goal[:JOINTS] = np.concatenate(list(task.nominal.values()))
     goal[_QUATERNION] = 0.5**0.5 * np.array([1.0, 0.0, 0.0, -1.0])
     running, end = _weights(_FINGERS, _BALL, _FINGER_RATES, _BALL_RATES), _weights(*task.end)
-    cost = [quadratic(goal, _KNOT, _HORIZON, running, end), servo_effort(sim, own, _KNOT * _EFFORT, _HORIZON)]
+    grip = squeezing(own, sim.neutral()[: sim.nq], task.squeeze)
+    effort = servo_effort(sim, own, _KNOT * _EFFORT, _HORIZON, grip)
+    cost = [quadratic(goal, _KNOT, _HORIZON, running, end), effort]
     guess = STIFFNESS * (goal if task.closing else start)[:JOINTS]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=guess)
     given = timed(_RATE) | {"servo": own, "gain_scale": 0.0}
@@ -97,6 +105,39 @@ def turning(task: BallTurn, settings: Mapping[str, Any]) -> SuiteTask:
     spread = np.concatenate([np.full(JOINTS, task.spread), np.full(3, 1e-3), np.full(3, 0.1), np.full(22, 0.02)])
     judge = _Turned(goal[_QUATERNION], task.reach)
     return SuiteTask(task.name, mpc, model, start, _DURATION, spread, judge, _RATE, lost=judge.lost)
+
+
+def squeezing(hand: Mechanism, q: Vector, force: float) -> Vector:
+    """Torques by which each finger presses on the ball: the sphere of the finger that is nearest to it, normally.
+
+    Args:
+        hand: hand and ball.
+        q: (23,) coordinates.
+        force: force of each finger [N].
+
+    Returns:
+        (16,) torques [N m].
+    """
+    out, step = np.zeros(JOINTS), 1e-6
+    for first in range(0, JOINTS, 4):
+        joints = range(first, first + 4)
+        links = [hand.joints[j].child for j in joints]
+        own = [c for c in hand.collisions if c.b in links]
+        nearest = min(own, key=lambda c: _apart(hand, c, q))
+        for j in joints:
+            change = np.zeros(len(q))
+            change[j] = step
+            out[j] = -force * (_apart(hand, nearest, q + change) - _apart(hand, nearest, q - change)) / (2.0 * step)
+    return out
+
+
+def _apart(hand: Mechanism, collision: Collision, q: Vector) -> float:
+    """Distance of two balls [m]."""
+    at = body_poses(hand.joints, q)
+    a, b = collision.shape_a, collision.shape_b
+    assert isinstance(a, Sphere) and isinstance(b, Sphere) and collision.b is not None
+    between = at[collision.a].at(np.asarray(a.center)) - at[collision.b].at(np.asarray(b.center))
+    return float(np.linalg.norm(between)) - a.radius - b.radius
 
 
 def _weights(fingers: float, ball: float, finger_rates: float, ball_rates: float) -> tuple[Vector, Vector]:

@@ -35,6 +35,7 @@ _TASK = BallTurn(
     end=(0.01, 10.0, 1e-3, 1.0),
     smoothing=((1e-5, 1e-5),),  # at 1e-4 the ball falls out of the first guess
     reach=(-np.inf, 0.13),
+    squeeze=1.0,  # at 0, plans hold the ball no harder than they must
 )
 
 
@@ -45,7 +46,8 @@ def allegro_upside_down(**settings: Any) -> SuiteTask:
     and plant here are those of `allegro`, and the goal stands still, where its goal turns over 2 s. Gravity points from
     the palm to the fingertips. A run of 10 s is a success when the ball ends within 15 degrees of its goal and stays
     within z = 130 mm of the palm's frame throughout. The fingers start .1 to 1 mm off the ball; those of the
-    publication start up to 7.2 mm inside it. Plans assume .7 of the fingers' friction of 1.
+    publication start up to 7.2 mm inside it. Plans count on all of the friction of the fingers. Torques cost nothing
+    where each finger presses on the ball by 1 N, twice the weight of the ball; those of the publication do at zero.
 
     Args:
         **settings: settings of `dojo.MPC`, instead of the ones of the task.

@@ -23,16 +23,29 @@ from solvers.types import Vector
 __all__ = ["allegro"]
 
 _CALL = "tasks.jin.allegro"
-_CENTER = {"cube": (-0.03, -0.01), "foam brick": (-0.01, 0.0), "stick": (-0.01, 0.0)}  # [m]
-_HEIGHT = {"cube": 0.04, "foam brick": 0.04, "stick": 0.03}  # [m]
-_LIFTED = {"cube": 0.05, "foam brick": 0.04, "stick": 0.03}  # [m] of goals
-_GOAL_X = -0.01  # [m]
+_CENTER = {
+    "cube": (-0.03, -0.01),
+    "can": (-0.02, 0.0),
+    "foam brick": (-0.01, 0.0),
+    "stick": (-0.01, 0.0),
+    "torus": (-0.02, 0.0),
+}  # [m] of starts
+_HEIGHT = {"stick": 0.03} | dict.fromkeys(("cube", "can", "foam brick", "torus"), 0.04)  # [m]
+_GOAL = {
+    "cube": (-0.01, 0.05),
+    "can": (-0.01, 0.06),
+    "foam brick": (-0.01, 0.04),
+    "stick": (-0.01, 0.03),
+    "torus": (0.0, 0.04),
+}  # [m] x and z of goals
 _SPREAD = 0.005  # [m] standard deviation of places
 _QUARTER = 0.5 * pi
 # until nothing overlaps at the start: lift [m], share of the bends of fingers that is kept, largest number of steps
 _BENDS = {"first": 3, "middle": 3, "ring": 3, "thumb": 2}  # last joints of fingers
 _LIFT, _UNBENT, _STEPS = 1e-3, 0.98, 100
-_KAPPA = 1e-4  # [N s m] of plans: at 1e-6 a tick takes twice as long, and as many runs succeed
+# [N s m] of plans: the gap of a contact is kappa over its impulse; at 1e-4 objects float by centimetres, near their
+# goals, and hands do not lift them
+_KAPPA = 1e-5
 
 
 def trial_of(item: str, number: int) -> Trial:
@@ -54,7 +67,8 @@ def trial_of(item: str, number: int) -> Trial:
     yaw = 0.25 * pi + _QUARTER * random.rand() if item == "stick" else pi * random.rand() - _QUARTER
     sides = (-_QUARTER, _QUARTER) if item in ("cube", "stick") else (_QUARTER, -_QUARTER)
     start = pose(xy, _HEIGHT[item], turn(up, yaw))
-    return Trial(start, pose((_GOAL_X, 0.0), _LIFTED[item], turn(up, yaw + random.choice(sides))))
+    x, z = _GOAL[item]
+    return Trial(start, pose((x, 0.0), z, turn(up, yaw + random.choice(sides))))
 
 
 def _apart(start: Vector, hand: Mechanism) -> Vector:
@@ -88,11 +102,13 @@ def allegro(item: str = "cube", trial: int = 0, **settings: Any) -> SuiteTask:
 
     A run is a success, and ends, when the object is within 23 degrees of its goal for 2 s, wherever it is; it may take
     50 s. Links are balls, and capsules at their tips, where those of the publication are boxes with the same tips; they
-    meet the object alone, and the palm is its box. Foam brick and stick are a box and a capsule of their sizes, without
-    torsional friction. At the start, fingers that overlap the object are unbent, or it is lifted.
+    meet the object alone, and the palm is its box. Can, foam brick and stick are a cylinder, a box and a capsule of
+    their sizes, and the torus, of which MuJoCo sees the convex hull, is a polytope of 60 corners, and in plans a
+    cylinder. Contacts have no torsional friction. At the start, fingers that overlap the object are unbent, or it is
+    lifted.
 
     Args:
-        item: "cube", "foam brick" or "stick".
+        item: "cube", "can", "foam brick", "stick" or "torus".
         trial: number of the trial, 0 to 19 (default 0).
         **settings: settings of `dojo.MPC`, instead of the ones of the task.
 

@@ -15,7 +15,8 @@ from sim.mechanism.collision import Collision
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.shapes import Box, Capsule, Solid, Sphere, rotation_matrix
+from sim.mechanism.polytope import Polytope
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Solid, Sphere, rotation_matrix
 from solvers.rotation import quat_mul
 from solvers.types import Vector
 
@@ -30,7 +31,7 @@ _SIDE, _OUTER, _MIDDLE = 0.0435, -0.001542, 0.0007  # [m] places of fingers on t
 _THUMB, _THUMB_TURN = (-0.0182, 0.019333, -0.045987), (0.4777141, -0.5213341, -0.5213341, -0.4777141)
 _DAMPER = 0.1  # [N m s/rad]
 _FINGER, _PALM = 1.0, 0.5  # friction with an object
-_REACH = 0.02  # [m] of contacts in plans
+_REACH = 0.01  # [m] of contacts in plans: with twice that a tick takes a third longer
 _RANGES = ((-0.47, 0.47), (-0.196, 1.61), (-0.174, 1.709), (-0.227, 1.618))  # [rad]
 _THUMB_RANGES = ((0.263, 1.396), (-0.105, 2.163), (-0.189, 1.644), (-0.162, 1.719))
 _START = (
@@ -38,12 +39,28 @@ _START = (
     *((-0.459, 1.54, 1.11, 1.23), (0.638, 1.85, 1.5, 1.26)),
 )
 _ALONG_X = (0.5**0.5, 0.0, 0.5**0.5, 0.0)  # turns the axis of a capsule
+_TUBE, _RING, _CORNERS = 0.015, 0.0305, 12  # of a torus: radius of its tube and of its middle [m]; points of a circle
+
+
+def _torus() -> Polytope:
+    """The convex hull of a torus about z, by five circles of points on it."""
+    around = 2.0 * np.pi / _CORNERS * np.arange(_CORNERS)
+    circles = []
+    for angle in 0.25 * np.pi * np.arange(-2, 3):
+        r, z = _RING + _TUBE * cos(angle), _TUBE * sin(angle)
+        circles.append(np.stack([r * np.cos(around), r * np.sin(around), np.full(_CORNERS, z)], axis=1))
+    return Polytope(np.concatenate(circles))
+
+
 SHAPES: dict[str, Solid] = {
     "cube": Box(0.05, 0.05, 0.05),
+    "can": Cylinder(0.0325, 0.065),
     "foam brick": Box(0.0516, 0.0753, 0.0466),
     "stick": Capsule(0.015, 0.1, orientation=_ALONG_X),
+    "torus": _torus(),
 }
-MASSES = {"cube": 0.1, "foam brick": 0.01, "stick": 0.1}  # [kg]
+_PLANNED: dict[str, Solid] = {"torus": Cylinder(_RING + _TUBE, 2.0 * _TUBE)}  # simpler shapes, of plans
+MASSES = {"cube": 0.1, "can": 0.01, "foam brick": 0.01, "stick": 0.1, "torus": 0.01}  # [kg]
 # of a link: number, place in its frame, radius; and capsules at the tips: middle and length
 _SPHERES: dict[str, tuple[tuple[int, tuple[float, float, float], float], ...]] = {
     "finger": (
@@ -122,13 +139,14 @@ def mechanism(item: str, planned: bool = False) -> Mechanism:
 
     Args:
         item: name of the object.
-        planned: whether it is the model of the controller, whose inputs are bounded, and whose contacts reach 2 cm
-            (default False).
+        planned: whether it is the model of the controller, whose inputs are bounded, whose contacts reach 1 cm, and
+            whose torus is a cylinder (default False).
 
     Returns:
         The mechanism.
     """
-    own, shape = links(), SHAPES[item]
+    own = links()
+    shape = _PLANNED.get(item, SHAPES[item]) if planned else SHAPES[item]
     bodies, joints = assembled(own)
     reach, limit = (_REACH, TORQUE) if planned else (None, np.inf)
     parts: list[tuple[str | None, Solid, float, str]] = []
@@ -150,7 +168,7 @@ def mechanism(item: str, planned: bool = False) -> Mechanism:
     }
     neutral[item] = (0.0, 0.0, 0.05, 1.0, 0.0, 0.0, 0.0)
     return Mechanism(
-        [Body(item, MASSES[item], shape=shape), *bodies],
+        [Body(item, MASSES[item], shape=SHAPES[item]), *bodies],
         [Joint("floating", None, item), *joints],
         [],
         [Input(link.name, limits=(-limit, limit)) for link in own],

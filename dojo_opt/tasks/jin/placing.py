@@ -97,5 +97,7 @@ class Placing:
         """
         error = self.error(loop.x[-1])
         angle = 2.0 * np.degrees(np.arcsin(np.sqrt(np.clip(float(error.turn), 0.0, 1.0))))
+        sideways = float(np.linalg.norm(loop.x[-1, self._at][:2] - self._goal[:2]))
         measures = {"off [mm]": 1e3 * float(error.distance), "angle off [deg]": float(angle), "time [s]": loop.duration}
+        measures["sideways [mm]"] = 1e3 * sideways
         return held(loop, self.near(loop.x)) >= self._needed, measures
