@@ -266,6 +266,7 @@ for command in ("run hop", "report timing", "models", "show pendulum", "warmup")
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a single process")
 def test_ctrl_c_ends_every_command_by_its_signal_and_in_silence() -> None:
     """A shell says 130, and a script around the command stops, too. In forks: a second each to load the command line."""

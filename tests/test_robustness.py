@@ -22,6 +22,7 @@ def test_no_extreme_state_is_missed(robustness, name):
     assert np.median(whole.iterations) <= 6, robustness.line(whole, name)
 
 
+@pytest.mark.slow
 def test_benchmarks_and_studies_write_the_same_format(robustness, tmp_path, capsys):
     assert (
         robustness.main(["--states", "64", "--seeds", "0", "--mechanism", "block", "--out", str(tmp_path / "new")]) == 0

@@ -9,7 +9,7 @@ import numpy as np
 
 from dojo_opt.planning.options import Options
 from dojo_opt.planning.problem import Problem
-from dojo_opt.planning.term import Term
+from dojo_opt.planning.term import Term, largest_violation
 from solvers.types import Matrix
 
 _LEAST = 1e-3  # share of the largest unit: least unit of a component
@@ -21,7 +21,6 @@ class Objective:
     def __init__(self, problem: Problem, options: Options) -> None:
         size = problem.sim.ndx + problem.sim.nu
         self._sim = problem.sim
-        self.violation = problem.violation
         self.costs = problem.costs
         self.constraints = problem.constraints
         self.g = np.zeros((problem.horizon + 1, size))
@@ -113,6 +112,10 @@ class Objective:
                 entry_name = term.entry_name(self._sim, entry)
                 found = float(size.max()), f"{term.name} of {entry_name} at knot {term.knots[row]}"
         return found
+
+    def violation(self, xs: Matrix, us: Matrix) -> float:
+        """Largest violation of a constraint; 0 without constraints."""
+        return largest_violation(self.constraints, xs, us)
 
     def mismatch(self, xs: Matrix, us: Matrix) -> float:
         """Largest violation of a constraint, or of the complementarity of an inequality and its multiplier."""

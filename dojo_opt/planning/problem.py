@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.planning.component_names import chosen_components
 from dojo_opt.planning.manifold import tangent_layout
-from dojo_opt.planning.term import Spec, numbers, state_table, table
+from dojo_opt.planning.term import Spec, largest_violation, numbers, state_table, table
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.memory_limit import check_room
@@ -333,8 +333,4 @@ class Problem:
             ValueError: for a wrong shape, or a number that is not finite.
         """
         xs, us = self._motion("Problem.violation", xs, us)
-        worst = 0.0
-        for term in self.constraints:
-            term.update(xs, us)
-            worst = max(worst, float(term.violation().max(initial=0.0)))
-        return worst
+        return largest_violation(self.constraints, xs, us)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -106,6 +107,15 @@ class Term:
             return self.violation()
         slack = np.divide(self.slope, 2.0 * self.weight, out=np.zeros_like(self.slope), where=self.weight > 0.0)
         return np.abs(np.maximum(self.residual, -slack)) * self.mask
+
+
+def largest_violation(constraints: Sequence[Term], xs: Matrix, us: Matrix) -> float:
+    """Largest violation of a constraint at (xs, us); 0 without constraints."""
+    worst = 0.0
+    for term in constraints:
+        term.update(xs, us)
+        worst = max(worst, float(term.violation().max(initial=0.0)))
+    return worst
 
 
 class StateTerm(Term):

@@ -132,6 +132,7 @@ def test_samples_at_uneven_times_are_not_used(plant):
     assert made.values == {"mass:ball": 1.0, "friction:*": 0.5}
 
 
+@pytest.mark.slow
 def test_a_quadruped_carries_what_the_fixed_model_does_not():
     adapt = dojo.Adaptation(("mass:trunk", "friction:*"))
     for settings, survives in (({}, False), ({"adapt": adapt}, True)):

@@ -134,6 +134,7 @@ def test_a_function_of_a_task_is_refused_by_name(case):
     check_refused(lambda: replace(TASK, **{name: function}), f"Task({name}=...)", *words)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_compiled_names_the_argument():
     task = replace(TASK, reward=lambda x, a, after: float(str(after[0])[:3]))
     check_refused(

@@ -76,6 +76,7 @@ def test_forces_pause_when_a_foot_slides_far(mpc):
     assert np.any(shear(0.46, x, ground, False))
 
 
+@pytest.mark.slow
 def test_a_trotting_quadruped_finds_the_friction_of_its_feet():
     known = {}
     for shear in (0.0, 1.3):

@@ -205,6 +205,7 @@ def test_windows_of_all_lengths_are_predicted_in_batches():
         assert one.solved and slow.solved
 
 
+@pytest.mark.slow
 def test_a_report_has_parameters_residuals_and_both_motions(tmp_path):
     truth = dojo.Simulator(dojo.models.pendulum(damper=0.3), time_step=0.05)
     rng, motions = np.random.default_rng(0), []

@@ -126,6 +126,7 @@ def test_no_ctrl_c_is_dropped_wherever_it_comes(name: str) -> None:
     assert not other.is_alive(), "a lock is kept"
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("module", ["asyncio.events", "tornado.ioloop", "meshcat.geometry"])
 def test_ctrl_c_in_the_first_animation_leaves_no_half_of_a_library(module: str, tmp_path: Path) -> None:
     """The next animation failed with a NameError of asyncio, which was imported in part."""

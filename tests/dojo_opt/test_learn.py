@@ -270,6 +270,7 @@ def test_pushes_change_an_evaluation_by_their_size_alone(task):
         dojo.learn.evaluate(policy, 1, pushes=(0.1, [1.0, 1.0]))
 
 
+@pytest.mark.slow
 def test_a_robust_policy_is_the_best_of_the_sums_with_and_without_pushes(task, tmp_path):
     pushes = (task.knot_time, [3.0])
     models = dojo.learn.Randomization(pushes=pushes)

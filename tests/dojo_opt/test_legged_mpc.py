@@ -101,6 +101,7 @@ def test_an_arm_that_is_folded_finds_a_place_to_push_from():
         dojo.problems.push(arm, box, (0.0, 0.1), offset=tip, at=(0.0, 0.0, 0.0))
 
 
+@pytest.mark.slow
 def test_links_of_a_pushing_arm_stay_outside_the_object():
     """From its neutral state the arm reached behind the box with its wrist inside it, of which nothing was said."""
     half = np.array([0.1, 0.1, 0.15])

@@ -107,6 +107,7 @@ def test_a_robot_trots_and_jumps(straight, task):
     assert shot.success and np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < 0.01
 
 
+@pytest.mark.slow
 def test_weak_joints_jump_as_high_as_they_can(straight):
     """Twice and four times the torque that carries the robot; a height that the user gives is not changed."""
     legs = Legs(straight)

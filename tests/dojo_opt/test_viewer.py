@@ -254,6 +254,7 @@ def test_names_of_a_user_are_text_in_the_page(page, tmp_path, name):
     dojo.plots.trajectory(motion_of).savefig(tmp_path / "a.png")
 
 
+@pytest.mark.slow
 def test_names_of_a_file_are_text_in_the_page_of_show(page, tmp_path):
     from xml.sax.saxutils import quoteattr
 

@@ -89,6 +89,7 @@ def test_free_body_against_ode_order_two():
     assert (abs(orders - 2.0) < 0.1).all(), (errors, orders)
 
 
+@pytest.mark.slow
 def test_pendulum_against_ode_order_two():
     scene, inertia = samples.pendulum(), 1.0 / 12.0 * 1.01 + 0.25
 

@@ -116,6 +116,7 @@ def test_a_residual_of_the_user_has_the_terms_of_the_planner(arm):
     np.testing.assert_allclose(H[0], H[1], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_functions_run_in_threads_and_other_processes(arm):
     kin = dojo.Kinematics(arm)
     function = kin.compiled("pose", "link7")

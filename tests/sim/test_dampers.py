@@ -48,6 +48,7 @@ def test_it_stops_after_its_momentum_over_the_damper(damper: float) -> None:
     assert np.diff(xs[:, 0]).min() >= -1e-12
 
 
+@pytest.mark.slow
 def test_properties_of_the_weights() -> None:
     """0 <= lag <= h d/2; the impulse does no work but on a rotor h d/2 - lag; rates against differences."""
     model, rng = dojo.Simulator(slider(), time_step=0.01).model, np.random.default_rng(1)

@@ -108,7 +108,7 @@ def check(sim: dojo.Simulator, x: np.ndarray) -> float:
     return float(np.abs(check_step(sim, x, by_input=1e-5).contacts.impulse).max())
 
 
-@pytest.mark.sweep(10)
+@pytest.mark.sweep(11)
 @pytest.mark.parametrize("h, speed", [(1e-3, 5.0), (1e-3, 20.0), (1e-4, 5.0)])
 @pytest.mark.parametrize("name", SCENES)
 def test_impacts(name: str, h: float, speed: float) -> None:

@@ -114,6 +114,7 @@ def test_inverse_kinematics_meets_targets_in_reach(tmp_path: Path, rng: np.rando
         assert np.linalg.norm(kin.pose("hand", near)[0] - at - (5.0, 0.0, 0.0)) > far.error - 1e-9
 
 
+@pytest.mark.slow
 def test_inverse_kinematics_finds_most_postures_of_an_arm(rng: np.random.Generator) -> None:
     """Of seven joints, from random starts."""
     sim = dojo.Simulator(dojo.models.panda(gripper=False), 0.01)

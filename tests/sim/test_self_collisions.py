@@ -35,6 +35,7 @@ def test_gaps_of_shapes_are_those_of_geometry() -> None:
     assert separation(HERE, box, Pose(np.eye(3), np.array([0.2, 0.0, 0.0])), box) < 0.0  # side by side
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("name", ["polytope_polytope", "polytope_cylinder", "box_cylinder", "cylinder_cylinder"])
 def test_the_bound_of_a_distance_is_no_larger_and_often_equal(name: str, rng: np.random.Generator) -> None:
     equal = 0

@@ -129,6 +129,7 @@ def test_a_function_that_calls_itself_has_a_digest() -> None:
     assert users_kernel(around(countdown))(3) == 1.0
 
 
+@pytest.mark.slow
 def test_a_value_that_changes_is_not_kept_under_the_old_one() -> None:
     """The second signature of a loop compiles after a global has changed."""
     programs = (
@@ -178,6 +179,7 @@ def run(gains: list[float], folder: Path) -> Any:
     return json.loads(python(LOOPS.replace("GAINS", str(gains)), NUMBA_CACHE_DIR=str(folder)))
 
 
+@pytest.mark.slow
 def test_another_process_compiles_nothing_and_mixes_nothing_up(tmp_path: Path) -> None:
     """Functions of one name, loaded and compiled side by side, in another order than that in which they were kept."""
     tail = ["large", "beyond"]
@@ -189,6 +191,7 @@ def test_another_process_compiles_nothing_and_mixes_nothing_up(tmp_path: Path) -
     assert run([3.0, 1.0], tmp_path) == [[6.0, 2.0, *tail], 4]
 
 
+@pytest.mark.slow
 def test_code_given_to_numba_by_others_turns_it_off(tmp_path: Path) -> None:
     """A function of NumPy that Numba does not know, as a user defines it: the definition may change without a trace."""
     program = """

@@ -28,6 +28,7 @@ def _compile_anew(decorate: Callable[[Any], Any]) -> float:
     return float(line(5.5))
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("decorate", [local_kernel, users_kernel])
 def test_ctrl_c_in_a_compilation_leaves_no_lock_closed(decorate: Callable[[Any], Any]) -> None:
     found: list[float] = []
