@@ -89,7 +89,7 @@ def replay(plan: Any) -> list[Cell]:
     fine, cut = problem.sim.replace(time_step=problem.sim.time_step / 5), 5 * problem.substeps
     limits = problem.control_limits
     shot = fine.rollout_feedback(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=cut, limits=limits)
-    if shot.status != 0:
+    if not shot.success:
         return [f"{shot.status.name} at knot {shot.solved_knots}", *[None] * 5]
     knots = [fine.rollout(x, np.tile(u, (cut, 1))).contacts for x, u in zip(shot.x[:-1], shot.u, strict=True)]
     loaded = np.concatenate([c.normal_force for c in knots]) > 1.0

@@ -24,7 +24,7 @@ from dojo_opt.report.result import Cell, Report, Table
 from solvers.types import Floats
 
 STEPS, TIME_STEP, ROUNDS = 200, 0.01, 60
-MOST = {"Simulator.step": 12.0, "Environment.step": 12.0, "closed_loop": 15.0}  # [us]
+MOST = {"Simulator.step": 12.0, "Environment.step": 12.0, "closed_loop": 12.0}  # [us]
 
 
 def scenes() -> dict[str, tuple[dojo.Simulator, Floats]]:

@@ -1,8 +1,8 @@
 """Put the measured numbers into the pages: README.md, CHANGELOG.md and those of docs/ quote docs/measured.
 
-    python docs/figures.py               fill in what docs/quotes.toml says
-    python docs/figures.py --check       change nothing; exit with 1 if a page is not what was measured
-    python docs/figures.py --take DIR    first take what `benchmarks/all.sh DIR` wrote to docs/measured
+    python docs/figures.py               fill in the numbers that docs/quotes.toml lists
+    python docs/figures.py --check       change nothing; exit with 1 if a page differs from the measurements
+    python docs/figures.py --take DIR    first copy the output of `benchmarks/all.sh DIR` to docs/measured
 
 docs/quotes.toml lists sentences as they stand in a page, with holes where measured numbers go:
 
@@ -14,7 +14,7 @@ A hole is a format and an address. Address: a study of the report or a benchmark
 of a table, the first cell of a row (the first two, with `; ` between) and the head of a column; or `details`, or
 `machine`, and the keys; or `bars`, `bars met`: how many the study has. Format: as Python's (d, .2f, .2g and so on),
 without zeros in exponents; s for a version or a share like 3 of 4; with a factor behind it, as `.2f*1e-3`.
-Code, formulas, links, titles, and what stands under `given` (regular expressions, by page) is not measured; every other
+Code, formulas, links, titles, and matches of `given` (regular expressions, by page) are not measured. Every other
 number of a page that is listed there has to be in a sentence of the list, or in a table:
 
     [[table]]           between `<!-- NAME -->` and `<!-- end of NAME -->`
@@ -22,7 +22,7 @@ number of a page that is listed there has to be in a sentence of the list, or in
     name = "stability"
     source = "stability > passed"
     columns = ["dojo-opt", "PyBullet"]
-    rows = [["mass ratio", "up to 1e6 kg on a foot of 1 kg"]]     first cell, and what is written behind it
+    rows = [["mass ratio", "up to 1e6 kg on a foot of 1 kg"]]     first cell, and the text behind it
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ PAGES = (
     *(f"docs/theory/{name}.md" for name in ("restitution", "error_control", "dampers")),
 )
 BULKY = (("planning", "settings"),)  # details that nothing quotes, 0.4 MB: not taken to docs/measured
-DIGITS = 6  # significant ones that are kept of what is taken
+DIGITS = 6  # significant ones that are kept
 WIDTH = 120  # of a line of JSON
 
 _HOLE = re.compile(r"\{(\S+?)(?:\*(\S+))? ([^{}]+)\}")
@@ -62,11 +62,11 @@ class Quotes(NamedTuple):
 
     quote: list[dict[str, str]]
     table: list[dict[str, Any]]
-    given: dict[str, list[str]]  # by page: regular expressions of what is no measurement
+    given: dict[str, list[str]]  # by page: regular expressions of numbers that are not measured
 
 
 def quotes() -> Quotes:
-    """What the pages quote."""
+    """The sentences and tables of the pages."""
     return Quotes(**tomllib.loads((ROOT / "docs" / "quotes.toml").read_text(encoding="utf-8")))
 
 
@@ -80,7 +80,7 @@ def measured(folder: Path = MEASURED) -> dict[str, Any]:
 
 
 def value(studies: dict[str, Any], address: str) -> Any:
-    """What is there.  KeyError: nothing is."""
+    """The number at an address.  KeyError: there is none."""
     try:
         return _found(studies, address)
     except (LookupError, ValueError) as error:
@@ -128,7 +128,7 @@ def shown(number: Any, style: str, factor: str | None = None) -> str:
 
 
 def fill(page: str, text: str, listed: Quotes, studies: dict[str, Any]) -> tuple[str, list[tuple[int, int]]]:
-    """The page with its quotes and tables as measured; and which parts of it they are.
+    """The page with its quotes and tables as measured, and their places in it.
 
     ValueError: a quote is not there, or more than once.  KeyError: its number is not in docs/measured.
     """
@@ -170,7 +170,7 @@ def _filled(
 
 
 def _table(table: dict[str, Any], studies: dict[str, Any]) -> str:
-    """A table of a page: first cells and what is written behind them, then columns of a measured one."""
+    """A table of a page: first cells and the text behind them, then columns of a measured one."""
     lines = ["| " + " | ".join([*table["header"], *table["columns"]]) + " |"]
     lines.append("|---" * (len(table["header"]) + len(table["columns"])) + "|")
     for label, *words in table["rows"]:
@@ -194,7 +194,7 @@ def uncovered(page: str, text: str, spans: list[tuple[int, int]], listed: Quotes
 
 
 def take(folder: Path) -> None:
-    """Copy what was measured to docs/measured, with six digits and without what is bulky; and the figures."""
+    """Copy measurements to docs/measured, with six digits and without bulky details; and the figures."""
     MEASURED.mkdir(exist_ok=True)
     for file in sorted(folder.glob("*.json")):
         text = file.read_text(encoding="utf-8")
@@ -212,7 +212,7 @@ def take(folder: Path) -> None:
 
 
 def compact(numbers: Any, indent: str = "") -> str:
-    """JSON with one line for what fits into one."""
+    """JSON, each item that fits into a line on one line."""
     line = json.dumps(numbers)
     if len(indent) + len(line) <= WIDTH or not isinstance(numbers, dict | list):
         return line
@@ -243,7 +243,7 @@ def main(argv: list[str] | None = None) -> int:
             return 2
         wrong += uncovered(page, filled[page], spans, listed)
         if args.check and filled[page] != before:
-            wrong.append(f"{page}: not what docs/measured says; run python docs/figures.py")
+            wrong.append(f"{page}: differs from docs/measured; run python docs/figures.py")
     for page, text in filled.items() if not args.check else ():
         (ROOT / page).write_text(text, encoding="utf-8")
     print("\n".join(wrong) or "every number of the pages is the measured one")

@@ -147,7 +147,7 @@ def test_the_python_of_the_guide_that_needs_an_extra_runs(library: str, tmp_path
     python("from pathlib import Path\nimport numpy as np, dojo_opt as dojo\n" + block, cwd=tmp_path)
 
 
-@pytest.mark.parametrize("package", [*PACKAGES, "benchmarks", "examples"])
+@pytest.mark.parametrize("package", [*PACKAGES, "benchmarks", "examples", "docs"])
 def test_prose_has_nouns_for_clauses(package: str) -> None:
     """At most 1.6 "what" in 1000 lines, names of variables included: 10 was the dialect, 0 to 1.6 are our models."""
     texts = [source_of(file) for file in files_of(package)]

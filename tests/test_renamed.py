@@ -40,6 +40,7 @@ OLD: dict[str, tuple[Callable[[], Any], Callable[[], Any], str]] = {
         lambda: SIM.stepper().step(X[None], US[:1]).x,
         "Simulator.stepper",
     ),
+    "second_order": (lambda: SIM.second_order, lambda: SIM.second_order_reason, "Simulator.second_order_reason"),
     "has_single_rows": (lambda: SIM.has_single_rows, lambda: SIM.has_stepper, "Simulator.has_stepper"),
     "batch.knot": (lambda: SIM.rollout_batch([X], [US]).knot, lambda: [3], "RolloutBatch.solved_steps"),
     "terrain": (

@@ -46,8 +46,8 @@ class Ours:
         marks = nodes(time_step, duration, samples)
         u = held(mechanism, inputs, int(marks[-1]))
         sim = Simulator(mechanism, time_step, self.kappa, self.tolerance, order=self.order, divide=self.divide)
-        if sim.second_order:  # a point of its curve would be one of order 2
-            raise ValueError(f"order {self.order}: {sim.second_order}")
+        if sim.second_order_reason:  # a point of its curve would be one of order 2
+            raise ValueError(f"order {self.order}: {sim.second_order_reason}")
         try:
             x = sim.state_from_velocity(q, v)
         except SimulationError as error:

@@ -1,4 +1,4 @@
-"""Steps whose lengths follow from an error estimate: long ones of order 8 in flight, short ones of order 2 in contact.
+"""Steps whose lengths follow from an error estimate: long ones of order 8 in flight, short ones of 2 and 4 in contact.
 
 A sub-step of length h from a node is accepted where its estimate e of the error of the joint coordinates has
 
@@ -19,7 +19,7 @@ from sim.dynamics.external_forces import set_external
 from sim.integrators.contact_events import NEVER
 from sim.integrators.halved_step import FAILED, LANDS, try_short
 from sim.integrators.hamilton import coordinate_rates
-from sim.integrators.phases import leave, left_out, report_apart
+from sim.integrators.phases import leave, omitted_impulses, report_apart
 from sim.integrators.runge_kutta import advance
 from sim.integrators.runge_kutta import begin as begin_node
 from sim.integrators.substep_lengths import (
@@ -76,7 +76,7 @@ def stand(models: Table, works: Table, line: SubstepState, goal: Vector) -> floa
         begin_node(model, data, line.x)
         set_external(data, line.wrench, 0)
         line.clock[Clock.READY] = 1.0
-    if left_out(model, data, 1.0, line.x[nq:], -1.0) > 10.0 / goal[AccuracyGoal.ACCURACY]:
+    if omitted_impulses(model, data, 1.0, line.x[nq:], -1.0) > 10.0 / goal[AccuracyGoal.ACCURACY]:
         return 0.0
     time = FAILED
     for c in range(model.contact_height.shape[0]):
@@ -102,7 +102,7 @@ def try_long(
     line.report[StepReport.ITERATIONS] += model.stage_b.shape[0]
     if status != _SOLVED:
         return status, FAILED
-    if left_out(model, data, 1.0, line.trial[nq:], h) > 10.0 / goal[AccuracyGoal.ACCURACY]:
+    if omitted_impulses(model, data, 1.0, line.trial[nq:], h) > 10.0 / goal[AccuracyGoal.ACCURACY]:
         return NEAR, FAILED
     return _SOLVED, _embedded_error(model, data, embedded, h) / (goal[AccuracyGoal.ACCURACY] * h)
 
@@ -206,7 +206,7 @@ def take_long(
 def attempt(
     models: Table, works: Table, settings: Vector, goal: Vector, embedded: Embedded, line: SubstepState
 ) -> int:  # fmt: skip
-    """One attempt at the next sub-step, of order 8 or 2; the Status."""
+    """One attempt at the next sub-step, of order 8, or in contact; the Status."""
     clock = line.clock
     rest = goal[AccuracyGoal.END] - clock[Clock.TIME]
     reach = 0.9 * stand(models, works, line, goal) if goal[AccuracyGoal.TREE] > 0.0 else 0.0

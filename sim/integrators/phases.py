@@ -54,7 +54,7 @@ def _limit(model: Model, data: Data, k: int, v: Vector) -> tuple[float, float]:
 
 
 @kernel
-def left_out(model: Model, data: Data, kappa: float, v: Vector, h: float) -> float:
+def omitted_impulses(model: Model, data: Data, kappa: float, v: Vector, h: float) -> float:
     """Sum of the impulses kappa/g over a step of length h to the node in `data`; of the node itself with h < 0.
 
     Gaps and speeds of the node are kept for the step that begins there. 1e300 where something is not apart.
@@ -133,7 +133,7 @@ def fly(
     report = motion.reports[t]
     copy_vector(x, x_next)
     allowed = _allowed(data, settings[StepSetting.TOLERANCE])
-    if left_out(model, data, kappa, x_next[nq:], -1.0) > allowed:
+    if omitted_impulses(model, data, kappa, x_next[nq:], -1.0) > allowed:
         return NEAR
     leave(data)
     set_external(data, motion.wrenches, t)
@@ -142,7 +142,7 @@ def fly(
     report[StepReport.ITERATIONS] = model.stage_b.shape[0]
     if status != _SOLVED:
         return status
-    if left_out(model, data, kappa, x_next[nq:], h) > allowed:
+    if omitted_impulses(model, data, kappa, x_next[nq:], h) > allowed:
         return NEAR
     report_apart(model, data, h, motion.contacts[t])
     return _SOLVED

@@ -17,10 +17,10 @@ from sim.simulator.omitted_contacts import reach
 from sim.simulator.settings import Settings
 
 
-def describe(mech: Mechanism, model: Model, settings: Settings, rank: str, second_order: str = "") -> str:
+def describe(mech: Mechanism, model: Model, settings: Settings, rank: str, second_order_reason: str = "") -> str:
     """A page of text.
 
-    rank: of the loop constraints, if there are any; second_order: why all steps are of order 2, if they are.
+    rank: of the loop constraints, if there are any; second_order_reason: why all steps are of order 2, if they are.
     """
     lines = [
         f"{mech.name}: {_count(mech.nbody, 'body', 'bodies')}, {_count(mech.nv, 'degree', 'degrees')} of freedom, "
@@ -36,7 +36,7 @@ def describe(mech: Mechanism, model: Model, settings: Settings, rank: str, secon
         *_contact_lines(mech),
         *_collision_lines(mech),
         "a step",
-        *(f"  {part:<18}{state}" for part, state in _parts(mech, settings.order, second_order)),
+        *(f"  {part:<18}{state}" for part, state in _parts(mech, settings.order, second_order_reason)),
         *_far_lines(mech, model, settings),
     ]
     return "\n".join(lines)
@@ -145,7 +145,7 @@ def _far_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
     return [f"  {'inactive contacts':<18}omitted from the solver beyond a gap of {span}; {rest}"]
 
 
-def _parts(mech: Mechanism, order: int, second_order: str) -> list[tuple[str, str]]:
+def _parts(mech: Mechanism, order: int, second_order_reason: str) -> list[tuple[str, str]]:
     """The parts of a step, and the omitted ones."""
     nlimit = mechanism_sizes(mech).nlimit
     points: list[Contact | ContactCandidate] = [*mech.contacts, *mech.contact_candidates]
@@ -155,8 +155,8 @@ def _parts(mech: Mechanism, order: int, second_order: str) -> list[tuple[str, st
     springs = sum(bool(np.any(np.asarray(j.spring))) for j in mech.joints)
     dampers = sum(bool(np.any(np.asarray(j.damper))) for j in mech.joints)
     solver = "interior point" if points or nlimit else "Newton's method; interior point omitted"
-    if second_order:
-        solver = f"{solver}; all steps are of order 2: {second_order}"
+    if second_order_reason:
+        solver = f"{solver}; all steps are of order 2: {second_order_reason}"
     elif order > 2:
         from sim.integrators.tableau import tableau
 

@@ -74,7 +74,7 @@ class Simulator(StateSpace):
             few as it needs: see `parts` of results. The parts conserve momentum exactly, unless no pair of
             consecutive poses has this momentum; then part of the relative momentum is lost: see `momentum_fractions`.
         accuracy: allowed error of the joint coordinates per second of motion [m, rad]. Each step is divided into
-            sub-steps of order 8 or 2 accordingly, and impacts happen at their own times. `errors` of results has the
+            sub-steps of order 8, 4 or 2 accordingly, and impacts happen at their own times. `errors` of results has the
             ratio of estimated to allowed error; see sim/integrators/adaptive.py.
 
     Raises:

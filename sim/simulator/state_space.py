@@ -64,11 +64,13 @@ class StateSpace:
         super().__setattr__(name, value)
 
     @property
-    def second_order(self) -> str:
+    def second_order_reason(self) -> str:
         """The reason why all steps of a simulator of higher order are of order 2, such as a stiff spring; empty if they
         are not.
         """
-        return self._engine.second_order
+        return self._engine.second_order_reason
+
+    second_order = renamed("second_order_reason")
 
     def describe(self) -> str:
         """A page of text about the simulator.
@@ -77,7 +79,7 @@ class StateSpace:
             The parts of the scene, the work of a step, and its omitted terms.
         """
         rank = str(self.loop_rank()) if self._closes else ""
-        return describe(self.mechanism, self.model, self._engine.settings, rank, self._engine.second_order)
+        return describe(self.mechanism, self.model, self._engine.settings, rank, self._engine.second_order_reason)
 
     def parameters(self, wrt: Sequence[str] | None = None) -> Parameters:
         """Names and values of parameters; `dojo.Parameters` describes the names.

@@ -56,7 +56,8 @@ def choice(function: Any, kinds: Sequence[types.Type]) -> Callable[..., Any] | N
 
 
 # Numba asks all of these rules anew in every function that it compiles, for most of the same few hundred calls
-_CALLS: dict[tuple[types.Type, tuple[types.Type, ...]], Signature] = {}
+_CALLS: dict[tuple[Any, tuple[Any, ...]], Signature] = {}
+_ITEMS = (operator.getitem, "static_getitem")  # by types, and by the type and an index that is known
 
 
 class KernelTyping(IndexTyping):
@@ -69,8 +70,9 @@ class KernelTyping(IndexTyping):
 
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
         """The signature of a call."""
-        if not isinstance(func, types.Function) or kws:
-            return super().resolve_function_type(func, args, kws)
+        if kws or not isinstance(func, types.Function):
+            known = not kws and (func is _ITEMS[0] or func == _ITEMS[1]) and not isinstance(args[1], slice)
+            return self._kept(func, args) if known else super().resolve_function_type(func, args, kws)
         if len(args) == 2:
             left, right = map(types.unliteral, args)
             op = func.typing_key
@@ -81,10 +83,14 @@ class KernelTyping(IndexTyping):
                 return signature(OPERATORS[op, left, right][0], left, right)
         if len(args) > 1 and choice(func.typing_key, kinds := [*map(types.unliteral, args)]):
             return signature(kinds[0], *kinds)
+        return self._kept(func, args)
+
+    def _kept(self, func: Any, args: Any) -> Any:
+        """The signature of a call that was met before, or is kept from now on."""
         call = func, tuple(args)
         found = _CALLS.get(call)
         if found is None:
-            found = super().resolve_function_type(func, args, kws)
-            if found is not None and all(kind.is_precise() for kind in args):
+            found = super().resolve_function_type(func, args, {})
+            if found is not None and all(kind.is_precise() for kind in args if isinstance(kind, types.Type)):
                 _CALLS[call] = found
         return found

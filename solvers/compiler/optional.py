@@ -10,7 +10,7 @@ The types of its arguments and of its result are read from the annotations, beca
     int, float, bool, None, Vector, Matrix, Integers, tuples of these, records (solvers/compiler), NamedTuples
 
     @optional(Slot.FACTOR_COUPLING, default=True)  # Slot: an IntEnum of the package that uses them
-    def factor_coupling(model: Model, work: Work) -> bool: ...
+    def factor_coupling(model: Model, data: Data) -> bool: ...
 
     link(model.optional, factor_coupling)
 

@@ -37,12 +37,11 @@ def reaching(sim, **settings):
 
 @pytest.mark.slow
 def test_the_spinner_starts_to_turn():
-    """Within 1.5 s, by contact alone; its ticks are on time for the plan before to be in force."""
+    """Within 1.5 s, by contact alone."""
     task = dojo.tasks.idto.spinner()
     loop = task.run(seconds=1.5)
     assert loop.survived
     assert loop.x[-1, 2] > 0.5
-    assert np.median([tick.cpu_milliseconds for tick in loop.log[1:]]) < 50.0
     outcome = task.outcome(loop)
     assert outcome.penetration < 1e-4
     assert set(outcome.measures) == {"mean speed [rad/s]"}

@@ -25,6 +25,7 @@ from sim.model.layout import (
     table,
 )
 from sim.model.model import Model
+from sim.solve.globalization import ATTEMPTS
 from solvers.compiler import Table, kernel
 from support.records import arrays_of
 
@@ -150,3 +151,7 @@ def test_no_two_fields_share_memory(sizes: Sizes) -> None:
     ranges.sort()
     assert len(ranges) > 100
     assert all(end <= start for (_, end), (start, _) in zip(ranges[:-1], ranges[1:], strict=True))
+
+
+def test_each_start_strategy_has_a_count() -> None:
+    assert allocate_data(ALL).strategy_solves.shape[0] >= ATTEMPTS

@@ -96,7 +96,7 @@ def _replay(plan: Plan, refine: int) -> tuple[float, float]:
     sim = problem.sim.replace(kappa=HARD, time_step=problem.sim.time_step / refine)
     steps, limits = refine * problem.substeps, problem.control_limits
     shot = sim.rollout_feedback(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=steps, limits=limits)
-    return _judged(problem, shot.x, shot.u) if shot.status == 0 else (np.nan, np.nan)
+    return _judged(problem, shot.x, shot.u) if shot.success else (np.nan, np.nan)
 
 
 def _judged(problem: Problem, xs: Matrix, us: Matrix) -> tuple[float, float]:

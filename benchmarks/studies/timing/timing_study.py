@@ -239,6 +239,6 @@ def _batch(report: Report, rounds: int) -> None:
 
 def _solved(name: str, trajectory: Any) -> Any:
     """The trajectory, or an error, because the time of a failed step is meaningless."""
-    if trajectory.status != 0:
+    if not trajectory.success:
         raise RuntimeError(f"report timing: {name}: step {trajectory.solved_steps} ended with {trajectory.status!r}")
     return trajectory

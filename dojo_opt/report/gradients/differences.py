@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.simulator.simulator import Simulator
+from solvers.status import Status
 from solvers.types import Matrix
 
 _FIRST, _LEVELS, _ORDERS = 1e-3, 14, 3  # step sizes 1e-3 2^-k; errors of order 2, 4, 6 and 8
@@ -67,7 +68,7 @@ class Stepper:
         """Next states (-) the next state of x; NaN where a step fails."""
         batch = self._sim.rollout_batch(xs, us[:, None])
         ends = np.array([self._sim.difference(x, self._origin) for x in batch.x[:, 1]])
-        ends[batch.status != 0] = np.nan
+        ends[batch.status != Status.SOLVED] = np.nan
         return ends
 
     def jacobian(self, eps: float, *, centered: bool = True) -> Matrix:

@@ -132,7 +132,7 @@ def with_friction(
     return [replace(joint, friction=forces[joint.name]) if forces[joint.name].any() else joint for joint in joints]
 
 
-def left_out(model: Any, collisions: bool, notes: Notes) -> None:
+def note_omitted(model: Any, collisions: bool, notes: Notes) -> None:
     """Notes on the elements of the file that the mechanism lacks."""
     if model.ntendon:
         forces = (model.tendon_stiffness, model.tendon_damping, model.tendon_limited, model.tendon_frictionloss)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.io.loader_choices import loader_choices
-from sim.io.mjcf.actuators import find_inputs, left_out, with_friction
+from sim.io.mjcf.actuators import find_inputs, note_omitted, with_friction
 from sim.io.mjcf.collisions import find_collisions, find_on_planes
 from sim.io.mjcf.contacts import find_contacts
 from sim.io.mjcf.equalities import find_gears, find_loops
@@ -89,7 +89,7 @@ def load_mjcf(
             raise ValueError(f"load_mjcf: {file}: no joint is free to move")
         inputs, gear, low, high = find_inputs(model, homes, where, notes)
         joints = with_friction(model, joints, homes, choices.joint_friction, notes)
-        left_out(model, bool(collisions), notes)
+        note_omitted(model, bool(collisions), notes)
         mech = MjcfMechanism(
             bodies,
             [*joints, *find_loops(model, where, notes)],

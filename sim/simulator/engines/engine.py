@@ -140,7 +140,7 @@ class Engine(LinkedModel):
     It refuses steps that it cannot solve. `states` has views of its states; the other engines are in engine_choice.py.
     """
 
-    second_order = ""  # why all steps are of order 2, of an engine of a higher one
+    second_order_reason = ""  # why all steps are of order 2, of an engine of a higher one
     in_one_kernel = True  # whether a step is one call of the kernel `step`, so that compiled loops can make it
 
     def __init__(self, model: Model, settings: Settings) -> None:

@@ -5,7 +5,7 @@
     DividingEngine    order 2                      as Engine; where that fails, 2, 4, ... parts, each by an Engine
     HighOrderEngine   order 4, 6, 8                one call of the kernel `step`, which is an explicit method
     PhasedEngine      these with contacts, limits  as HighOrderEngine; of order 2 near contacts, by a DividingEngine
-    AdaptiveEngine    an accuracy                  sub-steps of order 8, or of order 2 by an Engine
+    AdaptiveEngine    an accuracy                  sub-steps of order 8, or of 2 and 4 by an Engine
 
 They inherit so:
 

@@ -53,12 +53,12 @@ class March(NamedTuple):
 class PhasedEngine(PythonLoopEngine):
     """The kernels of one packed mechanism with contacts or limits, or with joints that are too stiff.
 
-    second_order: why all steps are of order 2; "" if they are so near contacts and limits alone.
+    second_order_reason: why all steps are of order 2; "" if they are so near contacts and limits alone.
     """
 
-    def __init__(self, model: Model, settings: Settings, second_order: str = "") -> None:
+    def __init__(self, model: Model, settings: Settings, second_order_reason: str = "") -> None:
         super().__init__(model, settings)
-        self.second_order = second_order
+        self.second_order_reason = second_order_reason
         self._second = (DividingEngine if settings.divide else Engine)(model, settings._replace(order=2))
         self._kept = threading.local()  # tables, and whether the last step was `near`
 
@@ -68,7 +68,7 @@ class PhasedEngine(PythonLoopEngine):
         xs, means, near = np.zeros((steps + 1, self.nx)), np.zeros((steps + 1, self.nx)), np.zeros(steps, np.int64)
         reports, contacts = np.zeros((steps, REPORT)), np.zeros((steps, self.sizes.ncontact, CONTACT))
         motion = MotionBuffers(means, us, self.external(wrenches), reports, contacts, *self.no_predictions[:2])
-        path = Phases(xs, motion, near, not self.second_order, self.settings.divide)
+        path = Phases(xs, motion, near, not self.second_order_reason, self.settings.divide)
         xs[0], settings, (models, works) = x, self._second.settings.array(kappa), self._lines()
         self._second.forget_parts()
         try:
