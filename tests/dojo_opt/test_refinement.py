@@ -91,3 +91,24 @@ def test_mechanisms_without_an_accuracy_are_refused():
     sim = dojo.Simulator(replace(rough, joints=(joint, *rough.joints[1:])), time_step=0.05)
     with pytest.raises(ValueError, match="dry friction"):
         dojo.Problem(sim, sim.neutral(), 10, refined_accuracy=0.01)
+
+
+def test_plans_and_controllers_run_at_an_accuracy():
+    """Knots of 50 ms, each simulated to 1e-5: the plan is its own replay, on steps of order 2 it is not."""
+    fixed = dojo.problems.swingup("pendulum")
+    cost, constraints = fixed.specs
+    limits, sim = fixed.control_limits, fixed.sim.replace(accuracy=1e-5)
+    problem = dojo.Problem(
+        sim,
+        fixed.start,
+        fixed.horizon,
+        cost=cost,
+        constraints=constraints,
+        control_limits=limits,
+        refined_accuracy=1e-3,
+    )
+    plan = dojo.ilqr(problem)
+    assert plan.success and plan.substeps == 1 and plan.time_step == 0.05
+    assert replay_error(plan) < 1e-9 < 1e-4 < replay_error(dojo.ilqr(fixed))
+    loop = dojo.closed_loop(dojo.MPC(problem), dojo.Plant(sim), 0.25)
+    assert loop.message.startswith("Ran to the end") and loop.x[-1][0] > 0.1
