@@ -69,14 +69,14 @@ def combine_pair(model: Model, data: Data, x1: Vector, x2: Vector, out: Vector, 
 
 
 @kernel
-def raise_order(model: Model, data: Data, line: SubstepState, embedded: Embedded) -> float:
+def raise_order(model: Model, data: Data, line: SubstepState, embedded: Embedded, accuracy: float) -> float:
     """The step of order 4 in line.trial, of the node line.node after it as a whole and line.trial after two halves;
     returns the error e = |q2 - q1|/2 of that of order 2 [m, rad].
 
     1e300 where it stays of order 2: with loops or gears, where friction turns, and where q1 and q2 are so far apart
     that gaps between them are no straight line.
     """
-    if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0 or friction_turns(line.parts):
+    if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0 or friction_turns(line.parts, accuracy):
         return 1e300
     apart = 0.0
     for d in range(embedded.distance.shape[0]):

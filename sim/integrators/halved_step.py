@@ -39,7 +39,7 @@ _PRESSED, _HELD = 8.0, 4.0
 _OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes deeper ones, whatever its length
 _LITTLE, _WAIT = 0.01, 4.0  # least ratio of a step that is extrapolated; steps without that after one in vain
 _NEAR_START = 0.01  # share of the tolerance
-_SETTLES = 4.0  # times the length in which contacts settle: in shorter steps their gaps oscillate
+_SETTLES = 1.5  # times the length in which contacts settle: in shorter steps their gaps oscillate
 _FEW = 40  # iterations of a step that may be shorter: at folds, the interior point would try all its starts
 _AHEAD = 1e-3  # [s] least length of the steps behind an impact whose velocities are compared
 
@@ -235,7 +235,7 @@ def _judged(
     allowed = goal[AccuracyGoal.ACCURACY] * h
     settles = data.active_count[0] > 0 and h < _SETTLES * goal[AccuracyGoal.SETTLED]
     if clock[Clock.HIT] + clock[Clock.BEYOND] == 0.0 and not settles:
-        raised = raise_order(model, data, line, embedded)
+        raised = raise_order(model, data, line, embedded, goal[AccuracyGoal.ACCURACY])
         if raised < FAILED:
             clock[Clock.ORDER] = 4.0
             return max(raised, stop) / allowed

@@ -14,7 +14,7 @@ from sim.model.record_columns import ContactRow
 from solvers.compiler import kernel
 from solvers.types import Cube, Vector
 
-_TURN = 1e-3  # change of the friction over the normal impulse
+_TURN = 1e-4  # least change of the friction over the normal impulse
 _SLIPS = 1e-3  # [m/s]
 
 
@@ -64,12 +64,14 @@ def stopping_error(model: Model, parts: Cube, slips: Vector, h: float) -> float:
 
 
 @kernel
-def friction_turns(parts: Cube) -> bool:
-    """Whether the friction of a contact that slides, over its normal impulse, differs in both halves.
+def friction_turns(parts: Cube, accuracy: float) -> bool:
+    """Whether the friction of a contact that slides, over its normal impulse, differs in both halves by more than the
+    accuracy [m/s, rad/s] in 1 m/s.
 
     It acts along the slip in the end of a step. Where that turns, the error is of order 1, and alike in a step and its
     halves.
     """
+    most = max(accuracy, _TURN)
     for c in range(parts.shape[1]):
         one, other = parts[0, c], parts[1, c]
         before, after = _normal_impulse(one), _normal_impulse(other)
@@ -80,6 +82,6 @@ def friction_turns(parts: Cube) -> bool:
             n1, n2 = one[ContactRow.NORMAL + k], other[ContactRow.NORMAL + k]
             change = other[ContactRow.IMPULSE + k] / after - n2 - one[ContactRow.IMPULSE + k] / before + n1
             turned += change * change
-        if turned > _TURN * _TURN:
+        if turned > most * most:
             return True
     return False

@@ -197,11 +197,11 @@ def test_friction_that_turns_is_seen() -> None:
     parts = np.zeros((3, 1, 11))
     parts[:, 0, ContactRow.NORMAL + 2], parts[:, 0, ContactRow.SLIP] = 1.0, 0.5
     parts[0, 0, :3], parts[1, 0, :3] = (0.3, 0.0, 1.0), (0.6, 0.0, 2.0)
-    assert not friction_turns(parts)
+    assert not friction_turns(parts, 1e-3)
     parts[1, 0, 1] = 0.01
-    assert friction_turns(parts)
+    assert friction_turns(parts, 1e-3) and not friction_turns(parts, 1e-2)
     parts[:, 0, ContactRow.SLIP] = 0.0
-    assert not friction_turns(parts)
+    assert not friction_turns(parts, 1e-3)
 
 
 def test_lengths_that_fail_are_not_tried_again_at_once() -> None:
