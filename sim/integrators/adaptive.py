@@ -19,7 +19,7 @@ from sim.dynamics.external_forces import set_external
 from sim.integrators.contact_events import NEVER
 from sim.integrators.halved_step import FAILED, LANDS, try_short
 from sim.integrators.hamilton import coordinate_rates
-from sim.integrators.phases import leave, omitted_impulses, report_apart
+from sim.integrators.phases import NEAR, leave, omitted_impulses, report_apart
 from sim.integrators.runge_kutta import advance
 from sim.integrators.runge_kutta import begin as begin_node
 from sim.integrators.substep_lengths import (
@@ -42,8 +42,6 @@ from solvers.compiler import Table, kernel
 from solvers.dense import copy_vector
 from solvers.status import Status
 from solvers.types import Vector
-
-NEAR = -1  # in place of a Status: a contact or limit is near at the end of the step
 
 _SOLVED = int(Status.SOLVED)
 _ACCURACY_NOT_REACHED = int(Status.ACCURACY_NOT_REACHED)
@@ -68,9 +66,9 @@ def _embedded_error(model: Model, data: Data, embedded: Embedded, h: float) -> f
 
 
 @kernel
-def stand(models: Table, works: Table, line: SubstepState, goal: Vector) -> float:
+def stand(models: Table, data_tables: Table, line: SubstepState, goal: Vector) -> float:
     """Time for which a flight from the node may go on before something could touch, 0 where it is near [s]."""
-    model, data = model_view(models[0]), data_view(works[1])
+    model, data = model_view(models[0]), data_view(data_tables[1])
     nq = data.theta1.shape[0]
     if line.clock[Clock.READY] == 0.0:
         begin_node(model, data, line.x)
@@ -90,10 +88,10 @@ def stand(models: Table, works: Table, line: SubstepState, goal: Vector) -> floa
 
 @kernel
 def try_long(
-    models: Table, works: Table, goal: Vector, line: SubstepState, embedded: Embedded, h: float
+    models: Table, data_tables: Table, goal: Vector, line: SubstepState, embedded: Embedded, h: float
 ) -> tuple[int, float]:  # fmt: skip
     """line.trial = the node a step of order 8 after line.x, at which `stand` stands; (Status or NEAR, error ratio)."""
-    model, data = model_view(models[0]), data_view(works[1])
+    model, data = model_view(models[0]), data_view(data_tables[1])
     nq = data.theta1.shape[0]
     copy_vector(line.x, line.trial)
     line.clock[Clock.READY] = 0.0
@@ -136,7 +134,7 @@ def _go_beyond(clock: Vector, h: float, rest: float, shortest: float, status: in
 
 @kernel
 def take_short(
-    models: Table, works: Table, settings: Vector, goal: Vector, line: SubstepState, embedded: Embedded, h: float
+    models: Table, data_tables: Table, settings: Vector, goal: Vector, line: SubstepState, embedded: Embedded, h: float
 ) -> int:  # fmt: skip
     """One attempt of order 2, kept where its error is allowed; the Status.
 
@@ -144,7 +142,7 @@ def take_short(
     to the accuracy times 1 s, then with any error, which `errors` of results reports.
     """
     clock, rest = line.clock, goal[AccuracyGoal.END] - line.clock[Clock.TIME]
-    status, ratio = try_short(models, works, settings, goal, line, embedded, h)
+    status, ratio = try_short(models, data_tables, settings, goal, line, embedded, h)
     rebounds = clock[Clock.HIT] > 0.0 or clock[Clock.LEAST] == 0.0
     shortest = min(goal[AccuracyGoal.SETTLED], goal[AccuracyGoal.IMPACT] if rebounds else NEVER)
     if status == _SOLVED and _allows(clock, h, shortest, ratio):
@@ -177,16 +175,16 @@ def take_short(
 
 @kernel
 def take_long(
-    models: Table, works: Table, goal: Vector, line: SubstepState, embedded: Embedded, h: float
+    models: Table, data_tables: Table, goal: Vector, line: SubstepState, embedded: Embedded, h: float
 ) -> int:  # fmt: skip
     """One attempt of order 8, kept where its error is allowed; the Status."""
     clock = line.clock
-    status, ratio = try_long(models, works, goal, line, embedded, h)
+    status, ratio = try_long(models, data_tables, goal, line, embedded, h)
     if status == _SOLVED:
         if ratio <= 1.0:
             length = next_length(h, ratio, clock[Clock.LONG_RATIO], 7.0)
             if line.contacts.shape[0] > 0:
-                report_apart(model_view(models[0]), data_view(works[1]), h, line.parts[0])
+                report_apart(model_view(models[0]), data_view(data_tables[1]), h, line.parts[0])
                 rest_contacts(line)
             clock[Clock.LONG_RATIO] = max(ratio, 1e-4)
             clock[Clock.LONG] = max(length, clock[Clock.LONG] if h < 0.99 * clock[Clock.LONG] else 0.0)
@@ -204,12 +202,12 @@ def take_long(
 
 @kernel
 def attempt(
-    models: Table, works: Table, settings: Vector, goal: Vector, embedded: Embedded, line: SubstepState
+    models: Table, data_tables: Table, settings: Vector, goal: Vector, embedded: Embedded, line: SubstepState
 ) -> int:  # fmt: skip
     """One attempt at the next sub-step, of order 8, or in contact; the Status."""
     clock = line.clock
     rest = goal[AccuracyGoal.END] - clock[Clock.TIME]
-    reach = 0.9 * stand(models, works, line, goal) if goal[AccuracyGoal.TREE] > 0.0 else 0.0
+    reach = 0.9 * stand(models, data_tables, line, goal) if goal[AccuracyGoal.TREE] > 0.0 else 0.0
     long = min(clock[Clock.LONG], rest, reach)
     if long < rest < 2.0 * long:
         long = 0.5 * rest
@@ -219,9 +217,9 @@ def attempt(
     if short < rest < 2.0 * short and clock[Clock.BEYOND] == 0.0:
         short = 0.5 * rest
     if long >= min(0.5 * short, rest) and long > goal[AccuracyGoal.SETTLED]:
-        status = take_long(models, works, goal, line, embedded, long)
+        status = take_long(models, data_tables, goal, line, embedded, long)
     else:
-        status = take_short(models, works, settings, goal, line, embedded, short)
+        status = take_short(models, data_tables, settings, goal, line, embedded, short)
     if goal[AccuracyGoal.END] - clock[Clock.TIME] < 1e-12 * goal[AccuracyGoal.END]:
         clock[Clock.TIME] = goal[AccuracyGoal.END]
     return status
@@ -229,20 +227,20 @@ def attempt(
 
 @kernel
 def go_on(
-    models: Table, works: Table, settings: Vector, goal: Vector, embedded: Embedded, line: SubstepState
+    models: Table, data_tables: Table, settings: Vector, goal: Vector, embedded: Embedded, line: SubstepState
 ) -> int:  # fmt: skip
     """Sub-steps until the end of the step, a full list of them or the deadline; the Status.
 
-    models: tables of the Model for order 8 and for order 2; works: of two Data.
+    models: tables of the Model for order 8 and for order 2; data_tables: of two Data.
     """
-    data, clock = data_view(works[0]), line.clock
+    data, clock = data_view(data_tables[0]), line.clock
     note_deadline(data, settings)
     if clock[Clock.BEGUN] == 0.0:
         begin_substeps(line, goal[AccuracyGoal.END])
     line.taken[0] = 0
     while clock[Clock.TIME] < goal[AccuracyGoal.END] and line.taken[0] < line.lengths.shape[0]:
         effort = line.report[StepReport.ITERATIONS]
-        status = attempt(models, works, settings, goal, embedded, line)
+        status = attempt(models, data_tables, settings, goal, embedded, line)
         if status != _SOLVED:
             return status
         if is_due(data, line.report[StepReport.ITERATIONS] - effort):

@@ -59,7 +59,7 @@ def _end(line: SubstepState, path: SubstepMotion, end: float, t: int, status: in
 @kernel
 def roll_substeps(
     models: Table,
-    works: Table,
+    data_tables: Table,
     settings: Vector,
     goal: Vector,
     embedded: Embedded,
@@ -71,7 +71,7 @@ def roll_substeps(
 
     Where a step is not solved, its report has the Status.
     """
-    data, end = data_view(works[0]), goal[AccuracyGoal.END]
+    data, end = data_view(data_tables[0]), goal[AccuracyGoal.END]
     note_deadline(data, settings)
     for t in range(first, path.us.shape[0]):
         if line.clock[Clock.BEGUN] == 0.0:
@@ -79,7 +79,7 @@ def roll_substeps(
         due = False
         while line.clock[Clock.TIME] < end:
             effort, line.taken[0] = line.report[StepReport.ITERATIONS], 0
-            status = attempt(models, works, settings, goal, embedded, line)
+            status = attempt(models, data_tables, settings, goal, embedded, line)
             path.substeps[t] += line.taken[0]
             if path.substeps[t] > goal[AccuracyGoal.MOST]:
                 status = _MAX_ITERATIONS

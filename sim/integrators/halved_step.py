@@ -30,7 +30,7 @@ from solvers.dense import copy_vector
 from solvers.status import Status
 from solvers.types import Vector
 
-LANDS = -2  # in place of a Status: a contact or limit is reached within the step
+LANDS = -2  # in place of a Status, beside NEAR: a contact or limit is reached within the step
 FAILED = 1e300
 
 _SOLVED = int(Status.SOLVED)
@@ -147,7 +147,7 @@ def _difference(
 @kernel
 def _extrapolated(
     models: Table,
-    works: Table,
+    data_tables: Table,
     step: tuple[Vector, Vector, float],
     line: SubstepState,
     embedded: Embedded,
@@ -163,7 +163,7 @@ def _extrapolated(
         return ratio
     if clock[Clock.BEYOND] + clock[Clock.WAIT] > 0.0 or not ratio > _LITTLE:
         return ratio
-    error = max(extrapolate(models[1], works[0], settings, goal, line, embedded, h) - CLOSED, 0.0)
+    error = max(extrapolate(models[1], data_tables[0], settings, goal, line, embedded, h) - CLOSED, 0.0)
     better = _HELD * error / (goal[AccuracyGoal.ACCURACY] * h)
     if better > 0.5 * ratio:
         clock[Clock.WAIT] = _WAIT
@@ -221,17 +221,17 @@ def _ends_before(goal: Vector, line: SubstepState, found: Landing, h: float) -> 
 
 @kernel
 def _judged(
-    models: Table, works: Table, step: tuple[Vector, Vector, float], line: SubstepState, embedded: Embedded
+    models: Table, data_tables: Table, step: tuple[Vector, Vector, float], line: SubstepState, embedded: Embedded
 ) -> float:  # fmt: skip
     """Error over allowed of the best of the steps of order 2, 4 and 6, which is then in line.trial.
 
     step: (goal, settings, length)
     """
-    model, data, clock = model_view(models[1]), data_view(works[0]), line.clock
+    model, data, clock = model_view(models[1]), data_view(data_tables[0]), line.clock
     goal, settings, h = step
     stop = stopping_error(model, line.parts, line.slips, h)
     behind = part_of(goal, settings, max(0.5 * h, _AHEAD), 1)
-    error = max(stop, _difference(models[1], works[0], behind, goal, line, embedded))
+    error = max(stop, _difference(models[1], data_tables[0], behind, goal, line, embedded))
     allowed = goal[AccuracyGoal.ACCURACY] * h
     settles = data.active_count[0] > 0 and h < _SETTLES * goal[AccuracyGoal.SETTLED]
     if clock[Clock.HIT] + clock[Clock.BEYOND] == 0.0 and not settles:
@@ -239,18 +239,18 @@ def _judged(
         if raised < FAILED:
             clock[Clock.ORDER] = 4.0
             return max(raised, stop) / allowed
-    return _extrapolated(models, works, step, line, embedded, error / allowed)
+    return _extrapolated(models, data_tables, step, line, embedded, error / allowed)
 
 
 @kernel
 def try_short(
-    models: Table, works: Table, settings: Vector, goal: Vector, line: SubstepState, embedded: Embedded, h: float
+    models: Table, data_tables: Table, settings: Vector, goal: Vector, line: SubstepState, embedded: Embedded, h: float
 ) -> tuple[int, float]:  # fmt: skip
     """line.trial = the node one step of length h after line.x; (Status or LANDS, error over allowed)."""
-    model, data, clock = model_view(models[1]), data_view(works[0]), line.clock
+    model, data, clock = model_view(models[1]), data_view(data_tables[0]), line.clock
     options = _patient(model, goal, settings, clock, h)
     clock[Clock.ORDER] = 2.0
-    status = _whole(models[1], works[0], options, line)
+    status = _whole(models[1], data_tables[0], options, line)
     if status != _SOLVED:
         return status, FAILED
     report_contacts(model, data, h, line.parts[2])
@@ -262,10 +262,10 @@ def try_short(
     if status == _SOLVED:
         parts = within(part_of(goal, settings, 0.5 * h, 1), options.max_iterations, _share(model))
         clock[Clock.WARM] *= 0.5
-        status = _two_halves(models[1], works[0], parts, line)
+        status = _two_halves(models[1], data_tables[0], parts, line)
     if status != _SOLVED:
         clock[Clock.WARM] = 0.0
         return status, FAILED
     if found.depth > _OVERLAP:
         return _SOLVED, 0.0
-    return _SOLVED, _judged(models, works, (goal, settings, h), line, embedded)
+    return _SOLVED, _judged(models, data_tables, (goal, settings, h), line, embedded)

@@ -51,19 +51,19 @@ def _interval(model: Model, data: Data, h: float, path: Phases, x: Vector) -> fl
 
 
 @kernel
-def _begin_near(model: Model, data: Data, work: Data, h: float, path: Phases, t: int) -> int:
+def _begin_near(model: Model, data: Data, scratch: Data, h: float, path: Phases, t: int) -> int:
     """The state with the mean velocity of the node where step t begins, the first of order 2; the Status."""
     x, mean = path.xs[t], path.motion.xs[t]
     rollout.begin(data)
     copy_vector(x, mean)
     status = _SOLVED
-    if _interval(model, work, h, path, x) == h:
-        status = start_state(model, work, h, x[data.theta1.shape[0] :], mean)
+    if _interval(model, scratch, h, path, x) == h:
+        status = start_state(model, scratch, h, x[data.theta1.shape[0] :], mean)
     return _NOT_FINITE if status == _SOLVED and normalize_state(model, mean, UNIT) >= 0 else status
 
 
 @kernel
-def _stay(model: Model, data: Data, work: Data, options: StepOptions, path: Phases, t: int) -> int:
+def _stay(model: Model, data: Data, scratch: Data, options: StepOptions, path: Phases, t: int) -> int:
     """Step t, of order 2; the Status."""
     motion, nq = path.motion, data.theta1.shape[0]
     mean, end, report = motion.xs[t], motion.xs[t + 1], motion.reports[t]
@@ -76,18 +76,23 @@ def _stay(model: Model, data: Data, work: Data, options: StepOptions, path: Phas
         status = int(report[StepReport.STATUS])
     if status == _SOLVED:
         copy_vector(end, path.xs[t + 1])
-        node_velocity(model, work, _interval(model, work, options.h, path, end), end)
-        copy_vector(work.dnu, path.xs[t + 1, nq:])
+        node_velocity(model, scratch, _interval(model, scratch, options.h, path, end), end)
+        copy_vector(scratch.dnu, path.xs[t + 1, nq:])
     return status
 
 
 @kernel
-def roll_phases(models: Table, works: Table, settings: Vector, path: Phases, first: int) -> int:
+def roll_phases(models: Table, data_tables: Table, settings: Vector, path: Phases, first: int) -> int:
     """Steps from `first` on: how many are taken at the end, at the deadline, or before the first unsolved one.
 
-    models, works: of the higher order, then of order 2. The report of a step that is not solved has the Status.
+    models, data_tables: of the higher order, then of order 2. The report of a step that is not solved has the Status.
     """
-    flight, second, data, near = model_view(models[0]), model_view(models[1]), data_view(works[0]), data_view(works[1])
+    flight, second, data, near = (
+        model_view(models[0]),
+        model_view(models[1]),
+        data_view(data_tables[0]),
+        data_view(data_tables[1]),
+    )
     options = options_of(near, settings, False)
     note_deadline(data, settings)
     for t in range(first, path.motion.us.shape[0]):

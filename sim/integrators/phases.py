@@ -31,7 +31,7 @@ from solvers.rotation import quat_matrix, quat_turn
 from solvers.status import Status
 from solvers.types import Matrix, Vector
 
-NEAR = -1  # in place of a Status: a contact or limit is active
+NEAR = -1  # in place of a Status: a contact or limit is active, or near at the end of the step
 
 _SOLVED = int(Status.SOLVED)
 

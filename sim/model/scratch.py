@@ -16,7 +16,7 @@ _CHUNKS = 4  # per core: evens out items that take longer
 
 
 class Scratch:
-    """Tables of Works, of the thread that asks."""
+    """Tables of Data, of the thread that asks."""
 
     def __init__(self, sizes: Sizes, contact_frame: Vector) -> None:
         self._sizes, self._contact_frame = sizes, contact_frame
@@ -24,18 +24,18 @@ class Scratch:
         self._turns = 0  # of the contact frames
 
     def tables(self, count: int) -> Table:
-        """Tables of `count` Works, (count, ...)."""
+        """Tables of `count` Data, (count, ...)."""
         kept = self._kept.__dict__
-        works = kept.setdefault("works", [])
+        buffers = kept.setdefault("buffers", [])
         if kept.setdefault("turns", self._turns) != self._turns:
-            for data in works:
+            for data in buffers:
                 data.contact_frame[:] = self._contact_frame
             kept["turns"] = self._turns
-        while len(works) < count:
-            works.append(allocate_data(self._sizes))
-            works[-1].contact_frame[:] = self._contact_frame
+        while len(buffers) < count:
+            buffers.append(allocate_data(self._sizes))
+            buffers[-1].contact_frame[:] = self._contact_frame
         if len(self._kept.__dict__.get("tables", ())) < count:
-            self._kept.tables = np.array([table(data) for data in works])
+            self._kept.tables = np.array([table(data) for data in buffers])
         out: Table = self._kept.tables[:count]
         return out
 

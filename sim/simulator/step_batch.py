@@ -174,11 +174,11 @@ class RowBatch:
     def _tables(self, derivatives: bool) -> tuple[RowTables, int]:
         """Tables of all rows, and the number of chunks."""
         n = len(self.us)
-        works = self.engines[0].chunks(n)
-        count = len(works)
+        data_tables = self.engines[0].chunks(n)
+        count = len(data_tables)
         chunk = np.searchsorted(np.arange(1, count + 1) * n // count, np.arange(n), side="right")
         models = [engine.gradient_table() if derivatives else engine.step_table() for engine in self.engines]
-        scratch = works[chunk]
+        scratch = data_tables[chunk]
         frames = np.array([engine.model.contact_frame for engine in self.engines])
         for k in map(int, np.flatnonzero((frames != frames[0]).reshape(len(frames), -1).any(axis=1))):
             own = self.index == k  # a Data has the contact frames of its Model

@@ -126,9 +126,9 @@ class AdaptiveEngine(PythonLoopEngine):
         goal, end = self._goal(settings), self.settings.time_step
         line = line._replace(u=u, wrench=wrench)
         line.x[:], line.clock[Clock.BEGUN] = x, 0.0
-        works, rows, status, taken = self._scratch.tables(2), [], int(Status.SOLVED), 0
+        data_tables, rows, status, taken = self._scratch.tables(2), [], int(Status.SOLVED), 0
         for _ in pieces(settings, 2):
-            status = int(go_on(models, works, settings, goal, errors, line))
+            status = int(go_on(models, data_tables, settings, goal, errors, line))
             n = int(line.taken[0])
             rows.append((line.starts[:n].copy(), line.lengths[:n].copy(), line.orders[:n].copy()))
             if status != Status.SOLVED or line.clock[Clock.TIME] >= end:
@@ -356,7 +356,11 @@ class AdaptiveEngine(PythonLoopEngine):
         if derivatives:
             return self._roll_slopes(x, us, wrenches, kappa)
         steps, external = len(us), self.external(wrenches)
-        (models, errors, line), settings, works = self._line(), self.settings.array(kappa), self._scratch.tables(2)
+        (models, errors, line), settings, data_tables = (
+            self._line(),
+            self.settings.array(kappa),
+            self._scratch.tables(2),
+        )
         goal, (A, B) = self._goal(settings), self.no_predictions[:2]
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
         contacts, division = np.zeros((steps, self.sizes.ncontact, CONTACT)), Division.none(steps)
@@ -365,7 +369,7 @@ class AdaptiveEngine(PythonLoopEngine):
         path = SubstepMotion(us, external, xs, reports, contacts, division.parts, division.errors)
         try:
             for _ in pieces(settings, steps + 1):
-                knot = int(roll_substeps(models, works, settings, goal, errors, line, path, knot))
+                knot = int(roll_substeps(models, data_tables, settings, goal, errors, line, path, knot))
                 if knot == steps or reports[knot, StepReport.STATUS] != Status.SOLVED:
                     break
         except KeyboardInterrupt:

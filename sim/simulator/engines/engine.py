@@ -333,11 +333,11 @@ class Engine(LinkedModel):
                 if step == n * substeps:
                     break
         else:
-            works = self._scratch.chunks(n)
-            ends = [c * n // len(works) * substeps for c in range(len(works) + 1)]
+            data_tables = self._scratch.chunks(n)
+            ends = [c * n // len(data_tables) * substeps for c in range(len(data_tables) + 1)]
             done = np.array(ends[:-1])
             for _ in pieces(settings, n * substeps):
-                parallel_loops.linearize_knots(model, works, settings, substeps, line, done)
+                parallel_loops.linearize_knots(model, data_tables, settings, substeps, line, done)
                 if done.tolist() == ends[1:]:
                     break
         if np.count_nonzero(reports[:, StepReport.STATUS]):
@@ -375,12 +375,12 @@ class Engine(LinkedModel):
         motions = parallel_loops.BatchBuffers(
             xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.no_predictions[:2]
         )
-        model, works, settings = self.step_table(), self._scratch.chunks(n), self.settings.array()
+        model, data_tables, settings = self.step_table(), self._scratch.chunks(n), self.settings.array()
         status = reports[:, 0, StepReport.STATUS]
         try:
             xs[:, 0] = x0s  # the first touch of much memory takes its time
             for _ in pieces(settings, n * steps):
-                parallel_loops.roll_batch(model, works, settings, motions)
+                parallel_loops.roll_batch(model, data_tables, settings, motions)
                 if np.all((knots == steps) | (status != Status.SOLVED)):
                     break
         except KeyboardInterrupt:

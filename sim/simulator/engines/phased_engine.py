@@ -69,15 +69,15 @@ class PhasedEngine(PythonLoopEngine):
         reports, contacts = np.zeros((steps, REPORT)), np.zeros((steps, self.sizes.ncontact, CONTACT))
         motion = MotionBuffers(means, us, self.external(wrenches), reports, contacts, *self.no_predictions[:2])
         path = Phases(xs, motion, near, not self.second_order_reason, self.settings.divide)
-        xs[0], settings, (models, works) = x, self._second.settings.array(kappa), self._lines()
+        xs[0], settings, (models, data_tables) = x, self._second.settings.array(kappa), self._lines()
         self._second.forget_parts()
         try:
             for _ in pieces(settings, steps):
-                t = int(roll_phases(models, works, settings, path, t))
+                t = int(roll_phases(models, data_tables, settings, path, t))
                 while t < steps and near[t] and self._divide(path, t, kappa):
                     t += 1
                     if t < steps:
-                        t = int(roll_phases(models, works, settings, path, t))
+                        t = int(roll_phases(models, data_tables, settings, path, t))
                 if t == steps or reports[t, StepReport.STATUS] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
@@ -90,10 +90,10 @@ class PhasedEngine(PythonLoopEngine):
     def _lines(self) -> tuple[Table, Table]:
         """Tables of the models of both orders, and of this thread's Data of both."""
         own, other = self.table(), self._second.table()
-        if getattr(self._kept, "works", (None, None))[0] is not own:
-            self._kept.works = own, np.stack([own, other])
+        if getattr(self._kept, "data_tables", (None, None))[0] is not own:
+            self._kept.data_tables = own, np.stack([own, other])
             self._kept.models = np.stack([self.linked(link_flight), self._second.step_table()])
-        return self._kept.models, self._kept.works[1]
+        return self._kept.models, self._kept.data_tables[1]
 
     def _divide(self, path: Phases, t: int, kappa: float | None) -> bool:
         """Take the unsolved step t of order 2 in parts; False where that does not solve it."""
