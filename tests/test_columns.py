@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import itertools
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -20,6 +21,8 @@ COMPONENTS = (1, 3, 4, 6, 9, 36)  # one number, vectors, quaternions, twists and
 FRAMES = ("pair_frame", "loop_frame", "pair_place", "pair_relative")  # a rotation, with a point before or behind it
 SIDES = ("coupling_body", "couple_live", "gear_dof", "gear_rate")  # of a and of b
 PADDED = ("couple_x",)  # one column, in lanes
+JACOBIANS = ("contact_turn", "pair_turn", "pair_shift")  # (3, 6) each, whose rows are passed
+NUMBERED = ("_rate", "earlier_shift", "times_row")  # kernels that take the number of a row of a matrix
 
 
 def _named() -> set[str]:
@@ -57,6 +60,18 @@ def _rows(function: list[ast.AST]) -> dict[str, str]:
     return out
 
 
+def _passed_numbers(call: ast.Call, rows: dict[str, str]) -> list[tuple[str, str]]:
+    """(field, call) where a row is passed with the number of a column, as three(data.cone[c], 3)."""
+    if last_name(call.func) in NUMBERED:
+        return []
+    for row, column in itertools.pairwise(call.args):
+        owner = row.value if isinstance(row, ast.Subscript) and not isinstance(row.slice, ast.Tuple) else row
+        name = rows.get(row.id) if isinstance(row, ast.Name) else _field(owner)
+        if name in MATRICES and name not in JACOBIANS and isinstance(getattr(column, "value", None), int):
+            return [(name, ast.unparse(call))]
+    return []
+
+
 def numbers_of(functions: Iterable[ast.FunctionDef]) -> list[tuple[str, str]]:
     """(field, subscript) of every column that a function calls by a number."""
     found = []
@@ -64,6 +79,8 @@ def numbers_of(functions: Iterable[ast.FunctionDef]) -> list[tuple[str, str]]:
         parts = list(ast.walk(function))
         rows, own = _rows(parts), {argument.arg for argument in function.args.args} & MATRICES
         for node in parts:
+            if isinstance(node, ast.Call):
+                found += _passed_numbers(node, rows)
             if not isinstance(node, ast.Subscript):
                 continue
             name, last = _field(node.value), node.slice
@@ -88,10 +105,11 @@ def test_no_column_with_a_name_is_a_number() -> None:
     assert {"contact_kin", "cone", "bound", "D", "pair_sizes"} <= named
     source = (
         "def f(data, hull):\n    k = data.contact_kin[c]\n    return k[3] + k[Kin.GAP] + data.bound[c, 1] + data.cone[0, j]"
-        " + hull[o, 3]"
+        " + hull[o, 3] + along(k, 18, e) + along(data.cone[c], Cone.S, e)"
     )
     assert sorted(numbers_of(_nodes(source, ast.FunctionDef))) == [
         ("bound", "data.bound[c, 1]"),
+        ("contact_kin", "along(k, 18, e)"),
         ("contact_kin", "k[3]"),
         ("hull", "hull[o, 3]"),
     ]

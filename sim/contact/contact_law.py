@@ -189,7 +189,7 @@ def return_contact(model: Model, data: Data, h: float, c: int, kappa: float) -> 
     Gaps weigh against impulses as h/m, slips as 1/m.
     """
     weight = _response(model, c)
-    return_pair(data.cone[c], data.cone_trial[c], 0, 1, h * weight, kappa)
+    return_pair(data.cone[c], data.cone_trial[c], Cone.SLACK.value, Cone.IMPULSE.value, h * weight, kappa)
     if law_of(model, c) == Law.LINEAR:
         return_pyramid(model, data, c, weight, kappa)
 

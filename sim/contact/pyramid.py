@@ -125,9 +125,10 @@ def pyramid_boundary(model: Model, data: Data, c: int) -> float:
 @optional(Slot.RETURN_PYRAMID)
 def return_pyramid(model: Model, data: Data, c: int, weight: float, kappa: float) -> None:
     """The five pairs put back onto the central path of kappa where they left their cones."""
-    return_pair(data.cone[c], data.cone_trial[c], 2, 3, weight, kappa)
+    cone, before = data.cone[c], data.cone_trial[c]
+    return_pair(cone, before, Pyramid.SPEED.value, Pyramid.CAP.value, weight, kappa)
     for e in range(4):
-        return_pair(data.cone[c], data.cone_trial[c], 8 + e, 4 + e, weight, kappa)
+        return_pair(cone, before, Pyramid.SLIP + e, Pyramid.FRICTION + e, weight, kappa)
 
 
 @optional(Slot.CONDENSE_PYRAMID)

@@ -127,7 +127,7 @@ def pair_jacobian(model: Model, data: Data, h: float, j: int) -> None:
     g = data.pair_out[j]
     frame_turn(g, data.pair_scratch)
     shape_to_world(data.pair_scratch, 0, data, s, x, y, z, data.pair_turn[j])
-    shape_to_world(g, 25, data, s, x, y, z, data.pair_shift[j])
+    shape_to_world(g, Witness.POINT_RATE.value, data, s, x, y, z, data.pair_shift[j])
     F = data.pair_frame[j]
     px, py, pz = F[PairFrame.POINT] - o[0], F[PairFrame.POINT + 1] - o[1], F[PairFrame.POINT + 2] - o[2]
     Ca = data.pair_Ca[j]

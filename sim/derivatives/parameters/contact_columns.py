@@ -159,13 +159,15 @@ def add_point(model: Model, data: Data, h: float, c: int, k: int, w: float, col:
     x, y, z = unit_vector(k)
     e = rotate(data.rot3, i, x, y, z)
     b = data.bounce[c]
-    gap = _along(kin, 18, e)
-    gap -= floor_change(
-        data, c, _along(b, 2, rotate(data.rot1, i, x, y, z)), _along(b, 8, rotate(data.rot2, i, x, y, z))
-    )
+    first = Kin.BY_TRANSLATION.value
+    gap = _along(kin, first, e)
+    before = _along(b, Bounce.ROW1.value, rotate(data.rot1, i, x, y, z))
+    gap -= floor_change(data, c, before, _along(b, Bounce.ROW2.value, rotate(data.rot2, i, x, y, z)))
     v = turning(data, h, i, e)
     v = (v[0] - e[0] / h, v[1] - e[1] / h, v[2] - e[2] / h)  # rows of kin are of a moving body
-    p = impulse_change(data, c, gap, _along(F, 3, v) + _along(kin, 21, e), _along(F, 6, v) + _along(kin, 24, e))
+    s1 = _along(F, 3, v) + _along(kin, first + 3, e)
+    s2 = _along(F, 6, v) + _along(kin, first + 6, e)
+    p = impulse_change(data, c, gap, s1, s2)
     df = ground_force(data, c, p)
     dr = e
     if model.contact_terrain[c] > 0:

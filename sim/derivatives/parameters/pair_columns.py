@@ -12,7 +12,7 @@ from sim.derivatives.parameters.contact_columns import add_pair, floor_change, i
 from sim.derivatives.parameters.taut_string_columns import add_moved_end
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import PairFrame
+from sim.model.record_columns import Bounce, PairFrame
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, rotate
 from solvers.types import Vector
@@ -30,7 +30,7 @@ def row(X: Vector, first: int) -> Vec3:
 def pair_floor(data: Data, c: int, side: int, e1: Vec3, e2: Vec3) -> float:
     """Change of the floor that an impact raises when the shape of a (0) or b (1) is moved by e1, e2 at 1 and 2."""
     b = data.bounce[c]
-    d = floor_change(data, c, dot(row(b, 2), e1), dot(row(b, 8), e2))
+    d = floor_change(data, c, dot(row(b, Bounce.ROW1.value), e1), dot(row(b, Bounce.ROW2.value), e2))
     return d if side == 0 else -d
 
 

@@ -88,7 +88,7 @@ def resume_limits(model: Model, data: Data, weight: float, kappa: float, predict
 def return_limits(model: Model, data: Data, weight: float, kappa: float) -> None:
     """The pairs that left their cones put back onto the central path of kappa."""
     for k in range(model.limit_dof.shape[0]):
-        return_pair(data.bound[k], data.bound_trial[k], 0, 1, weight, kappa)
+        return_pair(data.bound[k], data.bound_trial[k], Bound.SLACK.value, Bound.IMPULSE.value, weight, kappa)
 
 
 @kernel
