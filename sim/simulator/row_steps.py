@@ -85,11 +85,11 @@ class RowSteps:
         kappas = self._kappas(kappa, count)
         if contacts and (derivatives or not engine.in_one_kernel):
             raise ValueError(f"{_CALL}(contacts=True): expected no derivatives, and a simulator without an accuracy")
-        engines, index = self._models.of(f"{_CALL}(parameters=...)", parameters, count)
-        rows = np.zeros((count if contacts else 0, *engine.no_outputs[0].shape[1:]))
-        found, reports = RowBatch(engines, index, states, inputs, steps, kappas, rows, kept).step(derivatives)
+        rows = self._models.of(f"{_CALL}(parameters=...)", parameters, count)
+        touched = np.zeros((count if contacts else 0, *engine.no_outputs[0].shape[1:]))
+        found, reports = RowBatch(rows, states, inputs, steps, kappas, touched, kept).step(derivatives)
         if contacts:
-            found = replace(found, contacts=contacts_of(self._mechanism, engine.settings.time_step, rows))
+            found = replace(found, contacts=contacts_of(self._mechanism, engine.settings.time_step, touched))
         if not len(found.unsolved):
             return found
         i = int(found.unsolved[0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +20,7 @@ from sim.simulator.engines.division import DIVISIBLE
 from sim.simulator.engines.engine import REPORT, Engine, finite_rows, refuse
 from sim.simulator.results import Contacts, Result
 from sim.simulator.row_impulses import RowImpulses
+from solvers.compiler import Table
 from solvers.status import Status
 from solvers.types import Integers
 
@@ -57,6 +59,47 @@ class StepBatch(Result):
     __repr__ = short_repr
 
 
+@dataclass(frozen=True)
+class RowEngines:
+    """The engines of rows, and the tables that all steps of these rows share.
+
+    Attributes:
+        engines: distinct engines.
+        index: (n,) which of them each row has.
+    """
+
+    engines: Sequence[Engine]
+    index: Integers
+
+    __repr__ = short_repr
+
+    @cached_property
+    def step_tables(self) -> Table:
+        """(n, ...) tables of the Models of rows, with steps linked."""
+        return self._by_row([engine.step_table() for engine in self.engines])
+
+    @cached_property
+    def gradient_tables(self) -> Table:
+        """(n, ...) the same, with derivatives linked."""
+        return self._by_row([engine.gradient_table() for engine in self.engines])
+
+    @cached_property
+    def settings(self) -> Floats:
+        """(n, 8) settings of rows, of StepSetting."""
+        different = {engine.settings: engine.settings.array() for engine in self.engines}
+        return np.array([different[engine.settings] for engine in self.engines])[self.index]
+
+    @cached_property
+    def turned(self) -> list[int]:
+        """Engines whose contact frames are not those of the first one."""
+        frames = np.array([engine.model.contact_frame for engine in self.engines])
+        return [int(k) for k in np.flatnonzero((frames != frames[0]).reshape(len(frames), -1).any(axis=1))]
+
+    def _by_row(self, tables: list[Table]) -> Table:
+        found: Table = np.array(tables, dtype=tables[0].dtype)[self.index]
+        return found
+
+
 class RowModels:
     """Engines by values of parameters; those of the last rows are kept."""
 
@@ -65,12 +108,15 @@ class RowModels:
         self._own, self._size_of, self._make = own, size, make
         self._kept: OrderedDict[bytes, Engine] = OrderedDict()
         self._sizes: dict[str, int] = {}
-        self._last: tuple[tuple[str, ...], Floats, list[Engine], Integers] | None = None
+        self._last: tuple[tuple[str, ...], Floats, RowEngines] | None = None
+        self._alike = RowEngines([own], np.zeros(0, dtype=np.int64))
 
-    def of(self, call: str, parameters: Mapping[str, ArrayLike] | None, count: int) -> tuple[list[Engine], Integers]:
-        """Distinct engines, and which of them each of `count` rows has."""
+    def of(self, call: str, parameters: Mapping[str, ArrayLike] | None, count: int) -> RowEngines:
+        """The engines of `count` rows."""
         if not parameters:
-            return [self._own], np.zeros(count, dtype=np.int64)
+            if len(self._alike.index) != count:
+                self._alike = RowEngines([self._own], np.zeros(count, dtype=np.int64))
+            return self._alike
         sizes = {name: self._size(name) for name in parameters}
         columns = [self._columns(call, name, values, count) for name, values in parameters.items()]
         shared = all(len(column) == 1 for column in columns)
@@ -78,8 +124,8 @@ class RowModels:
             columns = [np.broadcast_to(column, (count, column.shape[1])) for column in columns]
         joined, names = np.concatenate(columns, axis=1), tuple(sizes)
         last = self._last  # calls repeat their models: to compare them takes a tenth of the time below
-        if last is not None and last[0] == names and len(last[3]) == count and np.array_equal(last[1], joined):
-            return last[2], last[3]
+        if last is not None and last[0] == names and len(last[2].index) == count and np.array_equal(last[1], joined):
+            return last[2]
         rows, index = (joined, np.zeros(count, dtype=np.int64)) if shared else _distinct(joined)
         bounds = np.cumsum([0, *sizes.values()])
         engines = []
@@ -92,8 +138,9 @@ class RowModels:
             engines.append(self._kept[key])
         while len(self._kept) > max(_KEPT, len(rows)):
             self._kept.popitem(last=False)
-        self._last = names, joined, engines, index
-        return engines, index
+        found = RowEngines(engines, index)
+        self._last = names, joined, found
+        return found
 
     def _columns(self, call: str, name: str, values: ArrayLike, count: int) -> Floats:
         """Values of a parameter, (count, components), or one row for all."""
@@ -128,8 +175,7 @@ def _distinct(rows: Floats) -> tuple[Floats, Integers]:
 class RowBatch:
     """Rows that are stepped together."""
 
-    engines: Sequence[Engine]
-    index: Integers  # (n,) which engine each row has
+    rows: RowEngines
     xs: Floats  # (n, nx)
     us: Floats  # (n, nu)
     substeps: int
@@ -141,7 +187,7 @@ class RowBatch:
 
     def step(self, derivatives: bool) -> tuple[StepBatch, Floats]:
         """One knot of every row, and the report of each."""
-        first = self.engines[0]
+        first = self.rows.engines[0]
         n = len(self.us)
         A, B = (np.zeros((n if derivatives else 0, first.ndx, size)) for size in (first.ndx, first.nu))
         x_next, reports = np.array(self.xs), np.zeros((n, REPORT))
@@ -173,31 +219,27 @@ class RowBatch:
 
     def _tables(self, derivatives: bool) -> tuple[RowTables, int]:
         """Tables of all rows, and the number of chunks."""
-        n = len(self.us)
-        data_tables = self.engines[0].chunks(n)
+        n, rows = len(self.us), self.rows
+        models = rows.gradient_tables if derivatives else rows.step_tables
+        data_tables = rows.engines[0].chunks(n)
         count = len(data_tables)
         chunk = np.searchsorted(np.arange(1, count + 1) * n // count, np.arange(n), side="right")
-        models = [engine.gradient_table() if derivatives else engine.step_table() for engine in self.engines]
         scratch = data_tables[chunk]
-        frames = np.array([engine.model.contact_frame for engine in self.engines])
-        for k in map(int, np.flatnonzero((frames != frames[0]).reshape(len(frames), -1).any(axis=1))):
-            own = self.index == k  # a Data has the contact frames of its Model
-            scratch[own] = self.engines[k].chunks(n)[chunk[own]]
-        different = {engine.settings: engine.settings.array() for engine in self.engines}
-        settings = np.array([different[engine.settings] for engine in self.engines])[self.index]
+        for k in rows.turned:
+            own = rows.index == k  # a Data has the contact frames of its Model
+            scratch[own] = rows.engines[k].chunks(n)[chunk[own]]
+        settings = rows.settings.copy()
         given = ~np.isnan(self.kappas)
         settings[given, StepSetting.KAPPA] = self.kappas[given]
         kept = self.impulses
         if len(kept):
             settings[:, StepSetting.IMPULSES] = kept.known
-        return RowTables(
-            np.array(models, dtype=models[0].dtype)[self.index], scratch, settings, kept.cones, kept.bounds, kept.dry
-        ), count
+        return RowTables(models, scratch, settings, kept.cones, kept.bounds, kept.dry), count
 
     def _linearize(self, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
         """Steps and their derivatives."""
         rows, chunks = self._tables(derivatives=True)
-        line = Linearized(self.xs, self.us, self.engines[0].no_wrenches, A, B, x_next, reports)
+        line = Linearized(self.xs, self.us, self.rows.engines[0].no_wrenches, A, B, x_next, reports)
         done = np.zeros(len(self.us), dtype=np.int64)
         deadline = np.zeros(len(StepSetting))
         for _ in pieces(deadline, 2):
@@ -209,7 +251,7 @@ class RowBatch:
     def _roll(self, x_next: Floats, reports: Floats) -> None:
         """Steps alone."""
         rows, chunks = self._tables(derivatives=False)
-        first, n = self.engines[0], len(self.us)
+        first, n = self.rows.engines[0], len(self.us)
         xs = np.empty((n, self.substeps + 1, first.nx))
         xs[:, 0] = self.xs
         us = np.repeat(self.us[:, None], self.substeps, axis=1)
@@ -227,7 +269,7 @@ class RowBatch:
 
     def _divide(self, row: int, derivatives: bool, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
         """A row that was not solved in whole steps."""
-        engine = self.engines[self.index[row]]
+        engine = self.rows.engines[self.rows.index[row]]
         us = np.repeat(self.us[row : row + 1], self.substeps, axis=0)
         rolled = engine.roll(self.xs[row], us, kappa=self._kappa(row), derivatives=derivatives)
         reports[row] = rolled.reports[min(rolled.solved_steps, self.substeps - 1)]
@@ -243,8 +285,8 @@ class RowBatch:
 
     def _by_engine(self, derivatives: bool, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
         """Steps that compiled loops cannot make, the rows of an engine at a time."""
-        for k, engine in enumerate(self.engines):
-            rows = np.flatnonzero(self.index == k)
+        for k, engine in enumerate(self.rows.engines):
+            rows = np.flatnonzero(self.rows.index == k)
             xs, us = self.xs[rows], self.us[rows]
             if derivatives:
                 A[rows], B[rows], x_next[rows], reports[rows] = engine.linearize(xs, us, self.substeps, None)
