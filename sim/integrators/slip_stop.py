@@ -20,7 +20,7 @@ _SLIPS = 1e-3  # [m/s]
 
 @kernel
 def _normal_impulse(row: Vector) -> float:
-    """That of a contact [N s], from its row (11,)."""
+    """Impulse of a contact [N s], from its row (11,)."""
     p, n = row[ContactRow.IMPULSE : ContactRow.POINT], row[ContactRow.NORMAL :]
     return p[0] * n[0] + p[1] * n[1] + p[2] * n[2]
 
