@@ -38,6 +38,9 @@ class KnotStepper:
         self._division = Division.none(steps)
         self._none = np.zeros((0, engine.ndx, engine.ndx)), np.zeros((0, engine.ndx, engine.nu))
         self._start, self.end, self._knot = xs[0], xs[-1], 0
+        # views, which take as long to make as to copy
+        self._inputs, self._report = us[0] if steps == 1 else us, reports[-1]
+        self._contacts = rows[-1] if contacts else rows
 
     def advance(self, x: Floats, u: Floats) -> bool:
         """Take the steps of a knot; `end` (nx,) is the state after them until the next call.
@@ -50,7 +53,7 @@ class KnotStepper:
             Whether all steps were solved; `result` says why not.
         """
         motion, division = self._motion, self._division
-        self._start[:], motion.us[:] = x, u
+        self._start[:], self._inputs[:] = x, u
         if self._steps > 1 or division.parts[0] > 1:  # of the knot before
             division.parts.fill(1)
             division.momentum_fractions.fill(1.0)
@@ -61,9 +64,8 @@ class KnotStepper:
 
     def last_step(self) -> StepResult:
         """The last step of a knot that was solved, with the contacts that are kept."""
-        motion = self._motion
-        _, iterations, residual, violation, _, _ = motion.reports[-1].tolist()
-        scene = self._mechanism, self._time_step, motion.contacts[-1].copy()
+        _, iterations, residual, violation, _, _ = self._report.tolist()
+        scene = self._mechanism, self._time_step, self._contacts.copy()
         solved = self.end.copy(), _SOLVED, int(iterations), residual, violation, scene
         parts, fractions, errors = self._division
         if parts[-1] == 1:
@@ -93,7 +95,7 @@ class KnotStepper:
         x, report = self._motion.xs[self._knot].copy(), self._motion.reports[self._knot]
         np.nan_to_num(report, copy=False, nan=np.inf, posinf=np.inf)
         status, iterations, residual, violation, _, _ = report.tolist()
-        scene = self._mechanism, self._time_step, self._motion.contacts[-1].copy()
+        scene = self._mechanism, self._time_step, self._contacts.copy()
         detail = explain(report, x)
         return StepResult(x, STATUSES[int(status)], int(iterations), residual, violation, scene, detail=detail)
 
