@@ -57,9 +57,8 @@ class KnotStepper:
         if self._steps > 1 or division.parts[0] > 1:  # of the knot before
             division.parts.fill(1)
             division.momentum_fractions.fill(1.0)
+        motion.contacts.fill(0.0)  # the report leaves out collisions beyond their reach
         self._knot = self._engine.take_steps(self._engine.step_table(), motion, None, division)
-        if self._knot < self._steps:
-            motion.contacts.fill(0.0)
         return self._knot == self._steps
 
     def last_step(self) -> StepResult:

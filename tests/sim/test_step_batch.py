@@ -195,3 +195,15 @@ def test_bad_arguments_are_named(sim, change, message):
     X, U = _rows(sim, 3)
     with pytest.raises(ValueError, match=message):
         sim.step_batch(X, U, **change)
+
+
+def test_a_collision_that_moved_beyond_its_reach_keeps_nothing_of_the_step_before() -> None:
+    bodies = [dojo.Body(name, 1.0, (0.1, 0.1, 0.1)) for name in "ab"]
+    joints = [dojo.Joint("floating", None, name) for name in "ab"]
+    pair = dojo.Collision("a", "b", dojo.Sphere(0.1), dojo.Sphere(0.1), reach=0.1)
+    sim = dojo.Simulator(dojo.Mechanism(bodies, joints, collisions=[pair], gravity=(0.0, 0.0, 0.0)), 0.01)
+    near, far = sim.neutral(), sim.neutral()
+    near[7], far[7] = 0.21, 2.0
+    assert sim.step(near).contacts.impulse.any()
+    found = sim.step(far).contacts
+    assert not found.impulse.any() and np.isinf(found.gap).all()
