@@ -3,8 +3,9 @@
     NUMBA_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/learning_costs.py
 
 Tasks of Gymnasium, 64 rows that move under random actions, processor time per row and action: the least of some rounds
-taken in turns. Rows start from their states alone, or from the impulses of their last steps. An epoch: the means over
-the later epochs of a run with the settings of the task. Memory: the most that the process has had.
+taken in turns. Rows start from their states alone, or from the impulses of their last steps. Contacts beyond the cutoff
+with which the task is learnt are far, but in one column. An epoch: the means over the later epochs of a run with the
+settings of the task. Memory: the most that the process has had.
 """
 
 from __future__ import annotations
@@ -54,16 +55,17 @@ def moving(task: Task, sim: dojo.Simulator, substeps: int) -> tuple[Floats, Floa
 
 
 def stepped(name: str, rounds: int) -> list[Cell]:
-    """A row of the steps: task, time step, substeps, us per row and action in three ways, those of the last that Python
-    takes, iterations in two.
+    """A row of the steps: task, time step, substeps, cutoff, us per row and action in three ways, and of the last one
+    without a cutoff and those that Python takes; iterations in two.
     """
     h, substeps, _ = STEPS[name]
     task = task_of(name)
-    sim = task.sim.replace(time_step=h)
-    x, inputs, impulses = moving(task, sim, substeps)
+    whole, cutoff = task.sim.replace(time_step=h), task.settings.get("cutoff", 0.0)
+    near = whole.replace(cutoff=cutoff)
+    x, inputs, impulses = moving(task, whole, substeps)
     every = np.arange(ROWS)
 
-    def step(derivatives: bool, known: bool, count: int = substeps) -> Any:
+    def step(derivatives: bool, known: bool, count: int = substeps, sim: dojo.Simulator = near) -> Any:
         kept = impulses.of_rows(every) if known else None  # a copy: the same start in every round
         return sim.step_batch(x, inputs, count, derivatives, KAPPA, impulses=kept)
 
@@ -72,12 +74,13 @@ def stepped(name: str, rounds: int) -> list[Cell]:
             "step": lambda: step(False, False),
             "derivatives": lambda: step(True, False),
             "known": lambda: step(True, True),
+            "whole": lambda: step(True, True, sim=whole),
         },
         rounds,
     )
-    costs = [1e6 * float(seconds[kind].min()) / ROWS for kind in ("step", "derivatives", "known")]
+    costs = [1e6 * float(seconds[kind].min()) / ROWS for kind in ("step", "derivatives", "known", "whole")]
     iterations = [float(step(False, known, 1).iterations.mean()) for known in (False, True)]
-    return [name, h, substeps, *costs, _outside(lambda: step(True, True), rounds), *iterations]
+    return [name, h, substeps, cutoff, *costs, _outside(lambda: step(True, True), rounds), *iterations]
 
 
 def _outside(step: Callable[[], Any], rounds: int) -> float:
@@ -149,15 +152,16 @@ def run(args: argparse.Namespace) -> Report:
     report = Report("The cost of learning, one core")
     steps = [stepped(name, rounds) for name in names]
     header = (
-        "task", "time step [s]", "steps", "step [us]", "with A and B [us]", "from known impulses [us]",
-        "of it outside the compiled loop [us]", "iterations of the first step", "iterations, known impulses",
+        "task", "time step [s]", "steps", "cutoff", "step [us]", "with A and B [us]", "from known impulses [us]",
+        "without a cutoff [us]", "outside the compiled loop [us]", "iterations of the first step",
+        "iterations, known impulses",
     )  # fmt: skip
     report.tables.append(Table(f"An action of {ROWS} rows, per row", header, steps))
     epochs_of = [epoch(name, epochs) for name in names if name in ("HalfCheetah", "Ant")]
     report.tables.append(Table("An epoch of shac [ms]", ("task", "rows", "horizon", *PARTS), epochs_of))
     for row in steps:
         bar = None if args.quick else STEPS[str(row[0])][2]  # two rounds on a busy machine judge nothing
-        report.rows.append(Row(f"{row[0]}, step with A and B", min(float(row[4]), float(row[5])), "us", bar))
+        report.rows.append(Row(f"{row[0]}, step with A and B", min(float(row[5]), float(row[6])), "us", bar))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     report.rows.append(Row("most memory", peak, "MB"))
     return report

@@ -104,10 +104,13 @@ def draw_pushes(
 class Models:
     """The models of a randomisation, and those of the rows of an epoch."""
 
-    def __init__(self, task: Task, randomization: Randomization, rng: np.random.Generator) -> None:
+    def __init__(
+        self, task: Task, randomization: Randomization, rng: np.random.Generator, cutoff: float | None = None
+    ) -> None:
+        """cutoff: of the simulators; None: that of the task."""
         self._task, self._given = task, randomization
         self._choices = randomization.substeps or (task.substeps,)
-        sim, count = task.sim, randomization.models
+        sim, count = task.sim if cutoff is None else task.sim.replace(cutoff=cutoff), randomization.models
         check_pushes("Randomization", randomization.pushes, sim.nv)
         self._sims: dict[int, Simulator] = {}
         self._tables: dict[int, dict[str, Floats]] = {}

@@ -71,6 +71,8 @@ class ShacOptions:
         robust: whether the best policy is the one with the largest sum of mean returns with and without the pushes of
             `randomization`, if it has any, instead of those without (default False).
         kappa_grad: smoothing of the derivatives [N s m] (default None: that of the motion).
+        cutoff: that of the simulators it learns on, as of `Simulator` (default None: that of the task): at a large
+            kappa all contacts of a robot act, and far ones hardly count. Evaluations have that of the task.
         start: policy to begin with, of `imitate` or another run; it brings its network and scaling (default None).
         evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
         episodes: of an evaluation (default 8).
@@ -102,6 +104,7 @@ class ShacOptions:
     push_factors: tuple[float, float] = (1.0, 1.0)
     robust: bool = False
     kappa_grad: float | None = None
+    cutoff: float | None = None
     start: LearnedPolicy | None = None
     evaluations: int = 10
     episodes: int = 8
@@ -122,6 +125,8 @@ class ShacOptions:
         kappa = () if self.kappa_grad is None else ("kappa_grad",)
         for name in ("critic_rate", "norm", "costate", *kappa):
             checks.number(f"shac({name}=...)", getattr(self, name), above=0.0)
+        if self.cutoff is not None:
+            checks.number("shac(cutoff=...)", self.cutoff, at_least=0.0)
         for name, most in (("deviation", float("inf")), ("push_factors", float("inf")), ("betas", 1.0)):
             first, last = checks.vector(f"shac({name}=...)", getattr(self, name), 2)
             if min(first, last) < 0.0 or max(first, last) >= most:
@@ -142,7 +147,7 @@ class ShacTraining(Training):
         super().__init__(task, options, seed)
         o, rng = options, np.random.default_rng((seed, 0))
         self.restarts = np.random.default_rng((seed, 2))
-        self.models = Models(task, o.randomization, np.random.default_rng((seed, 3)))
+        self.models = Models(task, o.randomization, np.random.default_rng((seed, 3)), o.cutoff)
         network = Network((task.observations, *o.hidden, task.sim.nu), o.activation)
         self.critic = value_network(task, o.hidden, o.activation)
         self.policy = LearnedPolicy(network, network.start(rng, 0.1), *self._scale(None), task)

@@ -26,6 +26,7 @@ from sim.contact.contact_law import (
     start_contact,
 )
 from sim.contact.corner_laws import add_corner_laws, add_corner_slips
+from sim.contact.far_contacts import add_far_wrenches
 from sim.contact.ground_contact import (
     add_contact_law,
     add_contact_turn,
@@ -76,6 +77,7 @@ def apply_contacts(model: Model, data: Data) -> float:
         add_contact_wrench(model, data, c, fn, f1, f2, data.wrench)
         r = max(r, contact_error(model, data, c))
     add_inactive_wrenches(model, data)
+    add_far_wrenches(model, data)
     return r
 
 

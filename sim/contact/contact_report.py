@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sim.contact.contact_law import contact_error, report_contact, slip_violation
 from sim.contact.corners import report_corners
+from sim.contact.far_contacts import FAR
 from sim.contact.ground_contact import contact_kinematics
 from sim.contact.inactive import sunk_contact
 from sim.contact.pairs.pair_report import report_pairs
@@ -59,7 +60,7 @@ def report_ground(model: Model, data: Data, h: float, out: Matrix) -> None:
         if model.cluster_end[c] > 0:
             first = c
             report_corners(model, data, h, c, out)
-        if model.contact_hold[c] != 0:
+        if model.contact_hold[c] != 0 or data.contact_out[c] == FAR:
             contact_kinematics(model, data, h, c)
         elif data.contact_out[c] == 1 and model.cluster[first, Cluster.CORNERS] > 0.0:
             continue

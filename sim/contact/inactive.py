@@ -19,6 +19,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.corners import gather_corners, least_corner_gap
+from sim.contact.far_contacts import choose_far, has_far_activated
 from sim.contact.pairs.inactive_pairs import COUPLED
 from sim.contact.terrain_contact import terrain_gap
 from sim.mechanism.immovable_contacts import SUNK
@@ -29,6 +30,7 @@ from sim.model.options import StepOptions
 from sim.model.record_columns import Cluster, Corner, Inactive, Kin
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
+from solvers.dense import clear
 from solvers.rotation import rotate, three
 from solvers.types import Matrix
 
@@ -87,6 +89,8 @@ def choose_active(model: Model, data: Data, options: StepOptions) -> None:
     least = STIFFNESS * options.tolerance / (max(1, count) * options.kappa)
     data.active_ground_count[0] = 0
     data.inactive_count[0] = 0
+    if options.cutoff > 0.0:
+        clear(data.far_wrench)
     c = 0
     while c < count:
         i = model.contact_body[c]
@@ -124,7 +128,9 @@ def _sort(model: Model, data: Data, options: StepOptions, c: int, a: float) -> f
         return a
     for k in range(c, model.cluster_end[c]):
         data.contact_out[k] = 1 if a > 0.0 else 0
-    if a == 0.0 and model.contact_terrain[c] == 0:
+    if a == 0.0 and options.cutoff > 0.0:
+        choose_far(model, data, options, c)
+    elif a == 0.0 and model.contact_terrain[c] == 0:
         a = _leave_out(model, data, options, c)
     if stiff > 0.0 or row[Inactive.STIFF] > 0.0:  # others than before
         row[Inactive.LEAST_GAP] = 0.0
@@ -212,9 +218,9 @@ def _stiffness(model: Model, h: float, c: int, a: float) -> float:
 
 
 @optional(Slot.HAS_ACTIVATED, default=False)
-def has_activated(model: Model, data: Data) -> bool:
-    """Whether an inactive cluster has become active at configuration 3; it is active from now on."""
-    found = False
+def has_activated(model: Model, data: Data, options: StepOptions) -> bool:
+    """Whether an inactive cluster, or a far contact, has become active at configuration 3; it is active from now on."""
+    found = options.cutoff > 0.0 and has_far_activated(model, data, options)
     for m in range(data.inactive_count[0]):
         if _came_near(model, data, data.inactive_first[m]):
             found = True

@@ -125,6 +125,7 @@ def part_of(goal: Vector, settings: Vector, h: float, parts: int) -> StepOptions
         int(settings[StepSetting.MAX_ITERATIONS]),
         settings[StepSetting.GAIN],
         settings[StepSetting.LOSS],
+        settings[StepSetting.CUTOFF],
     )
 
 
@@ -132,7 +133,7 @@ def part_of(goal: Vector, settings: Vector, h: float, parts: int) -> StepOptions
 def within(options: StepOptions, most: int, share: float) -> StepOptions:
     """The options with at most so many iterations, and a share of the tolerance."""
     iterations, tolerance = min(options.max_iterations, most), share * options.tolerance
-    return StepOptions(options.h, options.kappa, tolerance, iterations, options.gain, options.loss)
+    return StepOptions(options.h, options.kappa, tolerance, iterations, options.gain, options.loss, options.cutoff)
 
 
 @kernel

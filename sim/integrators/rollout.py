@@ -1,7 +1,6 @@
 """Whole horizons, where Python enters compiled code: rollouts, linearizations, batches.
 
-    settings   (8,) time step [s], kappa [N s m], tolerance, largest number of iterations, deadline [s], largest gain
-               and loss of energy, of those that change in a step, and 1 if the Data has impulses for the first step
+    settings   (9,) the columns of StepSetting
     report     (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
                accuracy of derivatives, 0 where there are none
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
@@ -90,6 +89,7 @@ def options_of(data: Data, settings: Vector, begins: bool) -> StepOptions:
         int(settings[StepSetting.MAX_ITERATIONS]),
         settings[StepSetting.GAIN],
         settings[StepSetting.LOSS],
+        settings[StepSetting.CUTOFF],
     )
 
 

@@ -84,7 +84,7 @@ class Data(NamedTuple):
     active_ground_count: Integers  # (1,) how many of them are with the ground
     inactive_count: Integers  # (1,) inactive clusters
     inactive_first: Integers  # (nground,) their first contacts
-    contact_out: Integers  # (nground,) 1 for an inactive contact
+    contact_out: Integers  # (nground,) 1 for an inactive contact, 2 for a far one
     pair_sides: Integers  # (npair,) axes that separate the shapes at configuration 2, at the first pair of a collision
     pair_code: Integers  # (npair,) elements that make each contact point, chosen where an attempt starts
     pair_previous: Integers  # (npair,) of the choice before, those that pressed; 0 for the others
@@ -114,6 +114,7 @@ class Data(NamedTuple):
     corner_law: Matrix  # (nground, 36) -d(wrench)/d(twist) by such a law, at the first contact of a cluster: about the
     # centre of mass, world axes
     corner_block: Vector  # (36,) scratch
+    far_wrench: Matrix  # (nbody, 6) less the wrenches of far contacts (contact/far_contacts.py), about O
     inactive_tolerance: Vector  # (1,) change of a cluster's impulses below which they stand [N s]
     # contacts
     cone: Matrix  # (ncontact, 12) cone variables: Cone or Pyramid

@@ -111,7 +111,7 @@ DATA_FLOATS = _shapes(
     triangles nv nwide, triangle_across 12 nwide,
     dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel,
     step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 6, loop_clock 2,
-    inactive nground 40, inactive_tolerance 1,
+    inactive nground 40, inactive_tolerance 1, far_wrench nbody 6,
     corners 10 nground+8, corner_sums 36 8, corner_law nground 36, corner_block 36,
     reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach,
     held_x 2 high_state, held_u high_nu, held_momenta high_nv, momenta high_nv, stage_shift high_nv,

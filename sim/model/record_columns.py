@@ -342,6 +342,7 @@ class StepSetting(Code):
     GAIN = 5  # largest gain of energy (solve/energy_balance.py)
     LOSS = 6
     IMPULSES = 7  # 1 where the first step may start from the impulses in its Data, those of a step before it
+    CUTOFF = 8  # stiffness over mass of far contacts (contact/far_contacts.py), 0: none is far
 
 
 class StepReport(Code):

@@ -235,3 +235,7 @@ class Slot(Code):
     CLOSE_NODE = 187
     # the start of a step: whether contacts begin within it
     LANDS = 189
+    # contacts beyond a cutoff
+    CHOOSE_FAR = 190
+    ADD_FAR_WRENCHES = 191
+    HAS_FAR_ACTIVATED = 192

@@ -33,6 +33,7 @@ from sim.contact.contact_law import slip_noise
 from sim.contact.contact_report import report_ground, worst_contact
 from sim.contact.corner_laws import add_corner_laws, add_corner_slips
 from sim.contact.corners import evaluate_corners, report_corners
+from sim.contact.far_contacts import add_far_wrenches, choose_far, has_far_activated
 from sim.contact.inactive import choose_active, has_activated, has_corners, sunk_contact
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.contact.pairs.active_features import choose_pairs, choose_shapes, open_pairs, overlapping
@@ -369,6 +370,12 @@ def link_terms(model: Model) -> None:
         link(model.optional, *_TERRAIN)
     if np.any(model.contact_restitution):
         link(model.optional, *_IMPACTS)
+
+
+def link_far(model: Model) -> None:
+    """Link the kernels of far contacts, which steps with a cutoff need."""
+    if len(model.contact_height):
+        link(model.optional, choose_far, add_far_wrenches, has_far_activated)
 
 
 def link_gradient(model: Model) -> None:

@@ -25,6 +25,7 @@ _SETTINGS = (
     "order",
     "divide",
     "accuracy",
+    "cutoff",
 )  # of Simulator(...), in order
 
 

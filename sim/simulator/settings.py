@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
@@ -37,6 +38,12 @@ class Settings(NamedTuple):
     gain: float = LARGEST_GAIN  # largest gain of energy of a solved step, of the energies that change in it
     loss: float = inf  # largest loss where nothing dissipates, likewise
     accuracy: float = 0.0  # error of coordinates that steps may make [m/s, rad/s]; 0: steps are not divided for it
+    cutoff: float = 0.0  # stiffness over mass of far contacts (contact/far_contacts.py); 0: none is far
+
+    def shown(self, names: Sequence[str]) -> str:
+        """Settings by name, as text; those that are 0 by default only where they are not."""
+        given = [name for name in names if name not in ("accuracy", "cutoff") or getattr(self, name)]
+        return ", ".join(f"{name}={getattr(self, name):g}" for name in given)
 
     def array(self, kappa: float | None = None) -> Vector:
         """The settings as an array for kernels, without those that only choose the engine.
@@ -45,7 +52,7 @@ class Settings(NamedTuple):
         impulses.
         """
         level = self.kappa if kappa is None else kappa
-        limits = self.max_iterations, inf, self.gain, self.loss, 0.0
+        limits = self.max_iterations, inf, self.gain, self.loss, 0.0, self.cutoff
         return np.array((self.time_step, level, self.tolerance, *limits), dtype=np.float64)
 
 
@@ -57,6 +64,7 @@ def checked_settings(
     max_iterations: int,
     order: int,
     divide: bool,
+    cutoff: float,
 ) -> Settings:
     """Settings from arguments of `Simulator`, which describes them; kappa: checked, None for the default."""
     limit = checks.whole_number("Simulator(max_iterations=...)", max_iterations)
@@ -67,7 +75,10 @@ def checked_settings(
     h = checks.number("Simulator(time_step=...)", time_step, above=0.0)
     level = default_kappa(mechanism, h) if kappa is None else kappa
     residual = checks.number("Simulator(tolerance=...)", tolerance, above=0.0)
-    return Settings(h, level, residual, int(limit), int(order), bool(divide))
+    far = checks.number("Simulator(cutoff=...)", cutoff, at_least=0.0)
+    if far > 0.0 and order != 2:
+        raise ValueError(f"Simulator(cutoff=...): expected steps of order 2, got order={order}")
+    return Settings(h, level, residual, int(limit), int(order), bool(divide), cutoff=far)
 
 
 def of_call(settings: Vector, kappa: float | None, max_iterations: int | None) -> Vector:
@@ -94,6 +105,8 @@ def with_accuracy(settings: Settings, accuracy: float | None, mechanism: Mechani
     number = checks.number("Simulator(accuracy=...)", accuracy, above=0.0)
     if number < LEAST_ACCURACY:
         raise ValueError(f"Simulator(accuracy=...): expected at least {LEAST_ACCURACY:g}, got {accuracy!r}")
+    if settings.cutoff > 0.0:
+        raise ValueError(f"Simulator(cutoff=...): expected no accuracy, got {accuracy!r}")
     if settings.order != 2:
         raise ValueError(f"Simulator(accuracy=...): it chooses the order itself, got order={settings.order}")
     kappa = settings.kappa

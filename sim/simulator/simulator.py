@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 Wrenches = ArrayLike | Mapping[str, ArrayLike]
 
-_SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order", "divide", "accuracy")
+_SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order", "divide", "accuracy", "cutoff")
 
 
 class Simulator(StateSpace):
@@ -71,11 +71,12 @@ class Simulator(StateSpace):
             order 2 near contacts, collisions and limits, and for joints too stiff for an explicit step: see
             `describe()`.
         divide: whether a step that cannot be solved, or turns a body too far, becomes 2, 4, ... up to 1024 steps, as
-            few as it needs: see `parts` of results. The parts conserve momentum exactly, unless no pair of
-            consecutive poses has this momentum; then part of the relative momentum is lost: see `momentum_fractions`.
-        accuracy: allowed error of the joint coordinates per second of motion [m, rad]. Each step is divided into
-            sub-steps of order 8, 4 or 2 accordingly, and impacts happen at their own times. `errors` of results has the
-            ratio of estimated to allowed error; see sim/integrators/adaptive.py.
+            few as it needs: see `parts` of results. They conserve momentum exactly, unless no pair of consecutive poses
+            has this momentum; then part of the relative momentum is lost: see `momentum_fractions`.
+        accuracy: allowed error of the joint coordinates per second of motion [m, rad]: sub-steps of order 8, 4 or 2,
+            impacts at their own times (sim/integrators/adaptive.py). `errors` of results: estimated over allowed error.
+        cutoff: stiffness relative to the mass of its body up to which a contact with the ground is far: its impulse
+            follows from the state before the step, and derivatives omit it: see sim/contact/far_contacts.py.
 
     Raises:
         TypeError: for a mechanism or a `divide` of the wrong kind.
@@ -92,11 +93,12 @@ class Simulator(StateSpace):
         order: int = 2,
         divide: bool = True,
         accuracy: float | None = None,
+        cutoff: float = 0.0,
     ) -> None:
         if not isinstance(mechanism, Mechanism):
             raise TypeError(f"Simulator(mechanism): expected a Mechanism, got {mechanism!r}")
         self._kappa = None if kappa is None else checks.number("Simulator(kappa=...)", kappa, above=0.0)
-        steps = checked_settings(mechanism, time_step, self._kappa, tolerance, max_iterations, order, divide)
+        steps = checked_settings(mechanism, time_step, self._kappa, tolerance, max_iterations, order, divide, cutoff)
         super().__init__(mechanism, with_accuracy(steps, accuracy, None if self._kappa else mechanism))
 
     def __reduce__(self) -> Any:
@@ -108,9 +110,7 @@ class Simulator(StateSpace):
         return {**given, "order": 2 if self.accuracy else self.order, "kappa": self._kappa, "accuracy": self.accuracy}
 
     def __repr__(self) -> str:
-        names = _SETTINGS[: None if self.accuracy else -1]
-        shown = ", ".join(f"{name}={getattr(self._engine.settings, name):g}" for name in names)
-        return f"Simulator({self.mechanism.name}, {shown})"
+        return f"Simulator({self.mechanism.name}, {self._engine.settings.shown(_SETTINGS)})"
 
     def replace(self, **settings: Any) -> Simulator:
         """The same simulator with other settings. Compiled code is shared, and a default kappa remains the default.

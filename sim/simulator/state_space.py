@@ -48,7 +48,7 @@ class StateSpace:
     def __init__(self, mechanism: Mechanism, settings: Settings) -> None:
         self.mechanism = mechanism
         self.time_step, self.kappa, self.tolerance, self.max_iterations, self.order, self.divide = settings[:6]
-        self.accuracy = settings.accuracy or None
+        self.accuracy, self.cutoff = settings.accuracy or None, settings.cutoff
         self.model = pack(mechanism)
         sizes = mechanism_sizes(mechanism)
         self.nbody, self.nq, self.nv, self.ncontact, self.nu = sizes[:4] + (sizes.nu,)

@@ -85,7 +85,7 @@ class RowEngines:
 
     @cached_property
     def settings(self) -> Floats:
-        """(n, 8) settings of rows, of StepSetting."""
+        """(n, 9) settings of rows, of StepSetting."""
         different = {engine.settings: engine.settings.array() for engine in self.engines}
         return np.array([different[engine.settings] for engine in self.engines])[self.index]
 

@@ -233,7 +233,7 @@ def interior_point(
     fit_dry(model, data, options.h, q, v, u)
     while True:
         out = solve_active(model, data, options, (q, v, u), guess, out)
-        if inequalities_activated(model, data):
+        if inequalities_activated(model, data, options):
             continue
         if out.status != Status.SOLVED or not impacts_gained(model, data, options.h):
             break

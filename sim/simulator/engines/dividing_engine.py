@@ -38,7 +38,6 @@ from sim.simulator.engines.engine import (
 from sim.simulator.engines.interval_states import IntervalStates
 from sim.simulator.engines.intervals import Intervals
 from sim.simulator.engines.nearest_state import nearest_state
-from sim.simulator.link_kernels import link_step
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
 from solvers.compiler import Table
@@ -311,7 +310,7 @@ class DividingEngine(Engine):
     def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
         """As Engine.roll_batch; rollouts with divided steps end on one core."""
         xs, status, knots = super().roll_batch(x0s, us)
-        model = self.linked(link_step)
+        model = self.step_table()
         for i in _divisible(status):
             report = np.zeros((1, REPORT))
             report[0, StepReport.STATUS] = status[i]

@@ -10,7 +10,7 @@ import numpy as np
 from sim.model.layout import sizes_of, table
 from sim.model.model import Model
 from sim.model.scratch import Scratch
-from sim.simulator.link_kernels import link_gradient, link_planner, link_poses, link_step
+from sim.simulator.link_kernels import link_far, link_gradient, link_planner, link_poses, link_step
 from sim.simulator.settings import Settings
 from solvers.compiler import Table, link
 from solvers.types import Floats
@@ -24,6 +24,7 @@ class LinkedModel:
         self.sizes = sizes_of(model)
         self.nx, self.ndx, self.nu = self.sizes.nq + self.sizes.nv, 2 * self.sizes.nv, self.sizes.nu
         link_poses(model)
+        self._steps = (link_step, link_far) if settings.cutoff else (link_step,)
         self._linked: set[Callable[[Model], None]] = set()
         self._model = table(model)
         self._scratch = Scratch(self.sizes, model.contact_frame)
@@ -48,11 +49,11 @@ class LinkedModel:
 
     def step_table(self) -> Table:
         """Table of the Model, with the step of its order linked."""
-        return self.linked(link_step)
+        return self.linked(*self._steps)
 
     def gradient_table(self, *needs: Callable[[Model], None]) -> Table:
         """Table of the Model, with the step, its derivatives, and further needs of a call linked."""
-        return self.linked(link_step, link_gradient, *needs)
+        return self.linked(*self._steps, link_gradient, *needs)
 
     def prepare(self) -> None:
         """Link the kernels of rollouts and their derivatives at once: two processes can then compile them."""
