@@ -2,26 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dojo_opt.gaits.feet import Feet
+from dojo_opt.gaits.static_motions import StaticMotions
+from dojo_opt.planning.manifold import cross
 from sim.mechanism import checks
+from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
 from solvers.types import Floats
 
-__all__ = ["equilibrium", "input_map", "potential_gradient"]
+__all__ = ["equilibrium", "potential_gradient"]
 
 _STEP = 1e-5
 _EVEN = 1e-6  # weight of the sharing of the load against its balance
 _RANK = 1e-7  # singular values below are the noise of differences: balls under one rigid foot do not move one by one
 _ROUNDS = 20
 _LEFT = 1e-3  # largest imbalance, as a share of the weight
+_NOTHING = 1e-5  # [m/s^2] times the mass: an imbalance of a body without weight, such as one that floats in water
 _FEW = 8  # contacts that a message names
 _NEAR = 0.01  # [m] contacts may carry that are not further from the ground than the nearest by more than this
 _LOWEST = (_NEAR, 1e-3, 1e-4)  # [m] likewise, than the nearest of their body: of a round hull few corners touch at once
+
+_MOVED = 0.05  # of the size of a robot: how far its parts may go where it has to lean or to settle, 1 cm at least
+_SETTLED = 20  # Newton iterations per kappa
+_FALL = 0.1  # of one kappa to the next
+_LEANS = 6
+_BALANCED = 1e-7  # share of the weight that is as good as none
+_TIPS = 1e-4  # singular values below this share are the noise of differences of the tipping
+_STRIDE, _HALVINGS = 0.1, 20  # [m, rad] largest step of a settling robot, and halvings of it
+_ALOFT = 1e-4  # [m] above the ground, where settling begins
+_ABOUND = (
+    1e-3  # of the largest load, and of the range of a joint: torque of a stop, and distance from it, that are small
+)
 
 
 def potential_gradient(sim: Simulator, x: ArrayLike) -> Floats:
@@ -34,16 +52,6 @@ def potential_gradient(sim: Simulator, x: ArrayLike) -> Floats:
     moved = sim.integrate(rest[..., None, :], steps)
     V = np.asarray(sim.energy(moved)) - np.asarray(sim.kinetic_energy(moved))
     return np.asarray((V[..., : sim.nv] - V[..., sim.nv :]) / (2.0 * _STEP))
-
-
-def input_map(sim: Simulator) -> Floats:
-    """(nv, nu) generalised forces per unit of every input on a joint; those on bodies, such as pushes, have none."""
-    out = np.zeros((sim.nv, sim.nu))
-    for k, part in enumerate(sim.mechanism.inputs or ()):
-        if part.joint is None:
-            continue
-        out[sim.mechanism.v_slice(part.joint).start + part.dof, k] = part.gain
-    return out
 
 
 def least_pushes(pushes: Floats, load: Floats, even: float) -> Floats:
@@ -62,28 +70,55 @@ def _between_stops(sim: Simulator, x: Floats) -> Iterator[tuple[str, Floats, Flo
             yield joint.name, x[sim.mechanism.q_slice(joint.name)], lo, hi
 
 
-def stop_torques(sim: Simulator, x: Floats) -> Floats:
+def _stop_distances(sim: Simulator, x: Floats) -> tuple[Floats, Floats]:
+    """(nv,) distances of the joints from their lower and upper stops, infinite without one."""
+    below, above = np.full(sim.nv, np.inf), np.full(sim.nv, np.inf)
+    for name, q, lo, hi in _between_stops(sim, x):
+        below[sim.mechanism.v_slice(name)], above[sim.mechanism.v_slice(name)] = q - lo, hi - q
+    return below, above
+
+
+def stop_torques(sim: Simulator, x: Floats, kappa: float | None = None) -> Floats:
     """(nv,) mean torque of the joint stops at rest, kappa / (h distance) away from each [N, N m]."""
-    out = np.zeros(sim.nv)
-    for name, q, lo, hi in _between_stops(sim, x):
-        out[sim.mechanism.v_slice(name)] = sim.kappa / sim.time_step * (1.0 / (q - lo) - 1.0 / (hi - q))
-    return out
+    below, above = _stop_distances(sim, x)
+    return np.asarray((sim.kappa if kappa is None else kappa) / sim.time_step * (1.0 / below - 1.0 / above))
 
 
-def _check_stops(sim: Simulator, x: Floats) -> None:
-    """Refuse a joint at its stop, which pushes it away with an infinite torque on the central path."""
+def _off_stops(sim: Simulator, x: Floats) -> Floats:
+    """The state with joints that are at a stop a little off it: so far that its torque is a small load.
+
+    On the central path the torque of a stop grows without bound towards it.
+
+    Raises:
+        ValueError: a joint is beyond its stop.
+    """
+    out, h = x.copy(), sim.time_step
+    load = float(np.abs(potential_gradient(sim, x)).max(initial=0.0))
     for name, q, lo, hi in _between_stops(sim, x):
-        if lo.size and not np.all((lo < q) & (q < hi)):
+        span = np.where(np.isfinite(hi - lo), hi - lo, 1.0)
+        if np.any((q < lo - 1e-9 * span) | (q > hi + 1e-9 * span)):
             raise ValueError(
-                f"equilibrium({sim.mechanism.name}): joint {name!r} is not inside its stops: {q} in [{lo}, {hi}]"
+                f"equilibrium({sim.mechanism.name}): joint {name!r} is beyond its stops: {q} in [{lo}, {hi}]"
             )
+        least = sim.kappa / (h * max(load, 1e-9))
+        off = np.minimum(np.maximum(least, np.minimum(least / _ABOUND, _ABOUND * span)), 0.5 * span)
+        at = sim.mechanism.q_slice(name)
+        out[at] = np.where(q <= lo, lo + off, np.where(q >= hi, hi - off, q))
+    return out
 
 
 def _under(feet: Feet, state: Floats) -> tuple[Floats, Floats, Floats]:
     """d(gaps)/dq (k, nv), generalised forces (k, nv) of unit vertical forces, and the cosines of the slopes (k,)."""
-    normal = feet.normals(state)
-    gaps = np.einsum("kc,kcv->kv", normal, feet.jacobian(state))
-    return gaps, feet.touching(state).jacobian(state)[:, 2], normal[:, 2]
+    kin, normal, bodies = Kinematics(feet.sim), feet.normals(state), [contact.body for contact in feet.contacts]
+    places, q = feet.positions(state), state[: feet.sim.nq]
+    rows = {name: (kin.jacobian(name, q), kin.pose(name, q)[0]) for name in dict.fromkeys(bodies)}
+    J = np.stack([rows[name][0] for name in bodies])
+    arm = places - np.stack([rows[name][1] for name in bodies])
+    turn = J[:, 3:]  # (k, 3, nv); a point of the body moves by v + w x arm
+    down = np.einsum("kc,kcv->kv", normal, J[:, :3]) + np.einsum("kc,kcv->kv", cross(arm, normal), turn)
+    arm = arm - feet.radius[:, None] * normal
+    up = J[:, 2] + arm[:, 1, None] * turn[:, 0] - arm[:, 0, None] * turn[:, 1]
+    return down, up, normal[:, 2]
 
 
 def _check_friction(name: str, feet: Feet, cosines: Floats, force: Floats) -> None:
@@ -98,68 +133,176 @@ def _check_friction(name: str, feet: Feet, cosines: Floats, force: Floats) -> No
             )
 
 
-def _standing(
-    sim: Simulator, feet: Feet, state: Floats, among: tuple[NDArray[np.bool_], float], iterations: int
-) -> tuple[Floats, Floats]:
-    """The state near `state` in which contacts carry the load as evenly as they can, and their forces.
+class _Rest(NamedTuple):
+    """The search for a state of rest of a robot on contacts."""
 
-    among: the degrees of freedom without an input, and how far above the lowest contact of its body another one may
-    carry [m].
-    """
-    free, near = among
-    weight = float(np.abs(potential_gradient(sim, state)).max())
-    bodies = np.array([contact.body for contact in sim.mechanism.contacts])
-    same = bodies[:, None] == bodies
-    for _ in range(iterations):
-        down, up, cosine = _under(feet, state)
-        gap = feet.gaps(state)
-        lowest = np.where(same, gap, np.inf).min(axis=1)
-        touching = (gap < gap.min() + _NEAR) & (gap < lowest + near)
-        afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * cosine * np.maximum(gap, near)))
-        load = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ afar
-        force = least_pushes(up[:, free] * touching[:, None], load[free], _EVEN)
-        loaded = force > 1e-3 * weight
-        wanted = sim.kappa / (sim.time_step * (cosine * force)[loaded])
-        error = wanted - gap[loaded]
-        if np.abs(error).max(initial=0.0) < 1e-6 * wanted.min(initial=1.0):
-            break
-        move = np.zeros(sim.ndx)
-        move[: sim.nv] = np.linalg.lstsq(down[loaded], error, rcond=_RANK)[0]
-        state = sim.integrate(state, move)
-    return _pressed(sim, feet, state, free)
+    sim: Simulator
+    feet: Feet  # all contacts
+    motions: StaticMotions
+
+    def load(self, state: Floats, kappa: float) -> Floats:
+        """(nv,) generalised forces of gravity, springs and stops, without the contacts."""
+        return potential_gradient(self.sim, state) - stop_torques(self.sim, state, kappa)
+
+    def forces(self, state: Floats, kappa: float) -> Floats:
+        """(k,) vertical forces of the contacts, kappa / (h gap) along their normals."""
+        gap, cosine = self.feet.gaps(state), self.feet.normals(state)[:, 2]
+        return np.asarray(kappa / (self.sim.time_step * cosine * np.maximum(gap, 1e-12)))
+
+    def standing(self, state: Floats, near: float, iterations: int) -> Floats:
+        """The state near `state` in which contacts carry the load as evenly as they can.
+
+        near: how far above the lowest contact of its body another one may carry [m].
+        """
+        sim, feet, (_, allowed, loose) = self.sim, self.feet, self.motions
+        weight = float(np.abs(potential_gradient(sim, state)).max())
+        bodies = np.array([contact.body for contact in sim.mechanism.contacts])
+        same = bodies[:, None] == bodies
+        for _ in range(iterations):
+            down, up, cosine = _under(feet, state)
+            gap = feet.gaps(state)
+            lowest = np.where(same, gap, np.inf).min(axis=1)
+            touching = (gap < gap.min() + _NEAR) & (gap < lowest + near)
+            afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * cosine * np.maximum(gap, near)))
+            load = self.load(state, sim.kappa) - up.T @ afar
+            force = least_pushes((up @ loose) * touching[:, None], loose.T @ load, _EVEN)
+            loaded = force > 1e-3 * weight
+            wanted = sim.kappa / (sim.time_step * (cosine * force)[loaded])
+            error = wanted - gap[loaded]
+            if np.abs(error).max(initial=0.0) < 1e-6 * wanted.min(initial=1.0):
+                break
+            by = np.linalg.lstsq(down[loaded] @ allowed, error, rcond=_RANK)[0]
+            state = self.motions.move(sim, state, allowed @ by)
+        return self.pressed(state, allowed, sim.kappa, _ROUNDS)
+
+    def pressed(self, state: Floats, along: Floats, kappa: float, rounds: int) -> Floats:
+        """The state moved until the forces kappa / (h gap) of all contacts balance what nothing else holds.
+
+        Newton's method with the smallest motion. Four balls under a rigid foot cannot float at four given heights, so
+        the forces that share a load most evenly are nearly, and not quite, those of a state.
+
+        along: (nv, n) motions that it may take.
+        """
+        for _ in range(rounds):
+            left, slope, change = self.slopes(state, along, kappa)
+            weight = np.abs(potential_gradient(self.sim, state)).max()
+            if np.abs(left).max(initial=0.0) < 1e-9 * weight or self.feet.gaps(state).min() <= 0.0:
+                break
+            by = along @ np.linalg.lstsq(slope, -left, rcond=_RANK)[0]
+            state = self.motions.move(self.sim, state, by * min(1.0, 0.5 / change(by)))
+        return state
+
+    def slopes(self, state: Floats, along: Floats, kappa: float) -> tuple[Floats, Floats, Callable[[Floats], float]]:
+        """What nothing holds (m,), its derivative by motions `along` (m, n), and the largest relative change of a gap
+        or of the distance from a stop by a motion (nv,).
+        """
+        loose, gap, (down, up, _) = self.motions.loose, self.feet.gaps(state), _under(self.feet, state)
+        force, (below, above) = self.forces(state, kappa), _stop_distances(self.sim, state)
+        left = self.motions.left(self.load(state, kappa) - up.T @ force)
+        stiff = kappa / self.sim.time_step * (1.0 / below**2 + 1.0 / above**2)
+        slope = (up @ loose).T @ ((force / gap)[:, None] * (down @ along)) + loose.T @ (stiff[:, None] * along)
+
+        def change(by: Floats) -> float:
+            parts = (down @ by / gap, by / below, by / above)
+            return max(1e-300, *(float(np.abs(part).max(initial=0.0)) for part in parts))
+
+        return left, slope, change
+
+    def leaned(self, state: Floats, iterations: int) -> Floats:
+        """The state that shifts its weight over its contacts, where these are too few to carry it as it is."""
+        sim, allowed = self.sim, self.motions.allowed
+        weight = float(np.abs(potential_gradient(sim, state)).max())
+        for _ in range(_LEANS):
+            state = self.standing(state, _LOWEST[-1], iterations)
+            left, _, _ = self.slopes(state, allowed, sim.kappa)
+            if self.feet.gaps(state).min() <= 0.0 or np.abs(left).max(initial=0.0) < _BALANCED * weight:
+                break
+            loaded = self.forces(state, sim.kappa) > 1e-3 * weight
+            _, sizes, rows = np.linalg.svd(_under(self.feet, state)[0][loaded] @ allowed)
+            fixed = rows[int((sizes > _RANK * sizes.max(initial=0.0)).sum()) :].T  # motions that leave the gaps
+            by = allowed @ fixed @ np.linalg.lstsq(self.tipping(state) @ fixed, -left, rcond=_TIPS)[0]
+            state = self.motions.move(sim, state, by * min(1.0, _STRIDE / np.abs(by).max(initial=1e-300)))
+        return state
+
+    def tipping(self, state: Floats) -> Floats:
+        """(m, n) derivative of what nothing holds by the motions allowed, at given forces of the contacts."""
+        sim, (_, allowed, loose) = self.sim, self.motions
+        force = self.forces(state, sim.kappa)
+        out = np.empty((loose.shape[1], allowed.shape[1]))
+        for k, along in enumerate(_STEP * allowed.T):
+            loads = [
+                potential_gradient(sim, y) - _under(self.feet, y)[1].T @ force
+                for y in (self.motions.move(sim, state, along), self.motions.move(sim, state, -along))
+            ]
+            out[:, k] = self.motions.left(loads[0] - loads[1]) / (2.0 * _STEP)
+        return out
+
+    def settled(self, state: Floats) -> Floats:
+        """The state that the robot sinks into with its driven joints held, on contacts that become hard as it sinks.
+
+        Along `loose`, from where nothing touches: which contacts carry is found by the smoothing, from afar. Inputs
+        that hold all joints of an arm lift it off what it touches.
+        """
+        sim, feet, (_, allowed, loose) = self.sim, self.feet, self.motions
+        along = loose if loose.size else allowed
+        for _ in range(_ROUNDS):
+            short = np.maximum(_ALOFT - feet.gaps(state), 0.0)
+            if not short.any():
+                break
+            down = _under(feet, state)[0] @ along
+            by = along @ np.linalg.lstsq(down[short > 0.0], 1.1 * short[short > 0.0], rcond=_RANK)[0]
+            state = self.motions.move(sim, state, by)
+        weight = float(np.abs(potential_gradient(sim, state)).max())
+        kappa = max(sim.kappa, _NEAR * sim.time_step * weight / len(feet.names))
+        while True:
+            state = self.sunk(state, kappa)
+            if kappa <= sim.kappa:
+                return self.pressed(state, loose, kappa, _ROUNDS)
+            kappa = max(sim.kappa, _FALL * kappa)
+
+    def sunk(self, state: Floats, kappa: float) -> Floats:
+        """The state of least potential along `loose`, near `state`: that of gravity, springs, and contacts at kappa.
+
+        Newton's method without the curvature of gravity, which leaves its directions those of a descent.
+        """
+        sim, loose, level = self.sim, self.motions.loose, self.potential(state, kappa)
+        for _ in range(_SETTLED):
+            left, slope, limit = self.slopes(state, loose, kappa)
+            if np.abs(left).max(initial=0.0) < _LEFT * np.abs(potential_gradient(sim, state)).max():
+                break
+            by = loose @ np.linalg.lstsq(slope, -left, rcond=_RANK)[0]
+            by *= min(1.0, 0.5 / limit(by), _STRIDE / np.abs(by).max(initial=1e-300))
+            for _ in range(_HALVINGS):
+                moved = self.motions.move(sim, state, by)
+                now = self.potential(moved, kappa)
+                if now < level:
+                    break
+                by = 0.5 * by
+            else:
+                break
+            state, level = moved, now
+        return state
+
+    def potential(self, state: Floats, kappa: float) -> float:
+        """V - kappa/h sum(log gaps) [J]; infinite in the ground, or beyond a stop.  Slopes as if they were level."""
+        distances = np.concatenate([self.feet.gaps(state), *_stop_distances(self.sim, state)])
+        if distances.min() <= 0.0:
+            return np.inf
+        rest = np.array([*state[: self.sim.nq], *np.zeros(self.sim.nv)])
+        barrier = kappa / self.sim.time_step * np.log(distances[np.isfinite(distances)]).sum()
+        return float(self.sim.energy(rest) - self.sim.kinetic_energy(rest) - barrier)
 
 
-def _pressed(sim: Simulator, feet: Feet, state: Floats, free: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """The state moved until the forces kappa / (h gap) of all contacts balance the free degrees of freedom; the forces.
-
-    Newton's method with the smallest motion. Four balls under a rigid foot cannot float at four given heights, so the
-    forces that share a load most evenly are nearly, and not quite, those of a state.
-    """
-    for _ in range(_ROUNDS):
-        gap, (down, up, cosine) = feet.gaps(state), _under(feet, state)
-        force = sim.kappa / (sim.time_step * cosine * np.maximum(gap, 1e-12))
-        left = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ force
-        if np.abs(left[free]).max(initial=0.0) < 1e-9 * np.abs(left).max() or gap.min() <= 0.0:
-            break
-        slope = (up[:, free].T * (force / gap)) @ down
-        move = np.zeros(sim.ndx)
-        move[: sim.nv] = np.linalg.lstsq(slope, -left[free], rcond=_RANK)[0]
-        change = np.abs(down @ move[: sim.nv] / gap).max()
-        state = sim.integrate(state, move * min(1.0, 0.5 / max(change, 1e-300)))
-    return state, sim.kappa / (sim.time_step * _under(feet, state)[2] * np.maximum(feet.gaps(state), 1e-12))
-
-
-def _held(sim: Simulator, state: Floats, left: Floats, by: str) -> Floats:
-    """(nu,) inputs that balance the generalised forces `left` (nv,).  ValueError: those that have no input remain."""
-    B = input_map(sim)
-    free = ~B.any(axis=1)
-    if np.abs(left[free]).max(initial=0.0) > _LEFT * np.abs(potential_gradient(sim, state)).max(initial=0.0):
-        k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
+def _held(sim: Simulator, motions: StaticMotions, load: Floats, most: float, by: str) -> Floats:
+    """(nu,) inputs that balance a load (nv,).  ValueError: more than `most` of it remains."""
+    left = motions.left(load)
+    if np.abs(left).max(initial=0.0) > most:
+        k = int(np.abs(left).argmax())
         raise ValueError(
             f"equilibrium({sim.mechanism.name}): the {by} cannot balance the weight: {left[k]:.3g} N (or N m) is left "
-            f"at {sim.mechanism.dof_names[k]!r}"
+            f"at {sim.mechanism.dof_names[int(np.abs(motions.loose[:, k]).argmax())]!r}"
         )
-    return np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
+    return motions.holding(load)
 
 
 def _named(names: tuple[str, ...]) -> str:
@@ -169,14 +312,16 @@ def _named(names: tuple[str, ...]) -> str:
 
 
 def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int = 20) -> tuple[Floats, Floats]:
-    """A state of rest near x, and the input that holds it: for robots on feet, arms, and hands that hold an object.
+    """A state of rest near x, and the input that holds it: for arms, hands and robots on feet or lying on the ground.
 
     The contacts press straight down, so nothing creeps on level ground, and share the load as evenly as balance allows.
-    The joints balance gravity and springs. Inputs that act on bodies are zero. On the central path a contact with the
-    normal impulse g floats kappa / g above the ground: the state is moved to those heights. On slopes friction carries
-    a share of the weight, and creeps by an amount proportional to kappa. Contacts that carry load have to be within
-    1 cm of the same distance from the ground: `dojo_opt.gaits.feet.Feet.place` puts a robot with legs there on
-    terrain.
+    The joints balance gravity and springs, loops and gears included. Inputs that act on bodies are zero. On the central
+    path a contact with the normal impulse g floats kappa / g above the ground: the state is moved to those heights. On
+    slopes friction carries a share of the weight, and creeps by an amount proportional to kappa. Contacts that carry
+    load have to be within 1 cm of the same distance from the ground: `dojo_opt.gaits.feet.Feet.place` puts a robot with
+    legs there on terrain. A robot whose weight is beside its feet leans over them, or sinks onto the ground with its
+    joints as they are, by a twentieth of its size at most. A joint at its stop is moved off it, so little that the
+    torque of the stop is a small part of the load. Contacts of bodies with one another carry nothing.
 
     The state need not be stable: under constant torques a robot on legs falls within some tenths of a second.
 
@@ -189,31 +334,53 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         (state (nx,), input (nu,) [N, N m]).
 
     Raises:
-        ValueError: a joint of x is not inside its stops, or there is no equilibrium: the centre of mass is not above
+        ValueError: a joint of x is beyond its stops, or there is no equilibrium: the centre of mass is not above
             the feet, a joint without input would have to carry load, the ground is steeper than friction holds, a
             contact is in the ground, or the smoothing is so large that inactive contacts carry the weight.
     """
     if not isinstance(sim, Simulator):
         raise TypeError(f"equilibrium(sim): expected a Simulator, got {sim!r}")
     mech = sim.mechanism
-    names = mech.contact_names[: len(mech.contacts)]
     state = np.array(sim.neutral() if x is None else checks.array("equilibrium(x)", x, (sim.nx,)))
     state[sim.nq :] = 0.0
-    _check_stops(sim, state)
-    free = np.asarray(~input_map(sim).any(axis=1))
+    state = sim.close(_off_stops(sim, state))
+    weight = float(np.abs(potential_gradient(sim, state)).max(initial=0.0))
+    most = max(_LEFT * weight, _NOTHING * sum(body.mass for body in mech.bodies))
+    motions = StaticMotions.at(sim, state)
+    names = mech.contact_names[: len(mech.contacts)]
     if not names:
-        return state, _held(sim, state, potential_gradient(sim, state) - stop_torques(sim, state), "inputs")
-    feet, weight = Feet(sim, names), float(np.abs(potential_gradient(sim, state)).max())
-    for near in _LOWEST:
-        found, force = _standing(sim, feet, state, (free, near), iterations)
-        gap = feet.gaps(found)
-        _, up, cosine = _under(feet, found)
-        left = potential_gradient(sim, found) - stop_torques(sim, found) - up.T @ force
-        if gap.min() > 0.0 and np.abs(left[free]).max(initial=0.0) <= _LEFT * weight:
-            break
+        return state, _held(sim, motions, potential_gradient(sim, state) - stop_torques(sim, state), most, "inputs")
+    rest = _Rest(sim, Feet(sim, names), motions)
+    found, load, force = _on_contacts(rest, state, most, iterations)
+    gap = rest.feet.gaps(found)
     if gap.min() <= 0.0:
-        name = feet.names[int(gap.argmin())]
+        name = names[int(gap.argmin())]
         raise ValueError(f"equilibrium({mech.name}): {name!r} is {-gap.min():.3g} m deep in the ground near x")
-    u = _held(sim, found, left, f"vertical forces at {_named(feet.names)}")
-    _check_friction(mech.name, feet, cosine, np.where(force > 1e-3 * weight, force, 0.0))
+    u = _held(sim, motions, load, most, f"vertical forces at {_named(names)}")
+    _check_friction(mech.name, rest.feet, rest.feet.normals(found)[:, 2], np.where(force > 1e-3 * weight, force, 0.0))
     return found, u
+
+
+def _on_contacts(rest: _Rest, state: Floats, most: float, iterations: int) -> tuple[Floats, Floats, Floats]:
+    """The state of rest near `state`, or the last one tried; the load (nv,) there, and the forces of the contacts."""
+    searches: list[Callable[[], Floats]] = [partial(rest.standing, state, near, iterations) for near in _LOWEST]
+    searches += [partial(rest.leaned, state, iterations), partial(rest.settled, state)]
+    first = None
+    for k, search in enumerate(searches):
+        found = search()
+        force = rest.forces(found, rest.sim.kappa)
+        load = rest.load(found, rest.sim.kappa) - _under(rest.feet, found)[1].T @ force
+        ended = found, load, force
+        balanced = rest.feet.gaps(found).min() > 0.0 and np.abs(rest.motions.left(load)).max(initial=0.0) <= most
+        if balanced and (k < len(_LOWEST) or _near(rest, found, state)):
+            return ended
+        first = first or ended
+    assert first is not None
+    return first
+
+
+def _near(rest: _Rest, found: Floats, state: Floats) -> bool:
+    """Whether the robot went no further than it may to lean, or to settle."""
+    before, after = (np.concatenate([rest.feet.positions(x), rest.sim.maximal(x)[:, :3]]) for x in (state, found))
+    size = float(np.ptp(before, axis=0).max())
+    return float(np.abs(after - before).max()) <= max(_NEAR, _MOVED * size)

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dojo_opt.gaits.equilibrium import input_map, least_pushes
+from dojo_opt.gaits.equilibrium import least_pushes
 from dojo_opt.gaits.feet import Feet
+from dojo_opt.gaits.static_motions import input_map
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.memory_limit import check_room

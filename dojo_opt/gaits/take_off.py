@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from dojo_opt.gaits.equilibrium import input_map
 from dojo_opt.gaits.feet import Feet
+from dojo_opt.gaits.static_motions import input_map
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
 from solvers.types import Floats

@@ -137,7 +137,7 @@ def contact_forces(m: Motion, ax: Axes) -> Axes:
         ax.stairs(normal, edges, baseline=None, label=name, color=f"C{i % 10}")
         ax.stairs(friction, edges, baseline=None, linestyle=":", color=f"C{i % 10}")
     by = "by body " if many else ""
-    return _finish(ax, f"contact forces {by}[N] (dotted: friction)", "time [s]", at_lines=True)
+    return _finish(ax, f"contact forces {by}[N]\n(dotted: friction)", "time [s]", at_lines=True)
 
 
 def _forces(m: Motion) -> tuple[list[tuple[str, Any, Any]], bool]:

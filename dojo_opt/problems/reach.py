@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.constraint import Frame, Goal, SpeedLimits
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.gaits.equilibrium import input_map, potential_gradient
+from dojo_opt.gaits.equilibrium import potential_gradient
+from dojo_opt.gaits.static_motions import input_map
 from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 import dojo_opt as dojo
 from dojo_opt import Terrain, models
@@ -137,14 +138,94 @@ def on_its_feet(robot, x):
     return feet.place(x, targets[None])[0]
 
 
-def test_a_joint_at_its_stop_is_named():
-    """On the central path its torque would be infinite; beyond the stop it would pull."""
+def test_a_joint_beyond_its_stop_is_named():
+    """There the stop would pull."""
     robot = dojo.Simulator(dojo.models.atlas(), time_step=0.01)
     x = robot.neutral()
-    for angle in (0.0, -0.1):  # a knee bends from 0 to 2.36
-        x[robot.mechanism.q_slice("l_leg_kny")] = angle
-        with pytest.raises(ValueError, match="l_leg_kny"):
-            equilibrium(robot, x)
+    x[robot.mechanism.q_slice("l_leg_kny")] = -0.1  # a knee bends from 0 to 2.36
+    with pytest.raises(ValueError, match="'l_leg_kny' is beyond its stops"):
+        equilibrium(robot, x)
+
+
+def stays(sim, x, u, within=1e-6):
+    """A state of rest does not move, and is near where the robot begins."""
+    assert np.abs(sim.step(x, u, throw=True).x[sim.nq :]).max() < within
+    return x, u
+
+
+@pytest.mark.parametrize("kappa", [None, 1e-5])
+def test_a_joint_at_its_stop_is_moved_off_it(kappa):
+    """Files put joints there: zero is often the end of a range. The stop then takes a small part of the torque."""
+    arm = replace(dojo.models.panda(gripper=False), contacts=())
+    low = [dof.limits[0][0] for dof in arm.joints if dof.limits]
+    sim = dojo.Simulator(arm, time_step=0.01, kappa=kappa)
+    x = sim.neutral()
+    x[: sim.nq] = low
+    still, u = stays(sim, *equilibrium(sim, x))
+    assert 0.0 < np.abs(still - x).max() < 1e-2
+    held = dojo.Kinematics(sim).gravity_torques(still[: sim.nq])
+    np.testing.assert_allclose(u, held, atol=0.05 * np.abs(held).max())
+
+
+@pytest.mark.parametrize("model", ["fivebar", "delta", "stewart"])
+def test_loops_pass_the_weight_on_to_the_inputs(model):
+    sim = dojo.Simulator(getattr(dojo.models, model)(), time_step=0.01)
+    x, u = stays(sim, *equilibrium(sim))
+    assert np.abs(u).max() > 0.1 and np.abs(x - sim.neutral()).max() < 1e-3
+
+
+def test_gears_pass_the_weight_on_to_the_inputs():
+    """Two arms side by side, one of them driven by a gear of ratio -2 alone."""
+    rod = dojo.Box(0.5, 0.05, 0.05)
+    joints = [
+        dojo.Joint("revolute", None, "a", child_point=(-0.25, 0, 0), axis=(0, 1, 0)),
+        dojo.Joint("revolute", None, "b", "j", (0, 0.2, 0), (-0.25, 0, 0), axis=(0, 1, 0)),
+    ]
+    bodies = [dojo.Body("a", 1.0, shape=rod), dojo.Body("b", 2.0, shape=rod)]
+    mech = dojo.Mechanism(bodies, joints, gears=[dojo.Gear("j", "a", -2.0)], inputs=[dojo.Input("a")])
+    sim = dojo.Simulator(mech, time_step=0.01)
+    x, u = stays(sim, *equilibrium(sim))
+    np.testing.assert_allclose(u, -0.25 * 9.81 * (1.0 - 2.0 * 2.0), rtol=1e-9)
+
+
+def test_a_robot_leans_over_a_single_foot():
+    """Its weight is beside the foot: the hip moves it there."""
+    bodies = [dojo.Body("trunk", 3.0, shape=dojo.Box(0.3, 0.2, 0.1)), dojo.Body("leg", 1.0, shape=dojo.Sphere(0.05))]
+    joints = [
+        dojo.Joint("floating", None, "trunk"),
+        dojo.Joint("revolute", "trunk", "leg", "hip", (0.01, 0, 0), (0, 0, 0.3), axis=(0, 1, 0)),
+    ]
+    mech = dojo.Mechanism(bodies, joints, inputs=[dojo.Input("hip")], contacts=[dojo.Contact("leg", radius=0.05)])
+    sim = dojo.Simulator(mech, time_step=0.01)
+    x = sim.neutral()
+    x[2] += 0.05 - sim.maximal(x)[1, 2]
+    still, _ = stays(sim, *equilibrium(sim, x))
+    assert 1e-3 < np.abs(still - x).max() < 0.1
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_body_settles_on_its_nearest_face(seed):
+    """A random hull a little beside the face next to its centre of mass, which is one to stand on."""
+    rng = np.random.default_rng(seed)
+    corners = rng.normal(size=(8, 3))
+    corners *= 0.1 / np.linalg.norm(corners, axis=1)[:, None]
+    corners = np.vstack([corners, -corners])
+    faces = ConvexHull(corners).equations
+    down = faces[faces[:, 3].argmax(), :3]
+    mech = dojo.Mechanism(
+        [dojo.Body("hull", 1.0, np.diag([4e-3] * 3), shape=dojo.Polytope(corners))],
+        [dojo.Joint("floating", None, "hull")],
+        contacts=[dojo.Contact("hull", corner) for corner in corners],
+    )
+    sim = dojo.Simulator(mech, time_step=0.01)
+    x = sim.neutral()
+    x[3:7] = [1.0 + down @ [0.0, 0.0, -1.0], *np.cross(down, [0.0, 0.0, -1.0])]
+    x[3:7] /= np.linalg.norm(x[3:7])
+    x = sim.integrate(x, [0, 0, 0, *(0.02 * rng.normal(size=3)), *np.zeros(6)])
+    still, _ = stays(sim, *equilibrium(sim, Feet(sim, sim.mechanism.contact_names).put_down(x)))
+    np.testing.assert_allclose(
+        dojo.Kinematics(sim).pose("hull", still[: sim.nq])[1] @ down, [0.0, 0.0, -1.0], atol=1e-6
+    )
 
 
 def test_an_arm_stays_in_equilibrium_with_and_without_contacts():

@@ -51,3 +51,19 @@ def test_names_at_the_lines_do_not_touch(motion):
             assert lower.y0 + 0.6 * lower.height < upper.y0
         for box in boxes:
             assert box.x0 >= ax.get_window_extent().x1  # beside the curves
+
+
+@pytest.mark.slow
+def test_no_text_of_a_figure_leaves_it():
+    """Of a robot with many contacts, whose forces are named by body: the longest label."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    robot = dojo.Simulator(dojo.models.atlas(contacts="all"), time_step=0.02)
+    figure = dojo.plots.trajectory(robot.rollout(robot.neutral(), np.zeros((80, robot.nu))))
+    FigureCanvasAgg(figure).draw()
+    labels = [label for ax in figure.axes for label in (ax.xaxis.label, ax.yaxis.label, ax.title) if label.get_text()]
+    assert any("by body" in label.get_text() for label in labels)
+    for label in labels:
+        box = label.get_window_extent()
+        assert figure.bbox.x0 <= box.x0 and figure.bbox.y0 <= box.y0, label
+        assert box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1, label

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -180,6 +181,13 @@ def test_choices_of_meshes(tmp_path: Path) -> None:
         dojo.load_urdf(path, meshes="hulls")
     with pytest.raises(ValueError, match=r"load_urdf\(meshes=\.\.\.\): link: 'b' is not one of: \*, a"):
         dojo.load_urdf(path, meshes={"b": "hull"})
+
+
+def test_large_distances_from_a_mesh_have_whole_millimeters(tmp_path: Path) -> None:
+    """Of a ball of a metre in a box: the corner of the box is .42 m from it, and "4.2e+02 mm" no length."""
+    save(tmp_path / "ball.stl", trimesh.creation.icosphere(radius=1.0))
+    path = write(tmp_path, link("ball", inertial(), collision(mesh("ball.stl"))))
+    assert re.search(r"ball \(\d{3} mm\)", str(dojo.load_urdf(path, meshes="box").report))
 
 
 def test_a_mesh_that_is_missing_or_broken_is_said(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ def with_shapes(robot: Robot, file: Path, choice: Choice, mesh_dirs: Sequence[Pa
                 found.append(shape)
                 continue
             found += [replace(part, pose=shape.pose.then(part.pose)) for part in made[0]]
-            errors.append((made[1], f"{name} ({1e3 * made[1]:.2g} mm)"))
+            errors.append((made[1], f"{name} ({_millimeters(made[1])})"))
         links[name] = replace(link, collisions=tuple(found), visuals=_located(link, file, mesh_dirs, notes))
     if errors:
         notes.add(
@@ -64,6 +64,12 @@ def with_shapes(robot: Robot, file: Path, choice: Choice, mesh_dirs: Sequence[Pa
             [text for _, text in sorted(errors, reverse=True)],
         )
     return replace(robot, links=links)
+
+
+def _millimeters(length: float) -> str:
+    """A length [m] with two digits, or all before the point."""
+    mm = 1e3 * length
+    return f"{mm:.0f} mm" if mm >= 10.0 else f"{mm:.2g} mm"
 
 
 def _located(link: UrdfLink, file: Path, mesh_dirs: Sequence[Path], notes: Notes) -> tuple[Geometry, ...]:
