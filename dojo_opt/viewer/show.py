@@ -38,8 +38,8 @@ def add_show(commands: Any) -> None:
         "--contacts",
         nargs="+",
         metavar="LINK",
-        help="links of ROBOT.urdf that touch the ground, LINK=RADIUS for a ball about a link's origin [m]; of a model, "
-        "feet or all (all by default with --drop, where a model has it)",
+        help="links of ROBOT.urdf that touch the ground, LINK=RADIUS for a ball about a link's origin [m], all for the "
+        "other links; of a model, feet or all (all by default with --drop, where a model has it)",
     )
     parser.add_argument(
         "--meshes",
@@ -95,7 +95,7 @@ def touching(words: Sequence[str] | None) -> list[str | dojo.Contact] | None:
     for word in words:
         link, given, radius = word.partition("=")
         try:
-            out.append(dojo.Contact(link, radius=float(radius)) if given else link)
+            out.append(dojo.Contact(link, radius=float(radius)) if given else "*" if link == "all" else link)
         except ValueError as error:
             raise ValueError(f"--contacts {word}: expected LINK or LINK=RADIUS in metres: {error}") from None
     return out

@@ -108,6 +108,25 @@ def test_all_links_touch_the_ground_or_those_that_are_chosen(tmp_path: Path) -> 
     assert dojo.load_urdf(path, ground=False).contacts == ()
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_all_other_links_keep_their_shapes_beside_contacts_by_hand(tmp_path: Path, seed: int) -> None:
+    """Random links with and without shapes: balls by hand on some of them, and no link sinks that did not before."""
+    rng = np.random.default_rng(seed)
+    names = [f"l{k}" for k in range(6)]
+    parts = [link(name, inertial(), collision(SPHERE) if rng.random() < 0.7 else "") for name in names]
+    parts += [joint(f"j{k}", names[k - 1], names[k], "revolute") for k in range(1, 6)]
+    path = write(tmp_path, *parts)
+    chosen = rng.choice(names, size=2, replace=False)
+    every, both = (
+        dojo.load_urdf(path),
+        dojo.load_urdf(path, contacts=["*", *(dojo.Contact(n, radius=0.02) for n in chosen)]),
+    )
+    assert {c.body for c in both.contacts} == {c.body for c in every.contacts} | set(chosen)
+    assert all((c.radius == 0.02) == (c.body in chosen) for c in both.contacts)
+    with pytest.raises(dojo.UrdfError, match="'l9' is not a link"):
+        dojo.load_urdf(path, contacts=["*", "l9"])
+
+
 def test_a_contact_can_be_placed_by_hand_in_the_frame_of_its_link(tmp_path: Path) -> None:
     foot = dojo.Contact("right", point=(0.0, 0.0, 0.1), radius=0.02, friction=0.3)
     mech = dojo.load_urdf(biped(tmp_path), contacts=["left", foot])

@@ -28,6 +28,7 @@ from solvers.types import Floats
 
 Balls = list[tuple[Floats, float]]  # centre (3,) and radius [m]
 
+ALL = "*"  # among the chosen links: all others
 SHAPES = ("sphere", "box", "cylinder", "capsule", "hull")
 FRICTION = 0.8  # where neither the caller nor the file says anything
 _PARALLEL = 1e-3  # [rad, radii] by how much the axis of a wheel may miss that of its joint
@@ -52,6 +53,7 @@ def find_contacts(
             continue
         body = place.group.name
         given = picked[name]
+        named = chosen is not None and name in as_list(chosen)
         if body not in coms:
             if given or place.group.links and _shapes(place):
                 notes.add("no contacts on links that are fixed to the world", [name])
@@ -72,7 +74,7 @@ def find_contacts(
         other = sorted({s.kind for s in link.collisions if s.kind not in SHAPES})
         for kind in other:
             notes.add(f"no contact from collision shapes of kind {kind!r}", [name])
-        if chosen is not None and not balls:
+        if named and not balls:
             raise link.element.error(
                 f"contacts=...: the link has no sphere, box, cylinder, capsule or mesh to make contacts of; "
                 f"place one in its frame with dojo.Contact({name!r}, point=(x, y, z), radius=...)"
@@ -80,13 +82,21 @@ def find_contacts(
     return out
 
 
+def as_list(chosen: str | Contact | Sequence[str | Contact]) -> list[str | Contact]:
+    """Links and contacts that the caller chose, one of them included."""
+    return [chosen] if isinstance(chosen, str | Contact) else list(chosen)
+
+
 def _picked(places: dict[str, Place], chosen: Sequence[str | Contact] | None) -> dict[str, list[Contact]]:
-    """The links that get contacts, each with those that the caller placed by hand."""
+    """The links that get contacts, each with those that the caller placed by hand.  ALL: every link, by its shapes."""
     if chosen is None:
         return {name: [] for name in places}
-    picked: dict[str, list[Contact]] = {}
-    for part in [chosen] if isinstance(chosen, str | Contact) else chosen:
+    parts = as_list(chosen)
+    picked: dict[str, list[Contact]] = {name: [] for name in places} if ALL in parts else {}
+    for part in parts:
         name = part.body if isinstance(part, Contact) else part
+        if part == ALL:
+            continue
         if name not in places:
             known = f"{checks.listed(places)}{checks.nearest(name, places)}"
             raise UrdfError(f"load_urdf(contacts=...): {name!r} is not a link of the file: {known}")

@@ -12,6 +12,7 @@ from sim.io.loader_choices import loader_choices
 from sim.io.meshes.reduced_hull import CORNERS
 from sim.io.urdf.assemble import Choices, assemble
 from sim.io.urdf.collision_meshes import mesh_choices, with_shapes
+from sim.io.urdf.contacts import ALL, as_list
 from sim.io.urdf.loops import read_loops
 from sim.io.urdf.mimic import can_follow
 from sim.io.urdf.report import Notes, UrdfMechanism
@@ -60,8 +61,9 @@ def load_urdf(
         friction: coefficient of friction of all contacts; None: <lateral_friction> of the link if the file has it, else
             0.8.
         contacts: names of the links that touch the ground, or dojo.Contact(link, point, radius), with the point in the
-            frame of the link; None: all that have a sphere, box (8 corners), capsule (2 balls) or cylinder (points on
-            both rims; 2 balls for a wheel, a cylinder that turns about its own axis) or mesh.
+            frame of the link, in place of the link's shapes; "*" among them: all other links, by their shapes. None:
+            all that have a sphere, box (8 corners), capsule (2 balls), cylinder (points on both rims; 2 balls for a
+            wheel, a cylinder that turns about its own axis) or mesh.
         merge_fixed: whether links on fixed joints become one body; a link without mass always does.
         position: (3,) place of the root's frame, if it is fixed [m].
         neutral: coordinates of the neutral state by joint [rad, m]; others are at zero, or in the middle of their range
@@ -106,7 +108,8 @@ def load_urdf(
     folders = [Path(folder) for folder in ([mesh_dirs] if isinstance(mesh_dirs, str | Path) else mesh_dirs)]
     choice = mesh_choices(meshes, robot.links), whole_number("load_urdf(mesh_corners=...)", mesh_corners, 4)
     robot = _bouncing(robot, restitution, notes)
-    robot = with_shapes(robot, file, choice, folders, ground and contacts is None, notes)
+    every = contacts is None or ALL in as_list(contacts)
+    robot = with_shapes(robot, file, choice, folders, ground and every, notes)
     loops = read_loops(root, robot, notes)
     held, geared = _held(robot, locked, mimic, notes)
     choices = Choices(
