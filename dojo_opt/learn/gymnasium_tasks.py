@@ -26,7 +26,6 @@ from sim.mechanism.body import Body
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.stance import gaps
 from sim.simulator.simulator import Simulator
 from solvers.types import Floats
 
@@ -124,6 +123,34 @@ def _coordinate_limits(mech: Mechanism) -> tuple[Floats, Floats]:
     return low, high
 
 
+def least_gap(mech: Mechanism) -> Callable[[Floats], float]:
+    """Distance of the lowest contact from level ground, as all contacts of these models have it, quickly.
+
+    Args:
+        mech: the mechanism.
+
+    Returns:
+        Function of the coordinates q (nq,) that returns the distance [m]; infinite without contacts.
+    """
+    if not mech.contacts:
+        return lambda q: np.inf
+    sim, still = Simulator(mech), np.zeros(mech.nv)
+    names = {name: i for i, name in enumerate(mech.body_names)}
+    bodies = np.array([names[c.body] for c in mech.contacts])
+    px, py, pz = np.array([c.point for c in mech.contacts], dtype=np.float64).T
+    offsets = np.array([c.radius + c.height for c in mech.contacts])
+    if not np.all(mech.contact_normals == (0.0, 0.0, 1.0)) or any(c.terrain is not None for c in mech.contacts):
+        raise ValueError("least_gap: expected contacts with level ground")
+
+    def least(q: Floats) -> float:
+        z = sim.maximal(np.concatenate([q, still]))[bodies]
+        w, x, y, s = z[:, 6:10].T  # behind the velocity
+        heights = z[:, 2] + 2.0 * (x * s - w * y) * px + 2.0 * (y * s + w * x) * py + (1.0 - 2.0 * (x * x + y * y)) * pz
+        return float((heights - offsets).min())
+
+    return least
+
+
 def _starts(
     mech: Mechanism, height: int, position: float, velocity: Callable[..., Floats], home: Floats | None = None
 ) -> Callable[..., Floats]:
@@ -135,7 +162,7 @@ def _starts(
         if joint.nrot == 3:
             stop = mech.q_slice(joint.name).stop
             quaternions.append(slice(stop - 4, stop))
-    low, high = _coordinate_limits(mech)
+    (low, high), lowest = _coordinate_limits(mech), least_gap(mech)
 
     def start(rng: np.random.Generator) -> Floats:
         q = home + rng.uniform(-position, position, len(home))
@@ -143,8 +170,7 @@ def _starts(
         for part in quaternions:
             q[part] /= np.linalg.norm(q[part])
         v = velocity(rng, mech.nv)
-        least = min(gaps(mech, q), default=np.inf)
-        q[height] += max(_CLEARANCE - least, 0.0) if height >= 0 else 0.0
+        q[height] += max(_CLEARANCE - lowest(q), 0.0) if height >= 0 else 0.0
         return np.concatenate([q, v])
 
     return start

@@ -10,12 +10,15 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.learn import environment
+from dojo_opt.learn.gymnasium_tasks import least_gap
+from dojo_opt.learn.registration import task_of
 from dojo_opt.learn.vector_environment import VectorEnvironment
 
 gymnasium = pytest.importorskip("gymnasium")
 pytest.importorskip("mujoco")
 from gymnasium.vector import AutoresetMode  # noqa: E402
 
+from sim.mechanism.stance import gaps  # noqa: E402
 from solvers.compiler.pipeline import FAST  # noqa: E402
 from support.programs import python  # noqa: E402
 from support.robot_files import has_robots  # noqa: E402
@@ -243,3 +246,16 @@ def _assets():
     from pathlib import Path
 
     return Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
+
+
+@pytest.mark.parametrize("name", ["HalfCheetah", "Ant"])
+def test_the_least_gap_of_first_states_is_that_of_forward_kinematics(name):
+    mech = task_of(name).sim.mechanism
+    least, rng = least_gap(mech), np.random.default_rng(0)
+    for _ in range(3):
+        q = mech.neutral + rng.uniform(-0.3, 0.3, mech.nq)
+        for joint in mech.joints:
+            if joint.nrot == 3:
+                part = slice(mech.q_slice(joint.name).stop - 4, mech.q_slice(joint.name).stop)
+                q[part] /= np.linalg.norm(q[part])
+        np.testing.assert_allclose(least(q), gaps(mech, q).min(), rtol=0, atol=1e-12)
