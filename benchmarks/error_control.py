@@ -6,8 +6,9 @@ Drake's integrators with error control (RK3, and CENIC for convex contact).
 
 An error is the largest final error of a joint coordinate [m, rad], over the seconds of the motion. References: exact
 solutions of balls and blocks; order 8 with small steps without contact, and of closed loops order 2, extrapolated;
-else order 2 at 10 us with the least kappa. The error of a reference is its largest difference from runs with steps that
-are twice as long and 7 percent longer, in which impacts lie elsewhere: accuracies below three times it are omitted.
+else order 2 at 10 us, extrapolated to hard contact: a contact or limit that opens pushes with sqrt(kappa/h). The error
+of a reference is its largest difference from runs with steps that are twice as long and 7 percent longer, in which
+impacts lie elsewhere, and from an extrapolation of lower order: accuracies below three times it are omitted.
 
 Cost: processor time of the whole motion, relative to the cheapest fixed order and step, or step of RK4, or accuracy of
 Drake's, with an error no larger; nan where there is none. Bounces of MuJoCo are not comparable. `told`: the estimated
@@ -36,6 +37,7 @@ Points = list[tuple[float, float, str]]  # (error, processor time [s], order and
 _ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 _STEPS = (0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4)
 _FINE = (2e-5, 1.07e-5, 1e-5)  # [s] about the steps of references in contact
+_PRESSED = (1e-8, 4e-8, 16e-8)  # [N m] kappa/h of references in contact
 _KINDS = {  # by their names
     "pendulums of 1 to 50 links": "pendulum",
     "bodies and robots in flight": "free body|tree|in flight",
@@ -123,23 +125,37 @@ def _touches(mech: dojo.Mechanism) -> bool:
     return bool(mech.contacts or mech.collisions)
 
 
+def _end(motion: ReferenceMotion, about: float, pressed: float = 0.0, **settings: Any) -> Vector:
+    """Coordinates after steps of about this length [s], in contact with kappa = pressed h."""
+    steps = round(motion.seconds / about)
+    h = motion.seconds / steps
+    sim = dojo.Simulator(motion.mechanism, time_step=h, kappa=pressed * h if pressed else None, **settings)
+    x = sim.state_from_velocity(motion.q, motion.v)
+    return np.asarray(sim.rollout(x, steps=steps, throw=True).x[-1][: sim.nq])
+
+
+def _hard_reference(motion: ReferenceMotion) -> tuple[Vector, float]:
+    """`reference` in contact: an end at sqrt(kappa/h) = s, 2 s, 4 s is extrapolated to 0, with terms s and s^2."""
+    sim = dojo.Simulator(motion.mechanism)
+    *others, least = (_end(motion, about, _PRESSED[0]) for about in _FINE)
+    twice, four = (_end(motion, _FINE[-1], pressed) for pressed in _PRESSED[1:])
+    hard, linear = (8.0 * least - 6.0 * twice + four) / 3.0, 2.0 * least - twice
+    unsure = [error(sim, end, least, motion.seconds) for end in others]
+    return hard, max(*unsure, error(sim, linear, hard, motion.seconds))
+
+
 def reference(motion: ReferenceMotion) -> tuple[Vector, float]:
     """(coordinates in the end, their error over the seconds)."""
     if motion.exact is not None:
         return motion.exact, 0.0
-    touches, loops = _touches(motion.mechanism), bool(motion.mechanism.loops)
-    ends: list[Vector] = []
-    for about in _FINE if touches else ((4e-4, 2e-4, 1e-4) if loops else (2e-4, 1e-4)):
-        steps = round(motion.seconds / about)
-        h = motion.seconds / steps
-        settings: dict[str, Any] = {"kappa": 1e-13} if touches else {"order": 8}
-        if loops:
-            settings = {"tolerance": 1e-12}
-        sim = dojo.Simulator(motion.mechanism, time_step=h, **settings)
-        x = sim.state_from_velocity(motion.q, motion.v)
-        ends.append(np.asarray(sim.rollout(x, steps=steps, throw=True).x[-1][: sim.nq]))
-    if loops:  # of order 2
+    if _touches(motion.mechanism):
+        return _hard_reference(motion)
+    sim = dojo.Simulator(motion.mechanism)
+    if motion.mechanism.loops:  # of order 2
+        ends = [_end(motion, about, tolerance=1e-12) for about in (4e-4, 2e-4, 1e-4)]
         ends = [fine + (fine - coarse) / 3.0 for coarse, fine in pairwise(ends)]
+    else:
+        ends = [_end(motion, about, order=8) for about in (2e-4, 1e-4)]
     return ends[-1], max(error(sim, end, ends[-1], motion.seconds) for end in ends[:-1])
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from sim.mechanism import checks
 from sim.mechanism.joint import WORLD
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.mobility import largest_mobility
 from sim.model.record_columns import StepSetting
 from sim.solve.energy_balance import LARGEST_GAIN
 from solvers.types import Vector
@@ -20,10 +21,11 @@ __all__ = ["LEAST_ACCURACY", "Settings", "checked_settings", "default_kappa", "f
 LEAST_ACCURACY = 1e-12  # [m/s, rad/s]
 _ORDERS = (2, 4, 6, 8)
 _CREEP = 1e-9  # [m/s]
-_PUSH = 3e-4  # (speed at which an opening contact is pushed away, over the accuracy)^2
+_PUSH = 1e-2  # (speed at which an opening contact is pushed away, over the accuracy)^2
 _FAST = 1e100  # [m/s, rad/s] beyond any speed; its square is a float
 _EARTH = 9.81  # [m/s^2] in scenes without gravity
 _SMALLEST, _LARGEST = 1e-13, 1e-6  # [N s m]; products of slack and impulse are rounded to 2e-14
+_FINEST = 1e-15  # [m^2/s] of kappa over a mass: five times the rounding of a gap at 1 m, at an impulse of 1 m/s
 
 
 class Settings(NamedTuple):
@@ -96,9 +98,10 @@ def with_accuracy(settings: Settings, accuracy: float | None, mechanism: Mechani
 
     mechanism: whose kappa is the default one; that is lowered to
 
-        kappa <= 3e-4 m accuracy^2 h,    at least 1e-13
+        kappa <= .01 accuracy^2 h / w,    at least `least_kappa`
 
-    since a contact that opens is pushed away with sqrt(kappa/(m h)); links are much lighter than their robot of mass m.
+    w is the velocity of the most mobile coordinate per impulse in it [1/kg, 1/(kg m^2)] (mobility.py): a contact or
+    limit that opens pushes it away with sqrt(w kappa/h), and repeatedly in short steps.
     """
     if accuracy is None:
         return settings
@@ -111,9 +114,18 @@ def with_accuracy(settings: Settings, accuracy: float | None, mechanism: Mechani
         raise ValueError(f"Simulator(accuracy=...): it chooses the order itself, got order={settings.order}")
     kappa = settings.kappa
     if mechanism is not None and (mechanism.contacts or mechanism.joints):
-        most = _PUSH * min(free_parts(mechanism), default=1.0) * min(number, _FAST) ** 2 * settings.time_step
-        kappa = min(kappa, max(most, _SMALLEST))
+        parts = free_parts(mechanism)
+        moves = max(largest_mobility(mechanism), 1.0 / min(parts, default=1.0))
+        most = _PUSH * min(number, _FAST) ** 2 * settings.time_step / moves
+        kappa = min(kappa, max(most, least_kappa(sum(parts))))
     return settings._replace(accuracy=number, order=8, kappa=kappa)
+
+
+def least_kappa(mass: float) -> float:
+    """The least kappa of steps with an accuracy [N s m], at which products of gaps and impulses are not yet rounded:
+    1e-15 m^2/s times the mass of all parts [kg], between 1e-15 and 1e-13.
+    """
+    return float(np.clip(_FINEST * mass, _FINEST, _SMALLEST))
 
 
 def free_parts(mechanism: Mechanism) -> list[float]:

@@ -16,6 +16,7 @@ from sim.integrators.adaptive import _allows, _go_beyond
 from sim.integrators.slip_stop import friction_turns
 from sim.integrators.substep_lengths import lengthen, lengthen_kink, shorten, shorten_unsolved
 from sim.integrators.substeps import Clock
+from sim.mechanism.mobility import largest_mobility
 from sim.model.record_columns import ContactRow
 from sim.simulator.engines.adaptive_engine import AdaptiveEngine
 from support.linkage import plain_fourbar
@@ -111,6 +112,26 @@ def test_a_hopper_lands_as_exactly_or_says_so(accuracy: float) -> None:
     assert np.abs(found.x[-1] - exact)[:6].max() < 3.0 * seconds * accuracy * max(1.0, found.errors[0])
     assert found.contacts.gap[-1].min() < 1e-6
     assert ("estimated error" in found.message) == (found.errors[0] > 1.0)
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4])
+def test_a_light_link_leaves_its_limit_as_exactly(accuracy: float) -> None:
+    """A flap of 1e-4 kg m^2 is stopped by its limit, and turned back by 1e-4 N m: the limit does not push it."""
+    hinge = dojo.Joint("revolute", None, "flap", axis=(0.0, 1.0, 0.0), limits=(0.0, 1.0))
+    flap = dojo.Mechanism([dojo.Body("flap", 1.0, (1e-4, 1e-4, 1e-4))], [hinge], gravity=(0.0, 0.0, 0.0))
+    sim = dojo.Simulator(flap, accuracy=accuracy)
+    found = sim.rollout(np.array([0.0, -0.5]), np.array([[1e-4]]), duration=0.5, throw=True).x[-1]
+    assert abs(found[0] - 0.5 * 0.5**2) < 3.0 * 0.5 * accuracy
+
+
+@pytest.mark.parametrize("name", ["hopper", "walker", "quadruped", "panda", "atlas"])
+def test_mobility_is_a_bound_and_near(name: str) -> None:
+    """Of the diagonal of the inverse of the mass matrix, without translations of the base."""
+    mech = getattr(models, name)()
+    sim = dojo.Simulator(mech)
+    inverse = np.diag(np.linalg.inv(dojo.Kinematics(sim).mass_matrix(sim.neutral()[: sim.nq])))
+    bound = largest_mobility(mech)
+    assert inverse.max() <= bound < 100.0 * inverse.max()
 
 
 def test_an_input_acts_at_second_order_in_contact() -> None:

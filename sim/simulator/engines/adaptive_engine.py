@@ -39,7 +39,7 @@ from sim.simulator.engines.node_states import ClosingStates
 from sim.simulator.engines.python_loop_engine import PythonLoopEngine
 from sim.simulator.link_kernels import link_flight
 from sim.simulator.results import Interrupted
-from sim.simulator.settings import Settings
+from sim.simulator.settings import Settings, least_kappa
 from solvers.compiler import Table
 from solvers.status import Status
 from solvers.types import Cube, Integers, Vector
@@ -48,8 +48,9 @@ SHORTEST = 1e-7  # [s]
 _IMPACT = 1e-6  # [kg s] mass times the shortest step with an impact: kappa is smallest there, its effect below rounding
 # (h w)^2 of the shortest step h, where w^2 = m g^2 h/kappa is the stiffness over m of a contact that carries m g
 _SETTLED = 10.0
+# g h/accuracy of the shortest step h at least, and its largest length [s]
+_BRIEF, _LONGEST = 0.055, 3e-5
 _LEAST_PRESSING = 1e-6  # [m/s, rad/s] accuracy: shorter impacts would round velocities
-_LEAST_KAPPA = 1e-13  # [N s m]
 _CONVERGED = 1e-6  # tolerance of steps with loops or gears, in accuracies
 _ROWS = 256  # sub-steps between two pauses
 _MOST = 1_000_000  # sub-steps of a step: an input is not held for ever
@@ -87,6 +88,8 @@ class AdaptiveEngine(PythonLoopEngine):
         g = float(np.linalg.norm(model.gravity)) or 9.81
         self._lightest = _lightest(model)
         self._settling = (_SETTLED / self._lightest) ** 0.5 / g
+        self._briefest = min(_BRIEF * settings.accuracy / g, _LONGEST)
+        self._least_kappa = least_kappa(float(model.body_mass.sum()))
         self._kept = threading.local()  # scratch, and `contacts` (ncontact, 11) of the last step
 
     def _line(self) -> tuple[Table, Embedded, SubstepState]:
@@ -148,10 +151,11 @@ class AdaptiveEngine(PythonLoopEngine):
         """(8,) what sub-steps have to reach, see sim/integrators/adaptive.py."""
         s = self.settings
         pressing = settings[StepSetting.KAPPA] / s.time_step  # [N m]
-        settled = max(self._settling * pressing**0.5, (self._settling**2 * _LEAST_KAPPA) ** (1.0 / 3.0), SHORTEST)
+        least = (self._settling**2 * self._least_kappa) ** (1.0 / 3.0)
+        settled = max(self._settling * pressing**0.5, least, self._briefest, SHORTEST)
         impact = min(max(SHORTEST, _IMPACT / self._lightest), settled)
         lengths, tree = (s.time_step, s.time_step, settled), float(self._is_tree)
-        return np.array([s.accuracy, *lengths, _LEAST_KAPPA, tree, impact, _MOST])
+        return np.array([s.accuracy, *lengths, self._least_kappa, tree, impact, _MOST])
 
     # -- sub-steps one by one ------------------------------------------------------------------------------------------
 
@@ -160,7 +164,7 @@ class AdaptiveEngine(PythonLoopEngine):
         settings = self._second.settings.array(kappa)
         settings[StepSetting.TIME_STEP] = h
         settings[StepSetting.KAPPA] = max(
-            settings[StepSetting.KAPPA] * h / self.settings.time_step, parts * _LEAST_KAPPA
+            settings[StepSetting.KAPPA] * h / self.settings.time_step, parts * self._least_kappa
         )
         return settings
 
