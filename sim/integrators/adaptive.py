@@ -153,7 +153,7 @@ def take_short(
             lengthen(clock, h, ratio, shortest)
         keep(line, h, int(clock[Clock.ORDER]))
         clock[Clock.WAIT] = max(0.0, clock[Clock.WAIT] - 1.0)
-        clock[Clock.ERROR] += ratio * h
+        clock[Clock.ERROR] += ratio * h + clock[Clock.PUSH] * rest / goal[AccuracyGoal.ACCURACY]
         return _SOLVED
     if status == _NOT_FINITE or status == _CONTACT_SUNK:
         return status

@@ -65,12 +65,13 @@ def _longest_rebound(model: Model, data: Data, h: float, accuracy: float, c: int
 @kernel
 def _time_to_land(model: Model, data: Data, h: float, c: int, on_ground: bool) -> float:
     """Time until contact c is reached, on a parabola to the ground, at its speed to another body, from its gaps at
-    configurations 1 and 2 [s].
+    configurations 1 and 2; NEVER where it recedes from that [s].
     """
     g, gap = model.gravity, data.bounce[c, Bounce.GAP2]
     fall = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) if on_ground else 0.0
     speed = (data.bounce[c, Bounce.GAP1] - gap) / h + 0.5 * fall * h
-    return 2.0 * gap / (speed + sqrt(speed * speed + 2.0 * fall * gap))
+    closing = speed + sqrt(speed * speed + 2.0 * fall * gap)
+    return 2.0 * gap / closing if closing > 0.0 else NEVER
 
 
 @kernel
@@ -105,8 +106,7 @@ def landing(
         if jump > 0.0:
             push = h * jump / mass if mass > 0.0 else NEVER
             error = max(error, min(2.0 * gap, push))
-            if before > gap:
-                ahead = min(ahead, _time_to_land(model, data, h, c, m < data.active_ground_count[0]))
+            ahead = min(ahead, _time_to_land(model, data, h, c, m < data.active_ground_count[0]))
             if push > h * h * _ACCELERATION:
                 slips[c] = UNKNOWN
             hits = hits or push > h * h * _HIT

@@ -19,6 +19,7 @@ from sim.integrators.node_step import (
     step_mean,
     within,
 )
+from sim.integrators.opening_push import opening_push
 from sim.integrators.slip_stop import stopping_error
 from sim.integrators.substep_lengths import before_landing, shorten_impact
 from sim.integrators.substeps import AccuracyGoal, Clock, Embedded, SubstepState
@@ -249,7 +250,7 @@ def try_short(
     """line.trial = the node one step of length h after line.x; (Status or LANDS, error over allowed)."""
     model, data, clock = model_view(models[1]), data_view(data_tables[0]), line.clock
     options = _patient(model, goal, settings, clock, h)
-    clock[Clock.ORDER] = 2.0
+    clock[Clock.ORDER], clock[Clock.PUSH] = 2.0, 0.0
     status = _whole(models[1], data_tables[0], options, line)
     if status != _SOLVED:
         return status, FAILED
@@ -268,4 +269,5 @@ def try_short(
         return status, FAILED
     if found.depth > _OVERLAP:
         return _SOLVED, 0.0
+    clock[Clock.PUSH] = opening_push(model, data, line, 0.5 * h, goal[AccuracyGoal.ACCURACY])
     return _SOLVED, _judged(models, data_tables, (goal, settings, h), line, embedded)

@@ -40,6 +40,7 @@ class Clock(Code):
     CEILING = 21  # longest length: half of one without a solution, and more after every step since [s]
     REFUSED = 22  # 1 where the error of a step from this node was too large
     MISSES = 23  # steps of the shortest length in a row whose error is too large
+    PUSH = 24  # velocity that contacts give as they open, in the step just tried [m/s, rad/s]
 
 
 class AccuracyGoal(Code):
@@ -67,7 +68,7 @@ class SubstepState(NamedTuple):
     half: Vector
     node: Vector  # (nx,) scratch: the node after the undivided step
     ahead: Vector  # (nx,) scratch: mean state of a step from there
-    clock: Vector  # (24,) in place
+    clock: Vector  # (25,) in place
     report: Vector  # (6,)
     parts: Cube  # (3, ncontact, 11) scratch: contacts of both halves, and of the whole step
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the step

@@ -22,10 +22,11 @@ LEAST_ACCURACY = 1e-12  # [m/s, rad/s]
 _ORDERS = (2, 4, 6, 8)
 _CREEP = 1e-9  # [m/s]
 _PUSH = 1e-2  # (speed at which an opening contact is pushed away, over the accuracy)^2
+_PUSH_APART = 3e-4  # likewise, of the lightest part, where bodies collide
 _FAST = 1e100  # [m/s, rad/s] beyond any speed; its square is a float
 _EARTH = 9.81  # [m/s^2] in scenes without gravity
 _SMALLEST, _LARGEST = 1e-13, 1e-6  # [N s m]; products of slack and impulse are rounded to 2e-14
-_FINEST = 1e-15  # [m^2/s] of kappa over a mass: five times the rounding of a gap at 1 m, at an impulse of 1 m/s
+_FINEST = 1e-18  # [m^2/s] least kappa over the mass; the tolerance of products is larger, solutions have less
 
 
 class Settings(NamedTuple):
@@ -101,7 +102,8 @@ def with_accuracy(settings: Settings, accuracy: float | None, mechanism: Mechani
         kappa <= .01 accuracy^2 h / w,    at least `least_kappa`
 
     w is the velocity of the most mobile coordinate per impulse in it [1/kg, 1/(kg m^2)] (mobility.py): a contact or
-    limit that opens pushes it away with sqrt(w kappa/h), and repeatedly in short steps.
+    limit that opens pushes it away with sqrt(w kappa/h), and repeatedly in short steps. Where bodies collide kappa is
+    at most 3e-4 m accuracy^2 h with the mass m of the lightest part.
     """
     if accuracy is None:
         return settings
@@ -114,18 +116,21 @@ def with_accuracy(settings: Settings, accuracy: float | None, mechanism: Mechani
         raise ValueError(f"Simulator(accuracy=...): it chooses the order itself, got order={settings.order}")
     kappa = settings.kappa
     if mechanism is not None and (mechanism.contacts or mechanism.joints):
-        parts = free_parts(mechanism)
-        moves = max(largest_mobility(mechanism), 1.0 / min(parts, default=1.0))
-        most = _PUSH * min(number, _FAST) ** 2 * settings.time_step / moves
-        kappa = min(kappa, max(most, least_kappa(sum(parts))))
+        parts, collides = free_parts(mechanism), bool(mechanism.collisions)
+        lightest = 1.0 / min(parts, default=1.0)
+        push = _PUSH_APART / lightest if collides else _PUSH / max(largest_mobility(mechanism), lightest)
+        most = push * min(number, _FAST) ** 2 * settings.time_step
+        kappa = min(kappa, max(most, least_kappa(sum(parts), collides)))
     return settings._replace(accuracy=number, order=8, kappa=kappa)
 
 
-def least_kappa(mass: float) -> float:
-    """The least kappa of steps with an accuracy [N s m], at which products of gaps and impulses are not yet rounded:
-    1e-15 m^2/s times the mass of all parts [kg], between 1e-15 and 1e-13.
+def least_kappa(mass: float, collides: bool) -> float:
+    """The least kappa of steps with an accuracy [N s m]: 1e-18 m^2/s times the mass of all parts [kg], at most 1e-13.
+
+    A light limit that opens after an impact is still pushed little in the short steps there. Where bodies collide it is
+    1e-13: gaps below a load have to stay above the rounding of positions.
     """
-    return float(np.clip(_FINEST * mass, _FINEST, _SMALLEST))
+    return _SMALLEST if collides else float(np.clip(_FINEST * mass, _FINEST, _SMALLEST))
 
 
 def free_parts(mechanism: Mechanism) -> list[float]:

@@ -89,7 +89,7 @@ class AdaptiveEngine(PythonLoopEngine):
         self._lightest = _lightest(model)
         self._settling = (_SETTLED / self._lightest) ** 0.5 / g
         self._briefest = min(_BRIEF * settings.accuracy / g, _LONGEST)
-        self._least_kappa = least_kappa(float(model.body_mass.sum()))
+        self._least_kappa = least_kappa(float(model.body_mass.sum()), len(model.pair_kind) > 0)
         self._kept = threading.local()  # scratch, and `contacts` (ncontact, 11) of the last step
 
     def _line(self) -> tuple[Table, Embedded, SubstepState]:
