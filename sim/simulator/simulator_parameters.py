@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.derivatives.parameters.damper_inertia_effects import with_damper_inertia
-from sim.derivatives.parameters.parameters import KINDS, ParameterPlan, Parameters, all_parameters
-from sim.derivatives.parameters.selection import by_names, select, with_values
+from sim.derivatives.parameters.parameters import KINDS, Parameter, ParameterPlan, Parameters, all_parameters
+from sim.derivatives.parameters.selection import Table, by_names, select, with_values
 from sim.integrators.adjoint import Sweep
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
@@ -35,11 +35,18 @@ class SimulatorParameters:
 
     def __init__(self, engine: Engine, mechanism: Mechanism, time_step: float) -> None:
         self._engine, self._mechanism, self._time_step = engine, mechanism, time_step
-        self._known = with_damper_inertia(engine.model, all_parameters(mechanism, time_step))
-        self._table = by_names(self._known)
         # those made so far: finding parameters by name takes longer than their derivatives
         self._selections: dict[tuple[str, ...], tuple[Parameters, ParameterPlan]] = {}
         self._packed: Model | None = None  # that of the values that `adopt` has written last
+
+    @cached_property
+    def _known(self) -> list[Parameter]:
+        return all_parameters(self._mechanism, self._time_step)
+
+    @cached_property
+    def _table(self) -> Table:
+        """By names, with all that derivatives need; to find it takes as long as hundreds of steps."""
+        return by_names(with_damper_inertia(self._engine.model, self._known))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -65,7 +72,7 @@ class SimulatorParameters:
 
     def with_values(self, call: str, values: Mapping[str, ArrayLike]) -> tuple[Mechanism, float]:
         """The mechanism and the time step with other values of parameters."""
-        mech, time_step = with_values(call, self._mechanism, self._table, values)
+        mech, time_step = with_values(call, self._mechanism, by_names(self._known), values)
         return mech, self._time_step if time_step is None else time_step
 
     def adopt(self, call: str, values: Mapping[str, ArrayLike]) -> None:

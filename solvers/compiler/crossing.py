@@ -82,8 +82,10 @@ class Crossing:
     def reduced(self, result: Any) -> tuple[Any, ...]:
         """The reduced form of one of Numba's compile results, as on that system."""
         (name, *code), *others = result._reduce()
-        if len(code) == 1:  # a kernel that is shipped as instructions
-            return (name, self._moved(*code).as_bitcode()), *others
+        if not isinstance(code[0], str):  # a kernel that is shipped as instructions
+            *parts, environments = code[0]
+            moved = [tuple(self._moved(part).as_bitcode() for part in field) for field in parts]
+            return (name, (*moved, environments)), *others
         kind, (_, described) = code
         found = self._machine.emit_object(self._moved(result.library._final_module.as_bitcode()))
         return (name, kind, (found, self._moved(described).as_bitcode())), *others

@@ -13,7 +13,6 @@ from numba.core.compiler_machinery import PassManager, _pass_registry, register_
 from numba.core.errors import NumbaError
 from numba.core.ir_utils import build_definitions
 from numba.core.rewrites import rewrite_registry
-from numba.core.ssa import reconstruct_ssa
 
 from solvers.compiler.arithmetic import KernelTyping
 from solvers.compiler.garbage import seldom_collected
@@ -22,10 +21,11 @@ from solvers.compiler.inlining import Inlining
 from solvers.compiler.libraries import EntryLibrary, InnerLibrary, OptionalLibrary, RolledLibrary, SeldomLibrary
 from solvers.compiler.lowering import KernelLowering
 from solvers.compiler.progress import compiling
+from solvers.compiler.single_assignment import reconstruct_single_assignment
 
 __all__ = ["EntryCompiler", "InnerCompiler", "OptionalCompiler", "RolledCompiler", "SeldomCompiler"]
 
-_IDLE = (  # features that kernels do not use: closures, array expressions, literals as types, exceptions; print types
+_IDLE = (  # features that kernels do not use: closures, array expressions, literals as types, exceptions, and more
     untyped_passes.WithLifting,
     untyped_passes.InlineClosureLikes,
     untyped_passes.RewriteDynamicRaises,
@@ -34,6 +34,7 @@ _IDLE = (  # features that kernels do not use: closures, array expressions, lite
     untyped_passes.LiteralUnroll,
     untyped_passes.LiteralPropagationSubPipelinePass,
     typed_passes.NopythonRewrites,
+    typed_passes.InlineOverloads,
     typed_passes.DumpParforDiagnostics,
     typed_passes.AnnotateTypes,
     typed_passes.IRLegalization,  # where variables end, of which _Lower takes no notice
@@ -103,13 +104,13 @@ class _Rewrites(untyped_passes.GenericRewrites):
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class _SingleAssignment(untyped_passes.ReconstructSSA):
-    """Numba's pass, without lifetimes."""
+    """Numba's pass, without lifetimes, and with fewer blocks to rewrite."""
 
     _name = "kernel_ssa"
 
     def run_pass(self, state: Any) -> bool:
         """Give every assignment a variable of its own."""
-        state.func_ir = reconstruct_ssa(state.func_ir)
+        state.func_ir.blocks = reconstruct_single_assignment(state.func_ir.blocks)
         self._patch_locals(state)
         state.func_ir._definitions = build_definitions(state.func_ir.blocks)
         _tidy(state.func_ir)

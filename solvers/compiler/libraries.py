@@ -8,7 +8,9 @@ uncalled copies.
 
 from __future__ import annotations
 
-from typing import Any
+from functools import cache
+from itertools import chain
+from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
 from numba.core import cgutils
@@ -29,14 +31,51 @@ class _Idle:
         """Do nothing: entries set those that they hold."""
 
 
+class Content(NamedTuple):
+    """Code of a kernel for its callers."""
+
+    kernels: tuple[bytes, ...]  # bitcode of the kernel, and of its callees
+    numbas: tuple[bytes, ...]  # of functions that Numba compiled
+    environments: tuple[str, ...]  # their names
+
+
+class _Name(NamedTuple):
+    """A variable of a module."""
+
+    name: str
+
+
+class _Names(NamedTuple):
+    """The environments in a module that is no longer there, for Numba, which keeps them with the code."""
+
+    global_variables: list[_Name]
+
+
+def _make_smaller(codegen: Any, ll_module: Any) -> None:
+    """Numba runs all of its optimisations on each function; each entry does so again, after these three."""
+    ll_module.data_layout = codegen._data_layout
+    passes, builder = llvm.create_new_function_pass_manager(), codegen._pass_builder()
+    passes.add_sroa_pass()
+    passes.add_instruction_combine_pass()
+    passes.add_simplify_cfg_pass()
+    for function in ll_module.functions:
+        if not function.is_declaration:
+            passes.run(function, builder)
+
+
 class InnerLibrary(JITCodeLibrary):
-    """Code of a kernel for its callers: made smaller, not optimised, never translated."""
+    """Code of a kernel for its callers: made smaller, not optimised, never translated.
+
+    It holds the kernel itself and the code of each of its callees, direct or not, side by side. Only what runs links
+    them: linked for each caller, every module was copied and parsed again by all callers of its callers.
+    """
 
     def __init__(self, codegen: Any, name: str) -> None:
         CodeLibrary.__init__(self, codegen, name)  # Numba's own parses an empty module to link into
         self._linking_libraries: list[Any] = []
         self._final_module: Any = None
         self._shared_module: Any = None
+        self.content = Content((), (), ())
 
     @property
     def codegen(self) -> Any:
@@ -56,51 +95,91 @@ class InnerLibrary(JITCodeLibrary):
         self.add_llvm_module(module)
 
     def add_llvm_module(self, ll_module: Any) -> None:
-        """Take the code of the kernel itself; other code is linked to it."""
-        self._optimize_functions(ll_module)
+        """Take the code of the kernel itself."""
+        _make_smaller(self._codegen, ll_module)
         if self._final_module is None:
             self._final_module = ll_module
         else:
             self._final_module.link_in(ll_module)
 
-    def _optimize_functions(self, ll_module: Any) -> None:
-        """Numba runs all of its optimisations here; each entry does so again, after these three."""
-        ll_module.data_layout = self._codegen._data_layout
-        passes, builder = llvm.create_new_function_pass_manager(), self._codegen._pass_builder()
-        passes.add_sroa_pass()
-        passes.add_instruction_combine_pass()
-        passes.add_simplify_cfg_pass()
-        for function in ll_module.functions:
-            if not function.is_declaration:
-                passes.run(function, builder)
-
     def finalize(self) -> None:
-        """Link the code of all callees; nothing is optimised."""
+        """Gather the code; nothing is optimised or linked."""
         self._raise_if_finalized()
-        for library in dict.fromkeys(self._linking_libraries):
-            self._reload_init.update(library._reload_init)
-            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
         self._final_module.verify()
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvm.Linkage.external:
                 function.linkage = "linkonce_odr"
         self._finalize_dynamic_globals()
+        for library in self._linking_libraries:
+            self._reload_init.update(library._reload_init)
+            self._dynamic_globals += library._dynamic_globals
         self._final_module.name = self.name
-        self._shared_module = self._final_module
+        self.content = _content(self._final_module, self._linking_libraries)
+        self._final_module = _Names([_Name(name) for name in self.content.environments])
         self._finalized = True
+
+    def _get_module_for_linking(self) -> Any:
+        """For Numba's own libraries: the kernel, with all callees."""
+        self._ensure_finalized()
+        if self._shared_module is None:
+            self._shared_module = llvm.parse_bitcode(self.content.kernels[0])
+            _link(self._shared_module, self.content._replace(kernels=self.content.kernels[1:]))
+            _relink(self._shared_module, llvm.Linkage.weak_odr, "linkonce_odr")  # as Numba has it
+        return self._shared_module
 
     def serialize_using_object_code(self) -> Any:
         """The state that `inner_result` reads."""
         self._ensure_finalized()
-        return self.name, self._shared_module.as_bitcode()
+        return self.name, tuple(self.content)
 
     @classmethod
-    def read(cls, codegen: Any, kept: tuple[str, bytes]) -> InnerLibrary:
+    def read(cls, codegen: Any, kept: tuple[str, tuple[Any, ...]]) -> InnerLibrary:
         """A library that was kept."""
         library = cls(codegen, kept[0])
-        library._final_module = library._shared_module = llvm.parse_bitcode(kept[1])
+        library.content = Content(*kept[1])
         library._finalized = library._disable_inspection = True
         return library
+
+
+def _content(module: Any, libraries: list[Any]) -> Content:
+    """A module, with all that libraries hold, each part once."""
+    own = Content((module.as_bitcode(),), (), _environments(module))
+    parts = [own, *map(_content_of, dict.fromkeys(libraries))]
+    return Content(*(tuple(dict.fromkeys(chain.from_iterable(field))) for field in zip(*parts, strict=True)))
+
+
+def _environments(module: Any) -> tuple[str, ...]:
+    return tuple(v.name for v in module.global_variables if v.name.startswith(_ENVIRONMENT))
+
+
+@cache
+def _content_of(library: Any) -> Content:
+    if isinstance(library, InnerLibrary):
+        return library.content
+    return Content((), (library._get_module_for_linking().as_bitcode(),), ())
+
+
+def _relink(module: Any, old: Any, new: str) -> None:
+    """Functions of one linkage get another one."""
+    for function in module.functions:
+        if not function.is_declaration and function.linkage == old:
+            function.linkage = new
+
+
+def _link(module: Any, content: Content) -> None:
+    """Add kernels to a module, and the functions of Numba that they call.
+
+    All kernels: LLVM omits a function that may be defined several times (`linkonce`) where nothing calls it yet. Of two
+    processes that compiled the same kernel, whose callees have other names in each, only the first copy gets in; and
+    the callees of the second may have further callers, which come later. Functions of Numba only if they are called:
+    every kernel comes with its reference counts.
+    """
+    for part in content.kernels:
+        other = llvm.parse_bitcode(part)
+        _relink(other, llvm.Linkage.linkonce_odr, "weak_odr")
+        module.link_in(other)
+    for part in content.numbas:
+        module.link_in(llvm.parse_bitcode(part))
 
 
 class _Kept:
@@ -134,10 +213,21 @@ class EntryLibrary(JITCodeLibrary):
     functions by name too, and takes one for the copy of the same kernel in any function that Numba itself compiles.
     """
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        _make_smaller(self._codegen, ll_module)
+
+    def finalize(self) -> None:
+        """Link the code of all callees, optimise it, and translate it."""
+        for library in self._linking_libraries:
+            self._reload_init.update(library._reload_init)
+        found = _content(self._final_module, self._linking_libraries)
+        _link(self._final_module, found._replace(kernels=found.kernels[1:]))
+        self._linking_libraries: list[Any] = []  # for Numba, which links them one by one
+        super().finalize()
+
     def _optimize_final_module(self) -> None:
-        for function in self._final_module.functions:
-            if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
-                function.linkage = "private"
+        for linkage in (llvm.Linkage.weak_odr, llvm.Linkage.linkonce_odr):
+            _relink(self._final_module, linkage, "private")
         self._optimize()
 
     def _optimize(self) -> None:
@@ -147,12 +237,9 @@ class EntryLibrary(JITCodeLibrary):
     def _finalize_final_module(self) -> None:
         """Translate, and set the environments of all kernels in it."""
         super()._finalize_final_module()
-        for name in self._environments():
+        for name in _environments(self._final_module):
             if (environment := lookup_environment(name)) is not None:
                 self._codegen.set_env(name, environment)
-
-    def _environments(self) -> list[str]:
-        return [v.name for v in self._final_module.global_variables if v.name.startswith(_ENVIRONMENT)]
 
     def _get_module_for_linking(self) -> Any:
         """Data cached beside the machine code, a module with the names of this one: nothing links an entry, and Numba
@@ -160,7 +247,7 @@ class EntryLibrary(JITCodeLibrary):
         """
         self._ensure_finalized()
         text = str(self._codegen._create_empty_module(self.name))
-        for name in self._environments():
+        for name in _environments(self._final_module):
             text += f'\n@"{name}" = common global i8* null'
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvm.Linkage.external:

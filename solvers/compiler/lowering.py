@@ -20,7 +20,7 @@ from typing import Any
 from llvmlite.ir import Constant, IntType, MetaDataString
 from numba import types
 from numba.core import cgutils, ir
-from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs, must_use_alloca
+from numba.core.analysis import compute_cfg_from_blocks, must_use_alloca
 from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
@@ -42,6 +42,14 @@ def _is_whole(kind: Any) -> bool:
     return kind == types.int64 or (isinstance(kind, types.IntEnumMember) and kind.dtype == types.int64)
 
 
+def _variables_read(statement: Any) -> list[str]:
+    """Names of the variables that a statement reads."""
+    value = statement.value if isinstance(statement, ir.Assign) else statement
+    if isinstance(value, ir.Var):
+        return [value.name]
+    return [v.name for v in value.list_vars()] if isinstance(value, ir.Inst) else []
+
+
 class _Lower(Lower):
     """Numba's lowering with the changes above, for functions without reference counts."""
 
@@ -54,13 +62,19 @@ class _Lower(Lower):
     def _find_singly_assigned_variable(self) -> None:
         """Variables that need no place in memory: assigned once, where all that use them come by after that."""
         blocks = self.func_ir.blocks
-        found = compute_use_defs(blocks)
         above = compute_cfg_from_blocks(blocks).dominators()
-        home = {name: label for label, names in found.defmap.items() for name in names}
         times = Counter(s.target.name for block in blocks.values() for s in block.find_insts(ir.Assign))
+        home = {s.target.name: label for label, block in blocks.items() for s in block.find_insts(ir.Assign)}
         several = {name for name, count in times.items() if count > 1}
-        for label, names in found.usemap.items():
-            several |= {n for n in names if n in home and not (home[n] < label and home[n] in above[label])}
+        for label, block in blocks.items():
+            found: set[str] = set()  # names assigned so far in this block
+            for statement in block.body:
+                for name in _variables_read(statement):
+                    origin = home.get(name, label)
+                    if name not in found if origin == label else not (origin < label and origin in above[label]):
+                        several.add(name)
+                if isinstance(statement, ir.Assign):
+                    found.add(statement.target.name)
         self._singly_assigned_vars = set(home) - several - set(must_use_alloca(blocks))
         self._blk_local_varmap: dict[str, Any] = {}
 

@@ -59,13 +59,13 @@ def test_closed_loops_and_studies_keep_their_results() -> None:
     mpc = dojo.tasks.hopper_mpc()
     plant = dojo.tasks.plant(mpc, 2e-3)
     dojo.closed_loop(mpc, plant, 0.05)
-    loop = heard(lambda: dojo.closed_loop(mpc, plant, 1000.0), 2.0)
+    loop = heard(lambda: dojo.closed_loop(mpc, plant, 1000.0), 0.5)
     assert loop.message == "Ctrl-C interrupted the computation."
     assert not loop.survived
     assert len(loop.x) == len(loop.u) + 1 == len(loop.time) == len(loop.contacts.gap) + 1 > 1
     expected = dojo.closed_loop(mpc, plant, loop.duration)
     np.testing.assert_array_equal(expected.x, loop.x)
-    study = heard(lambda: mpc.monte_carlo(plant, lambda rng: dojo.Perturbation(), 0.02, runs=2_000), 2.0)
+    study = heard(lambda: mpc.monte_carlo(plant, lambda rng: dojo.Perturbation(), 0.02, runs=2_000), 0.5)
     assert len(study.outcomes) > 0
 
 
@@ -80,22 +80,20 @@ def test_ctrl_c_from_outside_never_crashes_a_plan() -> None:
         "try:\n    dojo.ilqr(problem, tolerance=1e-12, violation=1e-14)\n"
         "except KeyboardInterrupt as stop:\n    print(type(stop).__name__, stop.result.status.name)\n"
     )
-    rng = np.random.default_rng(0)
-    for _ in range(2):
-        child = subprocess.Popen(
-            [sys.executable, "-c", program],
-            env={**os.environ, "PYTHONPATH": str(HOME)},
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        assert child.stdout is not None
-        assert child.stdout.readline() == "start\n"
-        try:
-            child.wait(0.5 + rng.random())
-        except subprocess.TimeoutExpired:
-            child.send_signal(signal.SIGINT)
-        out, _ = child.communicate()
-        assert (child.returncode, out) == (0, "Interrupted INTERRUPTED\n")
+    child = subprocess.Popen(
+        [sys.executable, "-c", program],
+        env={**os.environ, "PYTHONPATH": str(HOME)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == "start\n"
+    try:
+        child.wait(0.5 + np.random.default_rng(0).random())
+    except subprocess.TimeoutExpired:
+        child.send_signal(signal.SIGINT)
+    out, _ = child.communicate()
+    assert (child.returncode, out) == (0, "Interrupted INTERRUPTED\n")
 
 
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), 0.02)

@@ -20,10 +20,10 @@ def test_mujoco_finds_its_own_cube():
     starts = np.tile(sim.neutral(), (4, 1))
     starts[:, 2], starts[:, 7:10] = 0.15, rng.normal(0.0, 0.7, (4, 3))
     starts[:, 10:] = rng.normal(0.0, 3.0, (4, 3))
-    films = list(cube.paths(starts, 60))
-    motion = cube.rollout(starts[0], np.zeros((60, 0)))
+    films = list(cube.paths(starts, 40))
+    motion = cube.rollout(starts[0], np.zeros((40, 0)))
     assert motion.success
     np.testing.assert_array_equal(motion.x, films[0])
-    found, rms = fit(films, sim.time_step, np.repeat((2e-3, 0.03, 0.1, 2.0), 3), 20, 4, sim)
+    found, rms = fit(films, sim.time_step, np.repeat((2e-3, 0.03, 0.1, 2.0), 3), 10, 4, sim)
     np.testing.assert_allclose(found.values[:2], truth[:2], rtol=0.05)
     assert rms < 0.5

@@ -285,10 +285,12 @@ def plan(height):
     dojo.ilqr(dojo.Problem(sim, sim.neutral(), 5, cost=[dojo.cost.ResidualCost(residual, 1), dojo.cost.Effort(1.0)]))
 for i in range(2):
     plan(never - i)
-first = rss()
-for i in range(COUNT):
-    plan(VALUE)
-print((rss() - first) / COUNT)
+def growth(heights):
+    first = rss()
+    for height in heights:
+        plan(height)
+    return (rss() - first) / len(heights)
+print(growth([never] * 5), growth([never + 1.0 + i for i in range(6)]))
 """
 
 
@@ -296,7 +298,6 @@ print((rss() - first) / COUNT)
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads the memory of a process as Linux says it")
 def test_memory_of_new_residuals_is_bounded():
     """Numba frees no code: a residual with a new value keeps some; a residual with a known value keeps none."""
-    again = float(python(MEMORY.replace("COUNT", "5").replace("VALUE", "never")))
-    anew = float(python(MEMORY.replace("COUNT", "10").replace("VALUE", "never + 1.0 + i")))
+    again, anew = map(float, python(MEMORY).split())
     assert again < 0.1
     assert anew < 3.0

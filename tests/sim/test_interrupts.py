@@ -118,9 +118,9 @@ STATES = {
 }
 
 
-def stopped(call: Callable[[int], Any], enough: int, after: float = 0.3, *, in_loop: bool = False) -> Any:
+def stopped(call: Callable[[int], Any], enough: int, after: float = 0.15, *, in_loop: bool = False) -> Any:
     """The exception of a call that Ctrl-C ends; its kernels are compiled before."""
-    call(2_000)
+    call(600)
     return heard_in(call, enough, after, in_loop=in_loop)
 
 

@@ -9,6 +9,7 @@ import pytest
 
 import dojo_opt as dojo
 from sim.derivatives.parameters.parameters import KINDS
+from sim.simulator import simulator_parameters
 from support.coupled_scenes import COUPLED, kinds
 from support.jacobians import check_jacobian, check_step
 from support.parameter_case import Case
@@ -25,6 +26,16 @@ def test_every_kind_in_every_situation(name: str) -> None:
     case = case_of(name)
     errors = {kind: error(case, kind) for kind in kinds(name, case)}
     assert all(e < 1e-6 for e in errors.values()), errors
+
+
+def test_derivatives_by_the_state_prepare_none_by_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To prepare them takes as long as hundreds of steps."""
+    monkeypatch.setattr(simulator_parameters, "with_damper_inertia", None)
+    sim, x, u = case_of("sliding")
+    fresh = sim.with_parameters({"friction:*": 0.3})
+    assert np.isfinite(fresh.linearize(x, u)[0]).all()
+    with pytest.raises(TypeError):
+        fresh.linearize(x, u, wrt=("mass",))
 
 
 def test_no_kind_is_left_out() -> None:

@@ -41,7 +41,7 @@ def test_free_body_at_20_rad_per_second():
 
 def test_double_pendulum(rng):
     sim = make(pendulum(2, spring=3.0, damper=0.1, rest=0.3), 0.02)
-    for _ in range(5):
+    for _ in range(3):
         compare(sim, 3.0 * rng.normal(size=4), rng.normal(size=2))
 
 
@@ -52,7 +52,7 @@ def test_every_joint(kind, base, rng):
     if kind == "fixed" and base is None:
         pytest.skip("nothing moves")
     sim = make(chain(kind, 2, gravity=(0.0, 1.0, -9.81), base=base, spring=3.0, damper=0.2), 0.02)
-    for _ in range(3):
+    for _ in range(2):
         compare(sim, random_state(sim, rng, 3.0), rng.normal(size=sim.nu))
 
 
@@ -60,7 +60,7 @@ def test_every_joint(kind, base, rng):
 def test_spring_with_a_rotated_rest(kind, rng):
     rest = [0.1, -0.2, 0.3][: dojo.Joint(kind, None, "b").ntrans] + [0.5, -0.4, 0.3]
     sim = make(chain(kind, 2, spring=20.0, rest=rest), 0.02)
-    for _ in range(3):
+    for _ in range(2):
         compare(sim, random_state(sim, rng, 3.0), rng.normal(size=sim.nu))
 
 
@@ -98,7 +98,7 @@ def hopper(law="nonlinear"):
 @pytest.mark.parametrize("law", LAWS)
 def test_hopper_in_flight_and_landing(law, height, time_step, rng):
     sim = make(hopper(law), time_step)
-    for _ in range(3):
+    for _ in range(2):
         q = np.r_[0.0, 0.0, height, rot.exp(0.3 * rng.normal(size=3)), rng.uniform(0.3, 0.55)]
         v = np.r_[rng.normal(size=2), -3.0, rng.normal(size=3), 3.0 * rng.normal()]
         compare(sim, np.r_[q, v], rng.normal(size=3))

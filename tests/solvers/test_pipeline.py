@@ -17,8 +17,9 @@ import json, numpy as np, dojo_opt as dojo
 from solvers.compiler.pipeline import FAST
 sim = dojo.Simulator(dojo.models.hopper() if {whole} else dojo.models.pendulum(), 0.02, divide={whole})
 x = sim.neutral()
-found = [*sim.maximal(x).ravel(), *sim.integrate(x, 0.3 * np.ones(sim.ndx))]
+found = [*sim.integrate(x, 0.3 * np.ones(sim.ndx))]
 if {whole}:
+    found += [*sim.maximal(x).ravel()]
     for _ in range(3):  # pressed onto the ground, it slides
         x = sim.step(x, 0.1 * np.ones(sim.nu)).x
         found += [*x]
