@@ -154,7 +154,7 @@ def tables(kind: int) -> tuple[bool, bool]:
 def count(kind: Pair, corners: tuple[int, int] = (0, 0)) -> int:
     """How many contact points the pair may have: features of `collide`; corners: of the two in their tables."""
     if kind == Pair.POLYTOPE_POLYTOPE:
-        return corners[0] + corners[1] + (EDGES if corners[0] > 1 else SPARE)
+        return corners[0] + (corners[1] + EDGES if corners[0] > 1 else SPARE)
     if kind == Pair.POLYTOPE_CYLINDER:
         return corners[0] + CROSSINGS + (RIM_POINTS if corners[0] > 2 else 0)
     return _COUNT.get(kind, 1)

@@ -11,7 +11,7 @@ from sim.mechanism.collision import Collision
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.polytope import Polytope
-from sim.mechanism.shapes import Box
+from sim.mechanism.shapes import Box, Sphere
 from support.free_collision import check_motion
 from support.jacobians import check_step
 from support.two_bodies import ROCK, SHAPES, approaching, two
@@ -63,3 +63,18 @@ def test_a_polytope_rests_on_a_box_as_the_box_that_it_is() -> None:
     np.testing.assert_allclose(t.x[-1, 2], 0.1, atol=1e-6)
     np.testing.assert_allclose(t.x[-1, sim.nq :], 0.0, atol=1e-4)
     np.testing.assert_allclose(t.contacts.force[-1].sum(axis=0), [-3.0, 0.0, 9.81], atol=1e-4)
+
+
+def test_a_ball_touches_a_polytope_in_one_point() -> None:
+    """In every place: its corners, which are farther away or where the ball touches, have no contacts of their own."""
+    ball = Collision("a", "b", Sphere(0.1), ROCK)
+    bodies = [Body("a", 1.0, 0.004 * np.eye(3)), Body("b", 1.0, shape=ROCK)]
+    joints = [Joint("floating", None, "a"), Joint("floating", None, "b")]
+    sim = dojo.Simulator(Mechanism(bodies, joints, collisions=[ball], gravity=(0, 0, 0)), time_step=0.01, kappa=1e-4)
+    corners = np.asarray(ROCK.vertices)
+    x = sim.neutral()
+    for corner in (corners[0], corners[:2].mean(axis=0), corners[:3].mean(axis=0)):
+        x[:3] = 1.5 * corner
+        contacts = sim.step(x, throw=True).contacts
+        assert (contacts.gap < 1.0).sum() == 1
+        assert len(sim.mechanism.contact_candidates) == 3  # with two spare ones

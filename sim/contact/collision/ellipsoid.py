@@ -17,8 +17,7 @@ from __future__ import annotations
 
 from sim.contact.collision.box import column, to_a, to_b
 from sim.contact.collision.cylinder import reach
-from sim.contact.collision.polytope_polytope import nearest_element
-from sim.contact.collision.polytope_table import above, edge, highest_face, row
+from sim.contact.collision.polytope_table import above, edge, highest_face, nearest_element, row
 from sim.contact.collision.rim import across, put_column
 from sim.contact.collision.support import (
     bent,

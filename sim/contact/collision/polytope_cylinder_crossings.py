@@ -10,8 +10,8 @@ from math import cos, sin
 from sim.contact.collision.box import to_a, to_b
 from sim.contact.collision.cylinder import RIM_BOTTOM, RIM_TOP, SIDE, reach
 from sim.contact.collision.edge_clipping import edge_normal, on_edges
-from sim.contact.collision.polytope_polytope import element, nearest_element, points_out
-from sim.contact.collision.polytope_table import edge, row
+from sim.contact.collision.polytope_polytope import element, points_out
+from sim.contact.collision.polytope_table import edge, nearest_element, row
 from sim.contact.collision.rim import (
     SECTORS,
     across,

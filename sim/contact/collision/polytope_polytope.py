@@ -3,7 +3,7 @@
     feature k < na      corner k of a against the corner, edge or face of b that is nearest to it; inside b against the
                         face that it is least deep below. Where the shapes overlap least along the normal of a face of
                         b: below that face against it
-    k - na < nb         corner k - na of b against a
+    k - na < nb         corner k - na of b against a, unless a is a point: nothing of b is nearer to it than feature 0
     the rest            EDGES pairs of edges that cross, with a normal that points out of b and into a; or SPARE
 
 Codes: 2 + the row of the element of the other polytope (polytope_table.py), from its row o; for two edges
@@ -17,7 +17,16 @@ from sim.contact.collision.box import to_a, to_b
 from sim.contact.collision.edge_axes import Arrangement
 from sim.contact.collision.edge_clipping import edge_normal, on_edges
 from sim.contact.collision.feature_code import substituted_feature
-from sim.contact.collision.polytope_table import above, edge, edge_faces, face_rows, highest_face, nearest_edge, row
+from sim.contact.collision.polytope_table import (
+    above,
+    edge,
+    edge_faces,
+    face_rows,
+    highest_face,
+    nearest_element,
+    row,
+    touching_corners,
+)
 from sim.contact.collision.witness import (
     FACE,
     LINE,
@@ -34,7 +43,7 @@ from sim.contact.collision.witness import (
     vertex_b,
 )
 from sim.model.model import Model
-from sim.model.record_columns import Hull, HullEdge, HullFace, PairSize
+from sim.model.record_columns import Hull, HullFace, PairSize
 from sim.model.slots import Slot
 from solvers.compiler import inner_kernel, optional
 from solvers.rotation import Vec3, cross
@@ -43,23 +52,6 @@ from solvers.types import Matrix, Vector
 _MANY = 4096
 _CROSSING = 1e-2  # sine of the angle from which on two edges cross
 _LEANING = 0.05  # part of a face normal by which the normal of two edges may lie outside of the arc of their faces
-
-
-@inner_kernel
-def nearest_element(hull: Matrix, o: int, x: Vec3) -> int:
-    """Row, from o, of the element nearest to a point."""
-    if int(hull[o, Hull.EDGES]) == 0:  # a point
-        return 1
-    face, height = highest_face(hull, o, x)
-    if face > 0 and (height <= 0.0 or above(hull, o, face, x)):
-        return face - o
-    e, _, _, corner = nearest_edge(hull, o, x)
-    k = 1 + int(hull[o, Hull.CORNERS]) + e
-    if not corner:
-        return k
-    y, u, length = edge(hull, o, e)
-    t = dot(u, x) - dot(u, y)
-    return 1 + int(hull[o + k, HullEdge.START if 2.0 * t < length else HullEdge.END])
 
 
 @inner_kernel
@@ -226,7 +218,7 @@ def face_towards(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector
     """
     radius = sizes[1] + sizes[PairSize.B + 1]
     oa, ob = int(sizes[0]), int(sizes[PairSize.B])
-    na, nb = int(hull[oa, Hull.CORNERS]), int(hull[ob, Hull.CORNERS])
+    na, nb = touching_corners(hull, oa, ob)
     if feature < na:
         x = to_b(R, row(hull, oa + 1 + feature))
         x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
@@ -247,7 +239,7 @@ def choose_elements(
     """The elements that are contact point `feature` at this pose; writes the contact, too."""
     face, crossings, s, _, _ = arrangement
     oa, ob = int(sizes[0]), int(sizes[PairSize.B])
-    na, nb = int(hull[oa, Hull.CORNERS]), int(hull[ob, Hull.CORNERS])
+    na, nb = touching_corners(hull, oa, ob)
     if feature < na:
         x = to_b(R, row(hull, oa + 1 + feature))
         x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
@@ -269,7 +261,7 @@ def put_elements(feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector
     """Contact of the elements `code`."""
     feature, code = substituted_feature(feature, code)
     oa, ob = int(sizes[0]), int(sizes[PairSize.B])
-    na, nb = int(hull[oa, Hull.CORNERS]), int(hull[ob, Hull.CORNERS])
+    na, nb = touching_corners(hull, oa, ob)
     radii = (sizes[1], sizes[PairSize.B + 1])
     if code == 0:
         absent(out)

@@ -96,3 +96,28 @@ def above(hull: Matrix, o: int, face: int, x: Vec3) -> bool:
         if (side if dot(m, row(hull, g if face == f else f)) > 0.0 else -side) > 0.0:
             return False
     return True
+
+
+@inner_kernel
+def nearest_element(hull: Matrix, o: int, x: Vec3) -> int:
+    """Row, from o, of the element nearest to a point."""
+    if int(hull[o, Hull.EDGES]) == 0:  # a point
+        return 1
+    face, height = highest_face(hull, o, x)
+    if face > 0 and (height <= 0.0 or above(hull, o, face, x)):
+        return face - o
+    e, _, _, corner = nearest_edge(hull, o, x)
+    k = 1 + int(hull[o, Hull.CORNERS]) + e
+    if not corner:
+        return k
+    y, u, length = edge(hull, o, e)
+    t = dot(u, x) - dot(u, y)
+    return 1 + int(hull[o + k, HullEdge.START if 2.0 * t < length else HullEdge.END])
+
+
+@inner_kernel
+def touching_corners(hull: Matrix, oa: int, ob: int) -> tuple[int, int]:
+    """How many corners of two polytopes, in rows oa and ob, may be contact points: all, but none of b for a point a,
+    whose own contact is with the nearest element of b, be it a corner.
+    """
+    return int(hull[oa, Hull.CORNERS]), int(hull[ob, Hull.CORNERS]) if hull[oa, Hull.EDGES] > 0.0 else 0

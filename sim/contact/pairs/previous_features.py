@@ -10,6 +10,7 @@ from math import sqrt
 
 from sim.contact.collision.box import to_a, to_b
 from sim.contact.collision.feature_code import substitute_code
+from sim.contact.collision.polytope_table import touching_corners
 from sim.contact.collision.rim import LEVEL
 from sim.contact.collision.witness import dot
 from sim.model.data import Data
@@ -75,7 +76,8 @@ def room(kind: int, sizes: Vector, hull: Matrix) -> int:
         a = int(sizes[0])
         return int(hull[a, Hull.CORNERS]) + (RIM_POINTS if hull[a, Hull.FACES] > 0.0 else 0)
     if kind == Pair.POLYTOPE_POLYTOPE:
-        return int(hull[int(sizes[0]), Hull.CORNERS] + hull[int(sizes[PairSize.B]), Hull.CORNERS])
+        na, nb = touching_corners(hull, int(sizes[0]), int(sizes[PairSize.B]))
+        return na + nb
     return 1 << 40
 
 
