@@ -27,6 +27,7 @@ from dojo_opt.mpc.moving_reference import (
     AnchoredReference as AnchoredReference,
     SampledReference as SampledReference,
 )
+from dojo_opt.mpc.rescue import Rescue as Rescue
 from dojo_opt.mpc.settings import MPCSettings as MPCSettings
 from dojo_opt.planning.ilqr import ilqr as ilqr
 from dojo_opt.planning.options import Options as Options, Stage as Stage

@@ -17,8 +17,10 @@ from dojo_opt.mpc.measurement import Measurement
 from dojo_opt.mpc.moving_reference import References
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.mpc.receding_horizon import shift_multipliers, tail
+from dojo_opt.mpc.rescue import SCALES, Starts
 from dojo_opt.mpc.servo import ModelServo, Servo
 from dojo_opt.mpc.settings import MPCSettings
+from dojo_opt.mpc.shrinkage import shrunk
 from dojo_opt.planning.ilqr import Solver
 from dojo_opt.planning.iterate import Iterate, Iteration
 from dojo_opt.planning.plan import Plan
@@ -34,7 +36,6 @@ from sim.simulator.adjustable_simulator import AdjustableSimulator
 from solvers.status import Status
 from solvers.types import Matrix, Stack, Vector
 
-_SCALES = (1.0, 0.5, 0.0)  # of the gains of the rollouts that guess="feedback" chooses from
 _ROUNDING = 1e-9  # [s] times are sums of floating-point steps
 _LATEST = 100_000  # knots that a plan is shifted by, at most: all of them are rolled out
 _LOST = 10.0  # times the merit of the guess of a tick: a rollout worse than that has left it
@@ -59,8 +60,8 @@ class MPC:
             reference of the problem at every tick).
         plan: the first plan, at the time of the first call (default None: that of `ilqr` without refinement).
         **settings: fields of `dojo.MPCSettings` by name, whose help has their units and defaults: period, kappa,
-            kappa_grad, guess, patience, gain_scale, delay, computation, servo, feedforward, time_limit, mean_velocity,
-            friction, learn_ground, adapt, options, first, log.
+            kappa_grad, guess, patience, rescue, gain_scale, delay, computation, servo, feedforward, time_limit,
+            mean_velocity, friction, shrinkage, learn_ground, adapt, options, first, log.
 
     Raises:
         TypeError: for an unknown setting, or an argument of the wrong kind.
@@ -77,13 +78,17 @@ class MPC:
         checks.keywords("MPC(...)", settings, MPCSettings.__dataclass_fields__)
         self.settings = MPCSettings(**settings)
         self._again = partial(MPC, problem, iterations, reference=reference, plan=plan, **settings)
-        friction = {} if self.settings.friction is None else {"friction": self.settings.friction}
+        changed: dict[str, Any] = {} if self.settings.friction is None else {"friction": self.settings.friction}
+        if self.settings.shrinkage:
+            changed["mechanism"] = shrunk(problem.sim.mechanism, self.settings.shrinkage)
         self.nominal = problem.sim  # the simulator that plants are made from
-        self.sim = AdjustableSimulator.like(problem.sim.replace(**friction))  # the model that plans are made with
+        self.sim = AdjustableSimulator.like(problem.sim.replace(**changed))  # the model that plans are made with
         self.problem = problem.with_own_terms(self.sim)
         self.start = problem.start.copy()  # (nx,) where the problem starts, and a plant may
         self.period = float(self.settings.period or self.problem.knot_time)
         self._solver = Solver(self.problem, self.settings.planner(iterations))
+        rescue = self.settings.rescue
+        self._starts = None if rescue is None else Starts(self._solver, rescue)
         self.references = References(self.problem, reference)
         if self.settings.computation > self.period + _ROUNDING:
             raise ValueError(
@@ -151,6 +156,8 @@ class MPC:
             self.estimator.forget()
         if self._shear is not None:
             self._shear.forget()
+        if self._starts is not None:
+            self._starts.forget()
         self._solver.reset()
 
     def __call__(self, time: float, x: ArrayLike) -> Vector:
@@ -259,6 +266,7 @@ class MPC:
             return
         result = solver.iterate(guess, shifted.K, began=begin[0])
         after = result.now if self._usable(result, guess) else None
+        result, after = self._rescued(shifted, result, after)
         if after is not None and after.gaps is None:  # the violations of an inconsistent trajectory say little
             solver.update_multipliers(after)
         taken = after is not None
@@ -273,6 +281,17 @@ class MPC:
         cost = self.log[-1].cost if after is None else after.cost
         iterations = len(result.history)
         self._record(now, begin, result.status, not taken, iterations, cost, result.alpha, shifted.x[0])
+
+    def _rescued(self, shifted: Policy, result: Iteration, after: Iterate | None) -> tuple[Iteration, Iterate | None]:
+        """The result of a tick and its trajectory, or those from another start where these are none, or worse."""
+        if self._starts is None or not (after is None or self._starts.always):
+            return result, after
+        start = self._starts.best(shifted.x, shifted.u, shifted.K)
+        if start is None or (after is not None and start.merit >= after.merit):
+            return result, after
+        before = list(result.history)
+        other = self._solver.iterate(start, shifted.K)
+        return other._replace(history=[*before, *other.history]), other.now
 
     def _rolled(self, guess: Iterate, K: Stack) -> Iterate | None:
         """After a rejected step: the rollout of the shifted plan under its gains, None when it is nowhere near it."""
@@ -306,7 +325,7 @@ class MPC:
             xs = shifted.x.copy()
             xs[0] = self.problem.start
             return solver.guess(xs, shifted.u)
-        scales = (0.0,) if self.settings.guess == "open loop" else _SCALES
+        scales = (0.0,) if self.settings.guess == "open loop" else SCALES
         nominal = Iterate(shifted.x, shifted.u)
         shots = (solver.rollout(nominal, scale * shifted.K) for scale in scales)
         return min((shot for shot in shots if shot is not None), key=lambda shot: shot.merit, default=None)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from dojo_opt.mpc.adaptation import Adaptation
+from dojo_opt.mpc.rescue import Rescue
 from dojo_opt.planning.options import Options, Stage
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
@@ -34,6 +35,8 @@ class MPCSettings:
         patience: ticks in a row without a new plan after which the next one begins with rollouts, whatever `guess` is;
             None never does. Manipulators get out of stalled plans, while a robot that balances falls: of 100 runs of
             `quadruped_mpc` under random disturbances 4 fell with 3, and none with None (default None).
+        rescue: further starts of a tick whose plan is rejected, a `Rescue` (default None: the previous plan stays in
+            force).
         gain_scale: factor of the feedback between plans; 0 applies the planned inputs without feedback (default 1).
         delay: time from a measurement to the input that it causes [s]; plans start later by this time (default 0).
         computation: time that a plan takes [s]: a plan takes effect this long after its measurement. It starts from the
@@ -49,6 +52,9 @@ class MPCSettings:
             True); see `dojo_opt.mpc.measurement`.
         friction: coefficient of friction that plans assume (default None: that of the model). A value below that of the
             ground is safer.
+        shrinkage: how much thinner than they are plans find the bodies of collisions [m]: about the gap across
+            which smooth contact presses, kappa over the impulse of a knot, so that fingers that follow a plan touch
+            what they hold (default 0).
         learn_ground: whether to estimate the height of the ground from the stance contacts; "slope" estimates their
             plane, for a robot on a floating base, and turns the references with it (default False).
         adapt: parameters of the model that are estimated from the measurements while the controller runs, an
@@ -64,6 +70,7 @@ class MPCSettings:
     kappa_grad: float | None = None
     guess: str = "states"
     patience: int | None = None
+    rescue: Rescue | None = None
     gain_scale: float = 1.0
     delay: float = 0.0
     computation: float = 0.0
@@ -72,6 +79,7 @@ class MPCSettings:
     time_limit: float = float("inf")
     mean_velocity: bool = True
     friction: float | None = None
+    shrinkage: float = 0.0
     learn_ground: bool | str = False
     adapt: Adaptation | None = None
     options: Options | None = None
@@ -90,7 +98,7 @@ class MPCSettings:
             value = getattr(self, name)
             if value is not None:
                 checks.number(f"MPC({name}=...)", value, above=above, finite=name.startswith("kappa"))
-        for name in ("gain_scale", "delay", "computation"):
+        for name in ("gain_scale", "delay", "computation", "shrinkage"):
             checks.number(f"MPC({name}=...)", getattr(self, name), at_least=0.0)
         if self.delay and self.computation:
             raise ValueError("MPC(delay=..., computation=...): give one of them, got both")
@@ -101,6 +109,8 @@ class MPCSettings:
         if not (isinstance(self.learn_ground, bool) or str(self.learn_ground) == "slope"):
             given = checks.shown(self.learn_ground)
             raise ValueError(f"MPC(learn_ground=...): expected False, True or 'slope', got {given}")
+        if self.rescue is not None and not isinstance(self.rescue, Rescue):
+            raise TypeError(f"MPC(rescue=...): expected a Rescue, got {self.rescue!r}")
         if self.adapt is not None and not isinstance(self.adapt, Adaptation):
             raise TypeError(f"MPC(adapt=...): expected an Adaptation, got {self.adapt!r}")
         for name in ("log", "patience"):

@@ -7,6 +7,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.mpc.settings import MPCSettings
+from dojo_opt.planning.iterate import Iterate
 from dojo_opt.planning.options import Options
 from dojo_opt.plant.tick import milliseconds
 from solvers.compiler import local_kernel
@@ -233,3 +234,87 @@ def test_hopper_hops_and_survives_a_payload_that_the_open_loop_guess_does_not():
     assert foot.max() > 0.1, "it does not hop"
     control = dojo.tasks.hopper_mpc(guess="open loop")
     assert not dojo.closed_loop(control, dojo.tasks.plant(control, 2e-3, payload=2.35), 2.0).survived
+
+
+def test_a_tick_whose_plan_is_rejected_starts_again_from_the_best_rollout(monkeypatch):
+    """Of the old plan under its gains, half of them and none, and of its inputs with splines; else it stays in force."""
+    mpc = dojo.MPC(standing_problem(), rescue=dojo.Rescue(splines=2, spread=1.0))
+    x = HOPPER.neutral()
+    mpc(0.0, x)
+    rollouts, begun = [], []
+    roll, iterate = mpc._solver.rollout, mpc._solver.iterate
+
+    def rolled(*given):
+        rollouts.append(roll(*given))
+        return rollouts[-1]
+
+    def iterated(now, K, **given):
+        begun.append(now)
+        return iterate(now, K, **given)
+
+    monkeypatch.setattr(mpc._solver, "rollout", rolled)
+    monkeypatch.setattr(mpc._solver, "iterate", iterated)
+    monkeypatch.setattr(mpc, "_usable", lambda result, guess: False)
+    moved = HOPPER.integrate(x, 1e-3 * np.eye(14)[0])
+    mpc(0.05, moved)
+    assert len(rollouts) == 5 and len(begun) == 2 and mpc.log[-1].iterations == 2
+    assert begun[1].merit == min(shot.merit for shot in rollouts)
+    assert len({shot.merit for shot in rollouts[2:]}) == 3
+    assert not mpc.log[-1].fallback and mpc.log[-1].cost <= begun[1].cost
+    np.testing.assert_array_equal(mpc.policy.x[0], mpc.log[-1].x)
+    del rollouts[:], begun[:]
+    monkeypatch.setattr(mpc, "_usable", lambda result, guess: True)
+    mpc(0.1, moved)
+    assert not rollouts and len(begun) == 1
+
+
+@pytest.mark.parametrize(("factor", "begun"), [(0.5, 2), (2.0, 1)])
+def test_every_tick_takes_a_better_start_if_it_is_asked_to(monkeypatch, factor, begun):
+    mpc = dojo.MPC(standing_problem(), rescue=dojo.Rescue(splines=0, always=True))
+    x = HOPPER.neutral()
+    mpc(0.0, x)
+    starts, iterate = [], mpc._solver.iterate
+
+    def iterated(now, K, **given):
+        starts.append(iterate(now, K, **given))
+        return starts[-1]
+
+    def best(*old):
+        start = mpc._solver.rollout(Iterate(*old[:2]), old[2])
+        return start._replace(merit=factor * starts[0].now.merit)
+
+    monkeypatch.setattr(mpc._solver, "iterate", iterated)
+    monkeypatch.setattr(mpc._starts, "best", best)
+    mpc(0.05, HOPPER.integrate(x, 1e-3 * np.eye(14)[0]))
+    assert len(starts) == begun
+    np.testing.assert_array_equal(mpc.policy.u, starts[-1].now.u)
+
+
+def test_plans_find_bodies_thinner_by_the_shrinkage():
+    """The larger of two balls, and no contact with the ground; plants keep their sizes."""
+    task = dojo.tasks.idto.jaco_ball()
+    planned, own = (sim.mechanism for sim in (task.mpc.sim, task.mpc.nominal))
+    for thin, whole in zip(planned.collisions, own.collisions, strict=True):
+        assert whole.shape_a.radius - thin.shape_a.radius == pytest.approx(task.mpc.settings.shrinkage)
+        assert thin.shape_b == whole.shape_b
+    assert [contact.radius for contact in planned.contacts] == [contact.radius for contact in own.contacts]
+    with pytest.raises(ValueError, match=r"MPC\(shrinkage=...\): expected collisions of a sphere or a capsule thicker"):
+        dojo.tasks.idto.jaco_ball(shrinkage=0.1)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"splines": -1}, r"Rescue\(splines=...\)"),
+        ({"points": 1}, r"Rescue\(points=...\)"),
+        ({"spread": -0.1}, r"Rescue\(spread=...\)"),
+        ({"spread": [[0.1]]}, r"Rescue\(spread=...\)"),
+    ],
+)
+def test_settings_of_a_rescue_are_checked(settings, message):
+    with pytest.raises(ValueError, match=message):
+        dojo.Rescue(**settings)
+    with pytest.raises(ValueError, match=r"Rescue\(spread=...\): expected a number or \(3,\)"):
+        dojo.MPC(standing_problem(), rescue=dojo.Rescue(spread=[0.1, 0.2]))
+    with pytest.raises(TypeError, match=r"MPC\(rescue=...\)"):
+        MPCSettings(rescue=3)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dojo_opt.mpc.controller import MPC
+from dojo_opt.mpc.rescue import Rescue
 from dojo_opt.mpc.settings import OPTIONS
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
@@ -52,6 +53,8 @@ class BallTurn:
         smoothing: those of rollouts and of derivatives in the stages of the first plan [N s m].
         reach: smallest and largest height at which the fingers hold the ball [m].
         squeeze: force of each finger on the ball whose torques cost nothing [N] (default 0).
+        shrinkage: how much thinner plans find fingers and ball [m] (default 0).
+        rescued: whether a tick whose plan is rejected starts again from rollouts and random splines (default False).
     """
 
     name: str
@@ -66,6 +69,8 @@ class BallTurn:
     smoothing: tuple[tuple[float, float], ...]
     reach: tuple[float, float]
     squeeze: float = 0.0
+    shrinkage: float = 0.0
+    rescued: bool = False
 
     __repr__ = short_repr
 
@@ -99,6 +104,7 @@ def turning(task: BallTurn, settings: Mapping[str, Any]) -> SuiteTask:
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=guess)
     given = timed(_RATE) | {"servo": own, "gain_scale": 0.0}
     given |= {"options": replace(OPTIONS, backtracking=_BACKTRACKING)}
+    given |= {"shrinkage": task.shrinkage, "rescue": Rescue() if task.rescued else None}
     given |= {"kappa": _KAPPA, "first": Options(stages=tuple(Stage(*pair) for pair in task.smoothing))}
     mpc = MPC(problem, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)

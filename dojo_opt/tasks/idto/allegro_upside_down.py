@@ -36,6 +36,8 @@ _TASK = BallTurn(
     smoothing=((1e-5, 1e-5),),  # at 1e-4 the ball falls out of the first guess
     reach=(-np.inf, 0.13),
     squeeze=1.0,  # at 0, plans hold the ball no harder than they must
+    shrinkage=6e-4,  # the gap of a contact that presses by .3 N at the kappa of the plans
+    rescued=True,
 )
 
 
@@ -48,6 +50,7 @@ def allegro_upside_down(**settings: Any) -> SuiteTask:
     within z = 130 mm of the palm's frame throughout. The fingers start .1 to 1 mm off the ball; those of the
     publication start up to 7.2 mm inside it. Plans count on all of the friction of the fingers. Torques cost nothing
     where each finger presses on the ball by 1 N, twice the weight of the ball; those of the publication do at zero.
+    Plans find the ball .6 mm thinner than it is, and a tick whose plan is rejected starts again from rollouts.
 
     Args:
         **settings: settings of `dojo.MPC`, instead of the ones of the task.

@@ -29,9 +29,9 @@ _NEAR, _HELD = 0.02, 0.5  # [m], [s]
 # rests nearer to its goal, and on MuJoCo's plant fewer runs succeed
 _KAPPA = 2e-5
 _KAPPA_GRAD = 5e-5  # [N s m] with derivatives at _KAPPA, plans lose the ball as the arm touches it
-# [m] that the arm of plans finds the ball thinner than it is: at _KAPPA contact acts across about this gap, and a plan
-# that knows all of the ball waits for a force that never comes; with 2 mm the ball is pushed past its goal
-_THIN = 8e-4
+# [m] at _KAPPA contact acts across about this gap, and a plan that knows all of the ball waits for a force that never
+# comes; with 2 mm the ball is pushed past its goal
+_SHRINKAGE = 8e-4
 _FRICTION = 0.4  # assumed by plans: with all of .5 the arm slips off the ball, and leaves it behind
 _SPIN = 0.03  # [1/(rad/s)^2] of the ball, .1 in the publication
 _TOUCH = 10.0  # [1/m^2] of the distance of stub and ball
@@ -46,8 +46,7 @@ def mechanism(friction: float, servos: bool = False) -> Mechanism:
 
     Args:
         friction: coefficient of friction.
-        servos: whether it is the model of the controller: joints with servos, and a ball that is thinner for the arm
-            (default False).
+        servos: whether it is the model of the controller: joints with servos (default False).
 
     Returns:
         The mechanism.
@@ -61,7 +60,7 @@ def mechanism(friction: float, servos: bool = False) -> Mechanism:
         [*parts.joints, Joint("floating", None, "ball")],
         [Contact("ball", radius=radius, friction=friction), *parts.grounded(friction)],
         parts.inputs,
-        collisions=parts.touching("ball", Sphere(radius - _THIN if servos else radius), friction),
+        collisions=parts.touching("ball", Sphere(radius), friction),
         name="jaco_ball",
         neutral=neutral,
     )
@@ -107,7 +106,7 @@ def jaco_ball(**settings: Any) -> SuiteTask:
     ]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=KP * start[:JOINTS])
     given = timed(_RATE) | {"iterations": 2, "servo": own, "gain_scale": 0.0}
-    given |= {"kappa": _KAPPA, "kappa_grad": _KAPPA_GRAD, "friction": _FRICTION}
+    given |= {"kappa": _KAPPA, "kappa_grad": _KAPPA_GRAD, "friction": _FRICTION, "shrinkage": _SHRINKAGE}
     given |= {"first": Options(stages=(Stage(_KAPPA, _KAPPA),))}
     mpc = MPC(problem, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)
