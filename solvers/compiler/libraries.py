@@ -156,7 +156,8 @@ def _environments(module: Any) -> tuple[str, ...]:
 def _content_of(library: Any) -> Content:
     if isinstance(library, InnerLibrary):
         return library.content
-    return Content((), (library._get_module_for_linking().as_bitcode(),), ())
+    module = library._get_module_for_linking()
+    return Content((), (module.as_bitcode(),), _environments(module))
 
 
 def _relink(module: Any, old: Any, new: str) -> None:
