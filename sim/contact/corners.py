@@ -26,7 +26,7 @@ from sim.model.record_columns import Cluster, Cone, ContactRow, Corner, Inactive
 from sim.model.slots import Slot
 from solvers.compiler import inlined, kernel, optional
 from solvers.lanes import LANES, Lanes, at_least, keep, load, root, spread, store, total
-from solvers.rotation import Vec3, put_three, times, transposed_times
+from solvers.rotation import Vec3, cross, put_three, times, transposed_times
 from solvers.types import Matrix
 
 _FAR = 1e9  # [m]
@@ -184,21 +184,38 @@ def least_corner_gap(model: Model, data: Data, c: int) -> float:
 
 
 @kernel
-def gather_corners(model: Model, data: Data, c: int, a: float) -> bool:
-    """Rows of `corners` of a cluster: corners are inactive whose gap at configuration 2 is more than a; returns
-    whether these are others than before.
+def gather_corners(model: Model, data: Data, c: int, a: float, slack: float) -> bool:
+    """Rows of `corners` of a cluster: corners are inactive whose gap at configuration 2, and after one more step like
+    the last one, is more than a + slack; returns whether these are others than before.
     """
     C, F, changed = data.corners, model.contact_frame[c], False
     i = model.contact_body[c]
     n0, n1, n2 = transposed_times(data.rot2[i], F[0], F[1], F[2])
     height = F[0] * data.pos2[i, 0] + F[1] * data.pos2[i, 1] + F[2] * data.pos2[i, 2]
+    fall, turn = _last_fall(model, data, c)
     for k in range(c, model.cluster_end[c]):
         p = model.contact_point[k]
         offset = model.contact_height[k] + model.contact_radius[k]
-        out = 1 if height + n0 * p[0] + n1 * p[1] + n2 * p[2] - offset > a else 0
+        ahead = min(0.0, fall + turn[0] * p[0] + turn[1] * p[1] + turn[2] * p[2])
+        out = 1 if height + n0 * p[0] + n1 * p[1] + n2 * p[2] - offset + ahead > a + slack else 0
         changed = changed or out != C[Corner.OUT, k]
         C[Corner.POINT, k], C[Corner.POINT + 1, k], C[Corner.POINT + 2, k] = p[0], p[1], p[2]
         C[Corner.FRICTION, k] = model.contact_friction[k] if model.contact_law[k] == Law.NONLINEAR else 0.0
         C[Corner.OFFSET, k], C[Corner.OUT, k] = offset, out
         data.contact_out[k] = out
     return changed
+
+
+@kernel
+def _last_fall(model: Model, data: Data, c: int) -> tuple[float, Vec3]:
+    """(f, t) of the body of a cluster: the gap of its corner p has grown by f + t.p in the step before.
+
+    With the normal n, the displacement d, and the rotation Q of that step, R2 = Q R1:  f = n.d,  t = R2^T (n - Q n).
+    """
+    i, n = model.contact_body[c], model.contact_frame[c]
+    q, d = data.turn_in[i], data.move_in[i]
+    sx, sy, sz = cross(q[1], q[2], q[3], n[0], n[1], n[2])
+    x, y, z = cross(q[1], q[2], q[3], sx, sy, sz)
+    w = -2.0 * q[0]
+    turn = transposed_times(data.rot2[i], w * sx - 2.0 * x, w * sy - 2.0 * y, w * sz - 2.0 * z)
+    return n[0] * d[0] + n[1] * d[1] + n[2] * d[2], turn

@@ -34,6 +34,7 @@ from solvers.dense import clear
 from solvers.rotation import rotate, three
 from solvers.types import Matrix
 
+_UNSTEADY = 0.1  # share of the motion in the step before by which the motion of corners in this one may differ
 _STIFFEST = 10.0  # largest e of the inactive corners of a cluster, whose stiffness the matrix does not omit
 
 
@@ -122,7 +123,7 @@ def _sort(model: Model, data: Data, options: StepOptions, c: int, a: float) -> f
     if a == 0.0 and model.cluster[c, Cluster.CORNERS] > 0.0:
         a = _radius(model, options, c, float(model.cluster_end[c] - c), _STIFFEST)
         row[Inactive.STIFF] = row[Inactive.CORNERS] = 1.0
-        if gather_corners(model, data, c, 2.0 * a + _travel(model, data, c)) or corners == 0.0:
+        if gather_corners(model, data, c, 2.0 * a, _UNSTEADY * _travel(model, data, c)) or corners == 0.0:
             row[Inactive.LEAST_GAP] = 0.0
             row[Inactive.SHARE] = -1.0
         return a

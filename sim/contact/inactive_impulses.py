@@ -179,7 +179,7 @@ def _evaluate_corners(model: Model, data: Data, h: float, c: int) -> None:
     row = data.inactive[c]
     keep_motion(data, h, model.contact_body[c], row)
     if row[Inactive.CORNERS] == 0.0:
-        gather_corners(model, data, c, -1e300)
+        gather_corners(model, data, c, -1e300, 0.0)
     evaluate_corners(model, data, h, c)
     row[Inactive.SHARE] = -1.0
     bound_changes(model, data, c, (1.0 - NEARER) * row[Inactive.LEAST_GAP])

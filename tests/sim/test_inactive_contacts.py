@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from naive import rotation as rot
+from scipy.spatial import ConvexHull
 
 import dojo_opt as dojo
 from sim.model.record_columns import Inactive
@@ -291,3 +292,29 @@ def test_reach_is_where_a_contact_at_rest_becomes_far(kappa):
     edge = reach(sim.model, 0.02, kappa, sim.tolerance)[0]
     for share, expected in ((0.99, 0), (1.01, 1)):
         assert len(sim.inactive_contacts(np.r_[0.0, 0.0, 0.1 + share * edge, 1.0, np.zeros(9)])) == expected
+
+
+def test_corners_that_keep_their_height_are_inactive_however_fast_a_hull_slides() -> None:
+    """A round hull slides without friction, 3 cm a step: of its 32 corners only those that press are active."""
+    rng = np.random.default_rng(2)
+    corners = rng.normal(size=(16, 3))
+    corners *= 0.05 / np.linalg.norm(corners, axis=1)[:, None]
+    corners = np.vstack([corners, -corners])
+    faces = ConvexHull(corners).equations
+    down = faces[faces[:, 3].argmax(), :3]
+    body = dojo.Body("foot", 1.0, np.diag([1e-3] * 3), shape=dojo.Polytope(corners))
+    mech = dojo.Mechanism(
+        [body],
+        [dojo.Joint("floating", None, "foot")],
+        contacts=[dojo.Contact("foot", corner, friction=0.0) for corner in corners],
+    )
+    sim = dojo.Simulator(mech, time_step=0.01)
+    x = sim.neutral()
+    x[3:7] = [1.0 - down[2], *np.cross(down, [0.0, 0.0, -1.0])]
+    x[3:7] /= np.linalg.norm(x[3:7])
+    x[2] = -faces[:, 3].max()
+    x, _ = dojo.equilibrium(sim, x)
+    x[sim.nq] = 3.0
+    t = sim.rollout(x, steps=5, throw=True)
+    np.testing.assert_allclose(t.x[-1, 0], x[0] + 0.15, atol=1e-6)
+    assert sim._engine.last().active_count[0] <= 5
