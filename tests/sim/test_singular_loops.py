@@ -156,4 +156,4 @@ def test_velocity_and_energy_at_the_nodes_of_loops() -> None:
         np.testing.assert_allclose(v @ [1.0, 1.0, 0.0], 0.0, atol=1e-10)  # the coupler does not turn
         np.testing.assert_allclose(v[:, 0], v[:, 2], atol=1e-10)
         errors.append(abs(float(v[-1, 0]) - 3.0))
-    assert errors[0] < 1e-6 and errors[1] <= 0.3 * errors[0] + 1e-9
+    assert errors[0] < 1e-6 and errors[1] <= 0.3 * errors[0] + 5e-9
