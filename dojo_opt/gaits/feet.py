@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.planning.manifold import cross
 from sim.mechanism import checks
+from sim.mechanism.terrain import Terrain
 from sim.model.interruptible_loops import rows
 from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
@@ -56,6 +57,12 @@ class Feet:
         self.radius = np.array([c.radius for c in self.contacts])
         self.normal = np.array([np.asarray(c.normal) for c in self.contacts])
         self.height = np.array([c.height for c in self.contacts])
+        # contacts on one surface are asked about together: a spline takes as long for one place as for a hundred
+        self._surfaces: dict[int, tuple[Terrain, list[int]]] = {}
+        for k, c in enumerate(self.contacts):
+            if c.terrain is not None:
+                surface = c.terrain.surface(float(c.radius))
+                self._surfaces.setdefault(id(surface), (surface, []))[1].append(k)
 
     @property
     def flat(self) -> bool:
@@ -86,7 +93,14 @@ class Feet:
             (..., k) distances [m].
         """
         at = self.positions(x)
-        return np.stack([c.gap(at[..., k, :]) for k, c in enumerate(self.contacts)], axis=-1)
+        out = np.empty(at.shape[:-1])
+        for k, c in enumerate(self.contacts):
+            if c.terrain is None:
+                out[..., k] = c.gap(at[..., k, :])
+        for surface, on in self._surfaces.values():
+            px, py, height = at[..., on, 0], at[..., on, 1], at[..., on, 2] - self.height[on]
+            out[..., on] = (height - surface.height(px, py)) * surface.normal(px, py)[..., 2]
+        return out
 
     def put_down(self, x: Floats) -> Floats:
         """Move a robot on a floating base up or down until its lowest ball touches the ground.
@@ -114,7 +128,10 @@ class Feet:
         Returns:
             (k, 3) unit normals, world axes.
         """
-        return np.stack([c.normal_at(p) for c, p in zip(self.contacts, self.positions(x), strict=True)])
+        at, out = self.positions(x), self.normal.copy()
+        for surface, on in self._surfaces.values():
+            out[on] = surface.normal(at[on, 0], at[on, 1])
+        return out
 
     def touching(self, x: Floats) -> Feet:
         """The points of the balls nearest to the ground, instead of their centres.

@@ -26,6 +26,7 @@ from sim.mechanism.body import Body
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
+from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
 from solvers.types import Floats
 
@@ -144,7 +145,7 @@ def least_gap(mech: Mechanism) -> Callable[[Floats], float]:
 
     def least(q: Floats) -> float:
         z = sim.maximal(np.concatenate([q, still]))[bodies]
-        w, x, y, s = z[:, 6:10].T  # behind the velocity
+        w, x, y, s = z[:, BodyState.QUATERNION].T
         heights = z[:, 2] + 2.0 * (x * s - w * y) * px + 2.0 * (y * s + w * x) * py + (1.0 - 2.0 * (x * x + y * y)) * pz
         return float((heights - offsets).min())
 

@@ -284,7 +284,7 @@ def test_a_robot_whose_trunk_has_corners_too_stands_on_its_feet():
     rng = np.random.default_rng(5)
 
     def hull(radius: float) -> dojo.Polytope:
-        corners = rng.normal(size=(10, 3))
+        corners = rng.normal(size=(16, 3))
         corners *= radius / np.linalg.norm(corners, axis=1)[:, None]
         return dojo.Polytope(np.vstack([corners, -corners]))
 
