@@ -20,7 +20,7 @@ from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,6 +45,7 @@ _DAMPING, _LEAST, _LARGEST = 1e-3, 1e-9, 1e8  # share of the diagonal
 _LEAST_NOISE = 1e-150  # whose inverse has a square
 _UNSEEN = 1e-8  # of the largest eigenvalue: combinations that the data do not determine
 _NEARLY = 10.0  # tolerances: the decrease that a fit may still expect at its end, where no step brings one
+_WITHIN = 0.1  # standard deviations: the change of the parameters that it may still expect there
 _AWAY = 0.3  # times a value: standard deviation of the starts of further fits without a prior
 _EXACT = 1e-10  # square of the errors over their noise: data without noise
 _MESSAGES = {**MESSAGES, Status.LINE_SEARCH: "No damped step decreases the cost as the linear model expects."}
@@ -193,6 +194,13 @@ class Prior:
         return float(np.sum(self.precision * (theta - self.mean) ** 2))
 
 
+class _Expectation(NamedTuple):
+    """Effect of a step in the linear model."""
+
+    decrease: float  # of the cost
+    deviations: float  # by which the parameters change, in standard deviations
+
+
 class _Fit:
     """Parameters, starts and their normal equations."""
 
@@ -241,8 +249,8 @@ class _Fit:
         self.prior_weight = max(1.0, cost / max(values, 1))
         return cost + self.pull(self.theta)
 
-    def step(self, equations: NormalEquations, damping: float) -> tuple[Floats, list[Floats], float]:
-        """New parameters, within their bounds, new starts, and the decrease of the cost in the linear model."""
+    def step(self, equations: NormalEquations, damping: float) -> tuple[Floats, list[Floats], _Expectation]:
+        """New parameters, within their bounds, new starts, and the effect of both in the linear model."""
         H, g, back = equations.reduced(damping)
         H += self.prior_weight * np.diag(self.prior.precision * self.unit**2)
         g += self.prior_weight * self.prior.precision * (self.theta - self.prior.mean) * self.unit
@@ -261,7 +269,8 @@ class _Fit:
         theta = np.clip(self.theta + self.unit * d, self.space.low, self.space.high)
         moves = -(back[:, :, -1] + back[:, :, :-1] @ d)
         decrease = self.pull(self.theta) - self.pull(theta) - equations.change(d, moves)
-        return theta, list(self.base.integrate(np.array(self.starts), moves)), decrease
+        expected = _Expectation(decrease, float(np.sqrt(d @ H @ d)))
+        return theta, list(self.base.integrate(np.array(self.starts), moves)), expected
 
 
 @dataclass(frozen=True)
@@ -414,9 +423,9 @@ def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history:
         accepted, gain, equations = False, 0.0, NormalEquations(found, weights, fit.unit)
         expected = None  # of the least damped step
         while damping < _LARGEST and not accepted:
-            theta, starts, decrease = fit.step(equations, damping)
-            expected = decrease if expected is None else expected
-            if decrease <= o.tolerance * cost:  # more damping predicts still less
+            theta, starts, now = fit.step(equations, damping)
+            expected = now if expected is None else expected
+            if now.decrease <= o.tolerance * cost:  # more damping predicts still less
                 return _stopped(expected, cost, o)
             trial = fit.errors(theta, starts, kappa, slopes=False)
             if trial is not None and all(t.solved or not use for t, use in zip(trial, usable, strict=True)):
@@ -451,12 +460,14 @@ def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history:
     return Status.MAX_ITERATIONS
 
 
-def _stopped(expected: float, cost: float, o: IdentifyOptions) -> Status:
-    """How a smoothing ends whose cost falls no further, by the decrease that the least damped step was to bring.
+def _stopped(expected: _Expectation, cost: float, o: IdentifyOptions) -> Status:
+    """How a smoothing ends whose cost falls no further, by the expectation of the least damped step.
 
-    Where that is large, the motions are not as the linear model has them, as at a change of contacts.
+    Where that is large, the motions are not as the linear model has them, as at a change of contacts. Where it would
+    hardly change the parameters, these are found, though the starts of the windows may not be.
     """
-    return Status.SOLVED if expected <= _NEARLY * o.tolerance * cost else Status.LINE_SEARCH
+    near = expected.decrease <= _NEARLY * o.tolerance * cost or expected.deviations <= _WITHIN
+    return Status.SOLVED if near else Status.LINE_SEARCH
 
 
 def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str, Any]], began: float) -> Identified:

@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 
 import dojo_opt as dojo
 from dojo_opt.identification.delayed_space import DelayedSpace
-from dojo_opt.identification.identify import _Fit
+from dojo_opt.identification.identify import IdentifyOptions, _Expectation, _Fit, _stopped
 from dojo_opt.identification.normal_equations import NormalEquations
 from dojo_opt.identification.windows import Predictor, WindowErrors, cut_windows, difference_slopes
 from solvers.status import Status
@@ -52,6 +52,12 @@ def test_outliers_are_resisted():
     plain = dojo.identify(_arm(0.1), motions, ("damper",), noise=sd, outlier=1e9)
     errors = [abs(found.values[0] - 0.3) for found in (robust, plain)]
     assert errors[0] < 3.0 * robust.deviation[0] and errors[0] < 0.5 * errors[1] and robust.outliers > 0.01
+
+
+def test_parameters_within_a_tenth_of_their_deviation_are_found():
+    """As at the end of a fit of friction: only the starts of windows beside changes of contacts want to move."""
+    for deviations, status in ((0.03, Status.SOLVED), (0.3, Status.LINE_SEARCH)):
+        assert _stopped(_Expectation(2.25, deviations), 1121.2, IdentifyOptions()) == status
 
 
 def test_a_fit_whose_steps_all_raise_the_cost_is_not_called_solved(monkeypatch):
