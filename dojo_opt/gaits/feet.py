@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.planning.manifold import cross
 from sim.mechanism import checks
-from sim.mechanism.terrain import Terrain
+from sim.mechanism.contact import Contact
 from sim.model.interruptible_loops import rows
 from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
@@ -57,12 +57,7 @@ class Feet:
         self.radius = np.array([c.radius for c in self.contacts])
         self.normal = np.array([np.asarray(c.normal) for c in self.contacts])
         self.height = np.array([c.height for c in self.contacts])
-        # contacts on one surface are asked about together: a spline takes as long for one place as for a hundred
-        self._surfaces: dict[int, tuple[Terrain, list[int]]] = {}
-        for k, c in enumerate(self.contacts):
-            if c.terrain is not None:
-                surface = c.terrain.surface(float(c.radius))
-                self._surfaces.setdefault(id(surface), (surface, []))[1].append(k)
+        self._grounds = _grounds(self.contacts)
 
     @property
     def flat(self) -> bool:
@@ -94,12 +89,8 @@ class Feet:
         """
         at = self.positions(x)
         out = np.empty(at.shape[:-1])
-        for k, c in enumerate(self.contacts):
-            if c.terrain is None:
-                out[..., k] = c.gap(at[..., k, :])
-        for surface, on in self._surfaces.values():
-            px, py, height = at[..., on, 0], at[..., on, 1], at[..., on, 2] - self.height[on]
-            out[..., on] = (height - surface.height(px, py)) * surface.normal(px, py)[..., 2]
+        for contact, on in self._grounds:
+            out[..., on] = contact.gap(at[..., on, :])
         return out
 
     def put_down(self, x: Floats) -> Floats:
@@ -128,9 +119,10 @@ class Feet:
         Returns:
             (k, 3) unit normals, world axes.
         """
-        at, out = self.positions(x), self.normal.copy()
-        for surface, on in self._surfaces.values():
-            out[on] = surface.normal(at[on, 0], at[on, 1])
+        at = self.positions(x)
+        out = np.empty(at.shape)
+        for contact, on in self._grounds:
+            out[on] = contact.normal_at(at[on])
         return out
 
     def touching(self, x: Floats) -> Feet:
@@ -234,3 +226,16 @@ class Feet:
 def _limits(joint: Any) -> list[tuple[float, float]]:
     """(lo, hi) of the scalar coordinates of a joint."""
     return [] if joint.nrot == 3 else list(joint.limits)
+
+
+def _grounds(contacts: Sequence[Contact]) -> list[tuple[Contact, int | list[int]]]:
+    """Contacts, each with its place in the sequence, or with those of all balls of its size on its terrain.
+
+    A spline takes as long for one place as for a hundred.
+    """
+    flat: list[tuple[Contact, int | list[int]]] = [(c, k) for k, c in enumerate(contacts) if c.terrain is None]
+    alike: dict[tuple[int, float, float], tuple[Contact, list[int]]] = {}
+    for k, c in enumerate(contacts):
+        if c.terrain is not None:
+            alike.setdefault((id(c.terrain), c.radius, c.height), (c, []))[1].append(k)
+    return [*flat, *alike.values()]

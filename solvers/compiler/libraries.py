@@ -114,7 +114,8 @@ class InnerLibrary(JITCodeLibrary):
             self._reload_init.update(library._reload_init)
             self._dynamic_globals += library._dynamic_globals
         self._final_module.name = self.name
-        self.content = _content(self._final_module, self._linking_libraries)
+        own = Content((self._final_module.as_bitcode(),), (), _environments(self._final_module))
+        self.content = _joined([own, *map(_content_of, self._linking_libraries)])
         self._final_module = _Names([_Name(name) for name in self.content.environments])
         self._finalized = True
 
@@ -141,11 +142,10 @@ class InnerLibrary(JITCodeLibrary):
         return library
 
 
-def _content(module: Any, libraries: list[Any]) -> Content:
-    """A module, with all that libraries hold, each part once."""
-    own = Content((module.as_bitcode(),), (), _environments(module))
-    parts = [own, *map(_content_of, dict.fromkeys(libraries))]
-    return Content(*(tuple(dict.fromkeys(chain.from_iterable(field))) for field in zip(*parts, strict=True)))
+def _joined(parts: list[Content]) -> Content:
+    """All of them, each piece once."""
+    fields = zip(Content((), (), ()), *parts, strict=True)
+    return Content(*(tuple(dict.fromkeys(chain.from_iterable(field))) for field in fields))
 
 
 def _environments(module: Any) -> tuple[str, ...]:
@@ -221,8 +221,7 @@ class EntryLibrary(JITCodeLibrary):
         """Link the code of all callees, optimise it, and translate it."""
         for library in self._linking_libraries:
             self._reload_init.update(library._reload_init)
-        found = _content(self._final_module, self._linking_libraries)
-        _link(self._final_module, found._replace(kernels=found.kernels[1:]))
+        _link(self._final_module, _joined([*map(_content_of, self._linking_libraries)]))
         self._linking_libraries: list[Any] = []  # for Numba, which links them one by one
         super().finalize()
 

@@ -71,7 +71,8 @@ class _Lower(Lower):
             for statement in block.body:
                 for name in _variables_read(statement):
                     origin = home.get(name, label)
-                    if name not in found if origin == label else not (origin < label and origin in above[label]):
+                    before = name in found if origin == label else origin < label and origin in above[label]
+                    if not before:
                         several.add(name)
                 if isinstance(statement, ir.Assign):
                     found.add(statement.target.name)
