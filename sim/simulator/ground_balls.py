@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sim.mechanism.contact import Contact
+from sim.mechanism.shapes import cross_matrix
 from sim.model.state_columns import BodyState
 from solvers.types import Floats
 
@@ -63,14 +64,8 @@ class GroundBalls:
         contact, body = self._contacts[i], self._bodies[i]
         n = np.asarray(contact.normal_at(center), dtype=np.float64)
         k = int(np.abs(n).argmin())
-        first = _cross(n) @ np.eye(3)[k]
+        first = cross_matrix(n) @ np.eye(3)[k]
         first /= np.linalg.norm(first)
-        frame = np.stack([n, first, _cross(n) @ first])
+        frame = np.stack([n, first, cross_matrix(n) @ first])
         arm = center - contact.radius * n - z[body, BodyState.POSITION]
-        return ((frame @ J[body, :3]) - (frame @ _cross(arm)) @ J[body, 3:]).T, frame
-
-
-def _cross(a: Floats) -> Floats:
-    """[a], the matrix of a x."""
-    x, y, z = a
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        return ((frame @ J[body, :3]) - (frame @ cross_matrix(arm)) @ J[body, 3:]).T, frame

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from sim.derivatives.parameters.directions import Effect
 from sim.derivatives.parameters.parameter import Parameter, Term
 from sim.mechanism.damper_inertia import BEND, Bent, bent, damper_motions, joint_columns
+from sim.mechanism.shapes import cross_matrix
 from sim.model.model import Model
 from solvers.types import Floats
 
@@ -66,7 +67,7 @@ def damper_inertia_rates(model: Model, dofs: NDArray[np.int64]) -> Rates:
 
 def _body_rates(at: Bent, i: int, V: Floats) -> Rates:
     """By mass and inertia of body i: |v|^2 of its centre, w w^T in its axes."""
-    v, w = V[:, :3] + V[:, 3:] @ _crossed(at.center[i]), V[:, 3:] @ at.rotation[i]
+    v, w = V[:, :3] + V[:, 3:] @ cross_matrix(at.center[i]), V[:, 3:] @ at.rotation[i]
     out: Rates = {(int(Effect.MASS), i, 0): np.sum(v * v, axis=1)}
     for k, (a, b) in enumerate(_INERTIA):
         out[int(Effect.INERTIA), i, k] = (1.0 if a == b else 2.0) * w[:, a] * w[:, b]
@@ -84,10 +85,10 @@ def _joint_rates(model: Model, at: Bent, i: int, motion: tuple[Floats, Floats, F
         out[int(Effect.PARENT_POINT), i, k] = _moved(H, before, shift)
         out[int(Effect.CHILD_POINT), i, k] = _moved(H, behind, np.concatenate([-at.rotation[i][:, k], np.zeros(3)]))
         turn = at.frame[i][:, k]
-        twist = np.concatenate([at.joint[i] @ _crossed(turn), turn])
+        twist = np.concatenate([at.joint[i] @ cross_matrix(turn), turn])
         out[int(Effect.ORIENTATION), i, k] = _moved(H, before, twist)
         turned = at.rotation[i][:, k]
-        back = np.concatenate([(at.joint[i] + lead) @ _crossed(turned), turned])
+        back = np.concatenate([(at.joint[i] + lead) @ cross_matrix(turned), turned])
         out[int(Effect.AXIS), i, k] = _moved(H, before, twist) - _moved(H, behind, back)
     if model.joint_nrot[i] == 1:
         d = int(model.body_vadr[i]) + int(model.joint_ntrans[i])
@@ -99,11 +100,6 @@ def _joint_rates(model: Model, at: Bent, i: int, motion: tuple[Floats, Floats, F
 
 def _moved(H: Floats, V: Floats, X: Floats) -> Floats:
     """2 H.(V x X), with the product of twists (v, w) x (v', w') = (w x v' + v x w', w x w')."""
-    along, about = _crossed(X[:3]), _crossed(X[3:])
+    along, about = cross_matrix(X[:3]), cross_matrix(X[3:])
     linear, angular = V[:, 3:] @ along + V[:, :3] @ about, V[:, 3:] @ about
     return np.asarray(2.0 * np.sum(H[:, :3] * linear + H[:, 3:] * angular, axis=1))
-
-
-def _crossed(b: Floats) -> Floats:
-    """The matrix with a @ matrix = a x b, for rows a: NumPy's own product takes ten times as long."""
-    return np.array([[0.0, -b[2], b[1]], [b[2], 0.0, -b[0]], [-b[1], b[0], 0.0]])
