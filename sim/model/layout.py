@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from sim.model.data import Carry, Data
 from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.compiler import Field, Part, record, table
+from solvers.compiler import Field, Part, Table, record, table
 from solvers.lanes import LANES, SIDE, whole
+from solvers.types import Floats
 
 __all__ = ["CARRY_FIELDS", "INTEGERS", "MODEL_FIELDS", "DATA_FIELDS", "Shape", "Sizes", "allocate_model",
-           "allocate_data", "model_view", "sizes_of", "table", "data_view"]  # fmt: skip
+           "allocate_data", "allocate_tables", "model_view", "sizes_of", "table", "data_view"]  # fmt: skip
 
 Shape = tuple[int | str, ...]
 
@@ -215,27 +216,79 @@ def _places(fields: _Fields, sizes: Sizes) -> tuple[int, list[tuple[str, slice, 
     return length, places
 
 
-def _carve(fields: _Fields, sizes: Sizes, kind: Any) -> dict[str, Any]:
-    """Zeroed arrays of these shapes, end to end in one buffer."""
-    length, places = _places(fields, sizes)
-    line = 128 // 8  # a pair of cache lines: arrays that two threads write must not share one
-    buffer: NDArray[Any] = np.zeros(length + 2 * line, dtype=kind)
-    buffer = buffer[-(buffer.ctypes.data // 8) % line :]
+_LINE = 128 // 8  # words of a pair of cache lines: arrays that two threads write must not share one
+
+
+def _carve(fields: _Fields, sizes: Sizes, buffer: NDArray[Any]) -> dict[str, Any]:
+    """Arrays of these shapes, end to end in a buffer."""
+    places = _places(fields, sizes)[1]
     return {name: buffer[at] if len(shape) == 1 else buffer[at].reshape(shape) for name, at, shape in places}
+
+
+def _zeros(count: int, words: int) -> NDArray[np.int64]:
+    """Buffers of zeros (count, words), each of which begins at a pair of cache lines."""
+    width = words + -words % _LINE
+    buffer: NDArray[np.int64] = np.zeros(count * width + _LINE, dtype=np.int64)
+    start = -(buffer.ctypes.data // 8) % _LINE
+    return buffer[start : start + count * width].reshape(count, width)
+
+
+def _halves(parts: tuple[_Fields, ...], sizes: Sizes) -> tuple[int, int]:
+    """Words of the integers and of the floats of a record; floats begin at a pair of cache lines."""
+    integers, floats = (_places(fields, sizes)[0] for fields in parts)
+    return integers + -integers % _LINE, floats
+
+
+def _arrays(parts: tuple[_Fields, ...], sizes: Sizes, buffer: NDArray[np.int64]) -> dict[str, Any]:
+    """The arrays of a record in its buffer."""
+    start = _halves(parts, sizes)[0]
+    integers, floats = parts
+    return _carve(integers, sizes, buffer) | _carve(floats, sizes, buffer[start:].view(np.float64))
 
 
 def allocate_model(sizes: Sizes) -> Model:
     """A Model of zeros."""
-    integers, floats = _MODEL_PARTS
-    return Model(**_carve(integers, sizes, np.int64), **_carve(floats, sizes, np.float64))
+    return Model(**_arrays(_MODEL_PARTS, sizes, _zeros(1, sum(_halves(_MODEL_PARTS, sizes)))[0]))
+
+
+def _data(sizes: Sizes, buffer: NDArray[np.int64]) -> Data:
+    """The Data in a buffer."""
+    arrays = _arrays(_DATA_PARTS, sizes, buffer)
+    carry = Carry(**{name: arrays.pop(name) for name in CARRY_FIELDS})
+    return Data(carry=carry, **arrays)
 
 
 def allocate_data(sizes: Sizes) -> Data:
     """The scratch of one thread, and the state between its steps."""
-    integers, floats = _DATA_PARTS
-    arrays = _carve(integers, sizes, np.int64) | _carve(floats, sizes, np.float64)
-    carry = Carry(**{name: arrays.pop(name) for name in CARRY_FIELDS})
-    return Data(carry=carry, **arrays)
+    return _data(sizes, _zeros(1, sum(_halves(_DATA_PARTS, sizes)))[0])
+
+
+@lru_cache(maxsize=64)
+def _first_table(sizes: Sizes) -> tuple[int, Table, slice]:
+    """Words of a Data, its table as if its buffer began at address 0, and the place of its contact frames."""
+    buffer = _zeros(1, sum(_halves(_DATA_PARTS, sizes)))[0]
+    data = _data(sizes, buffer)
+    words = table(data)
+    words[::3] -= buffer.ctypes.data
+    start = (data.contact_frame.ctypes.data - buffer.ctypes.data) // 8
+    return len(buffer), words, slice(start, start + data.contact_frame.size)
+
+
+def allocate_tables(sizes: Sizes, count: int) -> tuple[Table, Floats]:
+    """Many Data at once, as tables only, since the views of their arrays take longer to make than a step.
+
+    Args:
+        sizes: counts of the mechanism.
+        count: number of Data.
+
+    Returns:
+        Their tables (count, words), and their contact frames (count, 9 nground), which keep all their arrays alive.
+    """
+    length, first, frames = _first_table(sizes)
+    buffer = _zeros(count, length)
+    tables = np.tile(first, (count, 1))
+    tables[:, ::3] += buffer.ctypes.data + 8 * length * np.arange(count)[:, None]
+    return tables, buffer.view(np.float64)[:, frames]
 
 
 def sizes_of(model: Model) -> Sizes:

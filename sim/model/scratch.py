@@ -7,7 +7,7 @@ import threading
 
 import numpy as np
 
-from sim.model.layout import Sizes, allocate_data, table
+from sim.model.layout import Sizes, allocate_tables
 from solvers.compiler import Table
 from solvers.types import Vector
 
@@ -26,18 +26,18 @@ class Scratch:
     def tables(self, count: int) -> Table:
         """Tables of `count` Data, (count, ...)."""
         kept = self._kept.__dict__
-        buffers = kept.setdefault("buffers", [])
+        frames = kept.setdefault("frames", [])  # of the Data so far, which they keep alive
         if kept.setdefault("turns", self._turns) != self._turns:
-            for data in buffers:
-                data.contact_frame[:] = self._contact_frame
+            for part in frames:
+                part[:] = self._contact_frame.ravel()
             kept["turns"] = self._turns
-        while len(buffers) < count:
-            buffers.append(allocate_data(self._sizes))
-            buffers[-1].contact_frame[:] = self._contact_frame
-        if len(self._kept.__dict__.get("tables", ())) < count:
-            self._kept.tables = np.array([table(data) for data in buffers])
-        out: Table = self._kept.tables[:count]
-        return out
+        known: Table | None = kept.get("tables")
+        if known is None or len(known) < count:
+            more, frame = allocate_tables(self._sizes, count - (0 if known is None else len(known)))
+            frame[:] = self._contact_frame.ravel()
+            frames.append(frame)
+            known = kept["tables"] = more if known is None else np.concatenate([known, more])
+        return known[:count]
 
     def table(self) -> Table:
         """Table of the first Data."""

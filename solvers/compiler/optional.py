@@ -98,6 +98,7 @@ class OptionalKernel:
         self.func, self.slot, self.default, self._compiler = func, slot, default, compiler
         self.name = f"{func.__module__}:{func.__name__}"
         self._code: Any = None
+        self._address = 0
         _EVERY.append(self)
 
     def __call__(self, *args: Any) -> Any:
@@ -140,8 +141,10 @@ class OptionalKernel:
                 found = code.signature.return_type
                 raise TypeError(f"optional kernel {self.name}: expected to return {declared.return_type}, got {found}")
             self._code = code
-        with signals_held():  # llvmlite would keep its lock for ever, if an exception came as it leaves the lock
-            return int(self._code.library.get_pointer_to_function(self._code.fndesc.llvm_func_name))
+        if not self._address:  # which every new scene asks for again
+            with signals_held():  # llvmlite would keep its lock for ever, if an exception came as it leaves the lock
+                self._address = int(self._code.library.get_pointer_to_function(self._code.fndesc.llvm_func_name))
+        return self._address
 
     @cached_property
     def _call(self) -> Any:

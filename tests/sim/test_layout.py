@@ -19,6 +19,7 @@ from sim.model.layout import (
     Sizes,
     allocate_data,
     allocate_model,
+    allocate_tables,
     data_view,
     model_view,
     sizes_of,
@@ -145,9 +146,14 @@ def test_a_motion_begins_without_the_state_of_the_one_before() -> None:
 @pytest.mark.parametrize("sizes", [ALL, BARE])
 def test_no_two_fields_share_memory(sizes: Sizes) -> None:
     """The compiler counts on it: what is written to one field leaves all others as they were."""
-    ranges = []
-    for arrays in (arrays_of(allocate_data(sizes)), arrays_of(allocate_model(sizes))):
+    ranges, one = [], allocate_data(sizes)
+    tables, frames = allocate_tables(sizes, 3)
+    many = [data_view(words) for words in tables]
+    for arrays in map(arrays_of, (one, allocate_model(sizes), *many)):
         ranges += [(a.ctypes.data, a.ctypes.data + a.nbytes) for a in arrays.values() if a.size]
+    for data, frame in zip(many, frames, strict=True):
+        assert [a.shape for a in arrays_of(data).values()] == [a.shape for a in arrays_of(one).values()]
+        assert data.contact_frame.size == 0 or data.contact_frame.ctypes.data == frame.ctypes.data
     ranges.sort()
     assert len(ranges) > 100
     assert all(end <= start for (_, end), (start, _) in zip(ranges[:-1], ranges[1:], strict=True))
