@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.mechanism.shapes import cross_matrix
 from sim.model.model import Law, Model
 from solvers.types import Floats
 
@@ -29,22 +30,23 @@ def pack_clusters(model: Model) -> None:
         body = int(model.contact_body[first])
         mass, turning = _mobility(model, body)
         inertia, easy = model.body_inertia[body], turning**0.5
-        swing = max(_swing(inertia, p) + r * easy for p, r in zip(points, radii, strict=True))
+        swing = float(np.max(_swings(inertia, points) + radii * easy))
         spread = float(np.max(np.linalg.norm(points - center, axis=1)))
         mobility = mass + swing * swing + 2.0 * spread * swing * easy
         friction = model.contact_friction[first:end].max()
         model.cluster_end[first] = end
-        turn = _swing(inertia, points.mean(axis=0)) * easy
+        turn = float(_swings(inertia, points.mean(axis=0, keepdims=True))[0]) * easy
         several = np.count_nonzero(model.contact_body[:count] == body)
         others = radii.any() or model.contact_terrain[first] or np.any(model.contact_law[first:end] == _LINEAR)
         corners = end - first > MANY and not others
         model.cluster[first] = *center, around, arm, mobility, friction, turn, several, corners
 
 
-def _swing(inertia: Floats, p: Floats) -> float:
-    """Largest |J^-1/2 (p x f)| of a unit force f: how easily a body turns under a force at p."""
+def _swings(inertia: Floats, points: Floats) -> Floats:
+    """Largest |J^-1/2 (p x f)| (n,) of a unit force f at each of the points (n, 3): how easily it turns a body."""
     values, axes = np.linalg.eigh(inertia.reshape(3, 3))
-    return float(np.linalg.norm(np.cross(axes.T, p) / np.sqrt(values)[:, None], ord=2))
+    moments = np.array([axes.T @ cross_matrix(p) for p in points])
+    return np.asarray(np.linalg.norm(moments / np.sqrt(values)[:, None], ord=2, axis=(1, 2)))
 
 
 def _mobility(model: Model, body: int) -> tuple[float, float]:

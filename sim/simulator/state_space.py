@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from sim.dynamics.loops.loop_rank import LoopRank
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.pack import mechanism_sizes, pack
+from sim.mechanism.pack import pack
 from sim.mechanism.renamed import renamed
+from sim.model.layout import sizes_of
 from sim.model.record_columns import StepReport
 from sim.simulator.arguments import Arguments, shaped
 from sim.simulator.describe import describe
@@ -50,7 +51,7 @@ class StateSpace:
         self.time_step, self.kappa, self.tolerance, self.max_iterations, self.order, self.divide = settings[:6]
         self.accuracy, self.cutoff = settings.accuracy or None, settings.cutoff
         self.model = pack(mechanism)
-        sizes = mechanism_sizes(mechanism)
+        sizes = sizes_of(self.model)
         self.nbody, self.nq, self.nv, self.ncontact, self.nu = sizes[:4] + (sizes.nu,)
         self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
         self._engine = engine_of(self.model, mechanism, settings)
