@@ -1,16 +1,22 @@
 """Fixtures for all tests."""
 
+from __future__ import annotations
+
 import gc
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
 import pytest
+
+if TYPE_CHECKING:
+    import numpy as np
 
 sys.path.append(str(Path(__file__).parent.parent))  # benchmarks; at the end, so that an installed dojo_opt is tested
 # threads of a worker that wait do not take the cores from the other workers: half the processor time of batches
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is imported, so not here
 os.environ.setdefault("DOJO_OPT_JOBS", "1")  # workers of pytest-xdist share the cores already
 os.environ["PYTHONSAFEPATH"] = "1"  # nor do processes that tests start import the folder they run in: it has no kernels
 
@@ -53,4 +59,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture
 def rng() -> np.random.Generator:
     """One seed for all random tests."""
+    import numpy as np
+
     return np.random.default_rng(20240501)

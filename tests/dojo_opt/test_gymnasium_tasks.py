@@ -60,7 +60,7 @@ print(json.dumps([name for name in compiled(users=True) if name not in compiled(
 @pytest.mark.slow
 @pytest.mark.skipif(numba.config.DISABLE_JIT or not FAST, reason="functions of the user are kept by the fast compiler")
 def test_the_next_process_compiles_no_function_of_a_task():
-    program = USERS_CODE.replace("NAME", "Quadruped")  # whose model is our own, so that Gymnasium's are not read
+    program = USERS_CODE.replace("NAME", "Pendulum")  # whose model is our own, so that Gymnasium's are not read
     python(program)
     assert json.loads(python(program)) == []
 

@@ -11,7 +11,7 @@ from support.planned_legs import lands, lowest_foot
 @pytest.mark.parametrize(
     "distance, height",
     [(0.3, 0.2)]
-    + [pytest.param(*leap, marks=pytest.mark.slow) for leap in [(0.2, 0.2), (0.5, 0.25), (0.3, 0.3), (-0.2, 0.2)]],
+    + [pytest.param(*leap, marks=pytest.mark.slow) for leap in [(0.2, 0.2), (0.3, 0.3), (-0.2, 0.2)]],
 )
 def test_leap_is_found_from_standing_and_a_goal(distance, height):
     """Planned with steps of 20 ms it may stumble in shorter ones; cut into five at last, it holds at 1 ms.
@@ -21,8 +21,7 @@ def test_leap_is_found_from_standing_and_a_goal(distance, height):
     problem = problems.leap(distance=distance, height=height)
     assert np.ptp(problem.states0[1:], axis=0).max() == 0.0 and np.ptp(problem.controls0, axis=0).max() == 0.0
     plan = ilqr(problem)
-    # the longest takes 311 since dampers are of second order, and damp the motion within a step less
-    assert plan.success and plan.nit <= (320 if distance == 0.5 else 80), plan.summary()
+    assert plan.success and plan.nit <= 80, plan.summary()
     assert plan.nit == len(plan.history) and plan.substeps == 5 and plan.time[-1] == pytest.approx(1.0)
     assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(height, abs=0.01)
     assert lowest_foot(problem, plan).max() > 0.1

@@ -290,7 +290,7 @@ def growth(heights):
     for height in heights:
         plan(height)
     return (rss() - first) / len(heights)
-print(growth([never] * 5), growth([never + 1.0 + i for i in range(6)]))
+print(growth([never] * 3), growth([never + 1.0 + i for i in range(4)]))
 """
 
 

@@ -32,7 +32,7 @@ DRAWN = 500  # pixels of 480 x 360 that a robot covers at least
 
 
 @pytest.fixture(scope="module")
-def page():
+def window():
     """A page of a headless Chromium, the system's or playwright's own, which draws without a graphics card."""
     playwright = pytest.importorskip("playwright.sync_api")
     names = ("chromium", "chromium-browser", "google-chrome")
@@ -45,6 +45,13 @@ def page():
             pytest.skip(f"no Chromium: {error}")
         yield browser.new_page(viewport={"width": 480, "height": 360})
         browser.close()
+
+
+@pytest.fixture
+def page(window):
+    """The page, empty again after the test: a scene is drawn on and on, which takes a core without a graphics card."""
+    yield window
+    window.goto("about:blank")
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import pytest
 import dojo_opt as dojo
 from support.urdf_files import inertial, joint, link, write
 
-LINKS, FEWER = 2000, 500
+LINKS, FEWER = 1200, 300
 LINEAR = LINKS / FEWER
 TRIES = 4  # a slow loader fails in each of them, a busy machine does not
 
