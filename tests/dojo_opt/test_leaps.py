@@ -10,8 +10,7 @@ from support.planned_legs import lands, lowest_foot
 
 @pytest.mark.parametrize(
     "distance, height",
-    [(0.3, 0.2)]
-    + [pytest.param(*leap, marks=pytest.mark.slow) for leap in [(0.2, 0.2), (0.3, 0.3), (-0.2, 0.2)]],
+    [(0.3, 0.2)] + [pytest.param(*leap, marks=pytest.mark.slow) for leap in [(0.2, 0.2), (0.3, 0.3), (-0.2, 0.2)]],
 )
 def test_leap_is_found_from_standing_and_a_goal(distance, height):
     """Planned with steps of 20 ms it may stumble in shorter ones; cut into five at last, it holds at 1 ms.
