@@ -61,6 +61,7 @@ ROBOTS = {
     "HyQ": TestedRobot("hyq_description/robots/hyq_no_sensors.urdf"),
     "Bolt": TestedRobot("bolt_description/robots/bolt.urdf", {"FL_FOOT": 0.0275, "FR_FOOT": 0.0275}),
     "G1": TestedRobot("g1_description/urdf/g1_29dof_rev_1_0.urdf"),
+    "Talos": TestedRobot("talos_data/robots/talos_reduced.urdf"),
     "Panda": TestedRobot(
         "panda_description/urdf/panda.urdf", None, "panda_hand", (0, -0.8, 0, -2.3, 0, 1.6, 0.8, 0.02, 0.02)
     ),

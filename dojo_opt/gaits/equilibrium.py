@@ -133,6 +133,15 @@ def _check_friction(name: str, feet: Feet, cosines: Floats, force: Floats) -> No
             )
 
 
+class _Balance(NamedTuple):
+    """The forces at a state, and how they change by motions along (nv, n)."""
+
+    left: Floats  # (m,) what nothing holds
+    slope: Floats  # (m, n) its derivative
+    change: Callable[[Floats], float]  # largest relative change of a gap, or distance from a stop, by a motion (nv,)
+    weight: float  # largest generalised force of gravity and springs
+
+
 class _Rest(NamedTuple):
     """The search for a state of rest of a robot on contacts."""
 
@@ -184,21 +193,19 @@ class _Rest(NamedTuple):
         along: (nv, n) motions that it may take.
         """
         for _ in range(rounds):
-            left, slope, change = self.slopes(state, along, kappa)
-            weight = np.abs(potential_gradient(self.sim, state)).max()
-            if np.abs(left).max(initial=0.0) < 1e-9 * weight or self.feet.gaps(state).min() <= 0.0:
+            at = self.balance(state, along, kappa)
+            if np.abs(at.left).max(initial=0.0) < 1e-9 * at.weight or self.feet.gaps(state).min() <= 0.0:
                 break
-            by = along @ np.linalg.lstsq(slope, -left, rcond=_RANK)[0]
-            state = self.motions.move(self.sim, state, by * min(1.0, 0.5 / change(by)))
+            by = along @ np.linalg.lstsq(at.slope, -at.left, rcond=_RANK)[0]
+            state = self.motions.move(self.sim, state, by * min(1.0, 0.5 / at.change(by)))
         return state
 
-    def slopes(self, state: Floats, along: Floats, kappa: float) -> tuple[Floats, Floats, Callable[[Floats], float]]:
-        """What nothing holds (m,), its derivative by motions `along` (m, n), and the largest relative change of a gap
-        or of the distance from a stop by a motion (nv,).
-        """
+    def balance(self, state: Floats, along: Floats, kappa: float) -> _Balance:
+        """The forces at a state, with their derivatives by motions `along` (nv, n)."""
         loose, gap, (down, up, _) = self.motions.loose, self.feet.gaps(state), _under(self.feet, state)
         force, (below, above) = self.forces(state, kappa), _stop_distances(self.sim, state)
-        left = self.motions.left(self.load(state, kappa) - up.T @ force)
+        gravity = potential_gradient(self.sim, state)
+        left = self.motions.left(gravity - stop_torques(self.sim, state, kappa) - up.T @ force)
         stiff = kappa / self.sim.time_step * (1.0 / below**2 + 1.0 / above**2)
         slope = (up @ loose).T @ ((force / gap)[:, None] * (down @ along)) + loose.T @ (stiff[:, None] * along)
 
@@ -206,7 +213,7 @@ class _Rest(NamedTuple):
             parts = (down @ by / gap, by / below, by / above)
             return max(1e-300, *(float(np.abs(part).max(initial=0.0)) for part in parts))
 
-        return left, slope, change
+        return _Balance(left, slope, change, float(np.abs(gravity).max()))
 
     def leaned(self, state: Floats, iterations: int) -> Floats:
         """The state that shifts its weight over its contacts, where these are too few to carry it as it is."""
@@ -214,7 +221,7 @@ class _Rest(NamedTuple):
         weight = float(np.abs(potential_gradient(sim, state)).max())
         for _ in range(_LEANS):
             state = self.standing(state, _LOWEST[-1], iterations)
-            left, _, _ = self.slopes(state, allowed, sim.kappa)
+            left = self.balance(state, allowed, sim.kappa).left
             if self.feet.gaps(state).min() <= 0.0 or np.abs(left).max(initial=0.0) < _BALANCED * weight:
                 break
             loaded = self.forces(state, sim.kappa) > 1e-3 * weight
@@ -267,11 +274,11 @@ class _Rest(NamedTuple):
         """
         sim, loose, level = self.sim, self.motions.loose, self.potential(state, kappa)
         for _ in range(_SETTLED):
-            left, slope, limit = self.slopes(state, loose, kappa)
-            if np.abs(left).max(initial=0.0) < _LEFT * np.abs(potential_gradient(sim, state)).max():
+            at = self.balance(state, loose, kappa)
+            if np.abs(at.left).max(initial=0.0) < _LEFT * at.weight:
                 break
-            by = loose @ np.linalg.lstsq(slope, -left, rcond=_RANK)[0]
-            by *= min(1.0, 0.5 / limit(by), _STRIDE / np.abs(by).max(initial=1e-300))
+            by = loose @ np.linalg.lstsq(at.slope, -at.left, rcond=_RANK)[0]
+            by *= min(1.0, 0.5 / at.change(by), _STRIDE / np.abs(by).max(initial=1e-300))
             for _ in range(_HALVINGS):
                 moved = self.motions.move(sim, state, by)
                 now = self.potential(moved, kappa)

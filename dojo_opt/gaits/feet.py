@@ -93,6 +93,23 @@ class Feet:
             out[..., on] = contact.gap(at[..., on, :])
         return out
 
+    def landed(self, x: Floats) -> Floats:
+        """Places of the balls where the feet stand below or above where they are.
+
+        The balls of a body move down or up together, until the lowest one touches the ground: a sole that is not quite
+        flat, as the hull of a mesh, keeps its form.
+
+        Args:
+            x: (nx,) state.
+
+        Returns:
+            (k, 3) centres, world axes [m].
+        """
+        out, gaps = self.positions(x), self.gaps(x)
+        for body in set(self._body.tolist()):
+            out[self._body == body, 2] -= gaps[self._body == body].min()
+        return out
+
     def put_down(self, x: Floats) -> Floats:
         """Move a robot on a floating base up or down until its lowest ball touches the ground.
 

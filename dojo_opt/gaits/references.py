@@ -311,10 +311,7 @@ def _check_legs(call: str, sim: Simulator) -> None:
 
 def _ground(sim: Simulator) -> Floats:
     """(k, 3) feet of the neutral state, put onto the ground."""
-    feet = Feet(sim)
-    places = feet.positions(sim.neutral())
-    places[:, 2] -= feet.gaps(sim.neutral())
-    return places
+    return Feet(sim).landed(sim.neutral())
 
 
 def _whole(call: str, duration: float, step: float) -> int:

@@ -40,8 +40,7 @@ def highest_rise(sim: Simulator, limits: Any) -> float:
     if weight == 0.0 or sprung or not np.all(np.isfinite(low) & np.isfinite(high)):
         return np.inf
     feet = Feet(sim)
-    at = feet.positions(sim.neutral())
-    places = at - np.array([0.0, 0.0, 1.0]) * feet.gaps(sim.neutral())[:, None]
+    places = feet.landed(sim.neutral())
     dz = _STEP * float(sim.neutral()[2] - places[:, 2].min())
     down, up = (_stroke(feet, places, step) for step in (-dz, dz))
     states = np.array([*down[::-1], sim.neutral(), *up])

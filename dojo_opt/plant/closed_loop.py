@@ -13,6 +13,7 @@ from dojo_opt.planning.component_names import chosen_components
 from dojo_opt.plant.ground_plane import GroundPlane
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import Tick
+from sim import drawn
 from sim.mechanism import checks
 from sim.mechanism.memory_limit import check_room
 from sim.mechanism.short_repr import short_table
@@ -69,7 +70,7 @@ class ClosedLoop:
 
     def _repr_html_(self) -> str:
         rows = [] if self.reference is None else list(self.by_coordinate().items())
-        return short_table(repr(self), ("coordinate", "rms error [m or rad]"), rows)
+        return drawn(self) + short_table(repr(self), ("coordinate", "rms error [m or rad]"), rows)
 
     @property
     def duration(self) -> float:

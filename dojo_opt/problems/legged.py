@@ -285,8 +285,7 @@ def _lowered(sim: Simulator, by: Floats) -> tuple[Floats, Floats]:
     The centre of mass of a robot on flat feet stays over their middle: no leg before or behind keeps it from falling.
     """
     feet, x = Feet(sim), np.tile(sim.neutral(), (len(by), 1))
-    places = feet.positions(x[0])
-    places[:, 2] -= feet.gaps(x[0])
+    places = feet.landed(x[0])
     x[:, 2] -= by
     where = np.tile(places, (len(by), 1, 1))
     if feet.flat:

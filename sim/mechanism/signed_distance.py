@@ -24,6 +24,8 @@ Field = Callable[[Floats], ArrayLike]
 
 _LEAST = 4  # values along each axis
 _MARGIN = 3  # cells around a mesh
+_PARTS_OF_LONGEST = (25, 50, 100)  # spacings that are tried for a mesh
+_ERROR, _VOLUME_ERROR = 0.025, 0.05  # shares of the longest side and of the volume, between a mesh and the surface
 _MOST = 1e8  # points of a grid: .8 GB
 _FINEST, _COARSEST = 1e-9, 1e6  # spacings [m]: beyond, squares of lengths lose their digits
 _STAND = 32  # points on which it stands
@@ -173,12 +175,14 @@ class SignedDistance(Solid):
         return cls(distances_to_level(raw.level_set), origin, spacing, **place)
 
     @classmethod
-    def from_mesh(cls, mesh: Any, spacing: float, **place: Any) -> SignedDistance:
+    def from_mesh(cls, mesh: Any, spacing: float | None = None, **place: Any) -> SignedDistance:
         """The solid inside of a closed mesh; edges are rounded, by about one cell.
 
         Args:
             mesh: path of a file that trimesh reads (extra `meshes`), a trimesh.Trimesh, or (vertices, faces).
-            spacing: distance of neighbouring grid points; the grid ends three cells beyond the mesh [m].
+            spacing: distance of neighbouring grid points; the grid ends three cells beyond the mesh [m] (default None:
+                a twenty-fifth of the longest side of the mesh, or finer, such that the corners and the centres of its
+                triangles are within a fortieth of this side of the surface, and the volume right to 5 %).
             **place: further fields of the shape, such as `offset`, `center` and `orientation`.
 
         Returns:
@@ -186,16 +190,28 @@ class SignedDistance(Solid):
 
         Raises:
             ImportError: a path, without trimesh.
-            ValueError: the mesh is not closed, or thinner than the grid resolves.
+            ValueError: the mesh is not closed, or thinner than the grid resolves, be it the finest that is chosen.
         """
         call = "SignedDistance.from_mesh"
         vertices, faces = _triangles(call, mesh)
-        spacing = checks.number(f"{call}(spacing=...)", spacing, above=0.0)
-        around = _MARGIN * spacing
-        bounds = np.array([vertices.min(axis=0) - around, vertices.max(axis=0) + around])
-        origin, counts, points = _grid(call, bounds, spacing)
-        values = distances_to_mesh(call, points, counts, vertices, faces)
-        return cls(values, origin, spacing, **place)
+        if spacing is not None:
+            spacing = checks.number(f"{call}(spacing=...)", spacing, above=0.0)
+            return cls(*_around(call, vertices, faces, spacing), spacing, **place)
+        longest = float(np.ptp(vertices, axis=0).max(initial=0.0))
+        corners = vertices[faces]
+        seen = np.concatenate([corners.reshape(-1, 3), corners.mean(axis=1)])
+        volume = abs(float(np.linalg.det(corners - vertices.mean(axis=0)).sum())) / 6.0
+        for part in _PARTS_OF_LONGEST:
+            values, origin = _around(call, vertices, faces, longest / part)
+            if values.min() < 0.0:
+                solid = LevelSet(values, origin, longest / part)
+                error = float(np.linalg.norm(solid.settled(seen)[0] - seen, axis=1).max())
+                if error <= _ERROR * longest and abs(solid.moments(0.0)[0] - volume) <= _VOLUME_ERROR * volume:
+                    return cls(values, origin, longest / part, **place)
+        raise ValueError(
+            f"{call}(mesh): parts of it are too thin for a spacing of {longest / part:.3g} m, the finest that is "
+            "chosen; give spacing=..."
+        )
 
     def about_centroid(self) -> SignedDistance:
         """The shape with the centroid of the solid at its origin, as needed for a body that takes its inertia from the
@@ -371,6 +387,14 @@ def _grid(call: str, bounds: ArrayLike, spacing: float) -> tuple[Floats, tuple[i
     axes = [box[0, k] + spacing * np.arange(counts[k]) for k in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     return box[0], tuple(counts.tolist()), points
+
+
+def _around(call: str, vertices: Floats, faces: NDArray[np.int64], spacing: float) -> tuple[Floats, Floats]:
+    """Signed distances to a mesh on a grid around it, and its first point."""
+    around = _MARGIN * spacing
+    bounds = np.array([vertices.min(axis=0) - around, vertices.max(axis=0) + around])
+    origin, counts, points = _grid(call, bounds, spacing)
+    return distances_to_mesh(call, points, counts, vertices, faces), origin
 
 
 def _sampled(call: str, f: Field, points: Floats) -> Floats:

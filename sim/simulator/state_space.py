@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sim import drawn
 from sim.dynamics.loops.loop_rank import LoopRank
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
@@ -63,6 +65,9 @@ class StateSpace:
         if hasattr(self, "_arguments"):
             raise AttributeError(f"Simulator.{name}: a Simulator does not change; use replace({name}=...)")
         super().__setattr__(name, value)
+
+    def _repr_html_(self) -> str:
+        return drawn(self.mechanism) + f"<p>{escape(repr(self))}</p>"
 
     @property
     def second_order_reason(self) -> str:

@@ -65,6 +65,20 @@ def test_inverse_kinematics_reaches(sim, rng):
     assert np.all(placed[:, 9:19:3] < -1.0)  # knees stay bent to their side
 
 
+def test_a_sole_lands_as_it_is():
+    """Its balls keep their heights; all on the ground at once they would have asked for another sole."""
+    mech = models.quadruped()
+    bumps = [replace(c, point=np.asarray(c.point) + (0.02, 0.0, 0.004), name=f"{c.name} bump") for c in mech.contacts]
+    robot = Simulator(replace(mech, contacts=[*mech.contacts, *bumps]), time_step=0.02)
+    x, feet = robot.neutral(), Feet(robot)
+    x[2] += 0.05
+    fallen = feet.landed(x) - feet.positions(x)
+    np.testing.assert_allclose(fallen[4:], fallen[:4], atol=1e-15)
+    lowest = np.minimum(*feet.gaps(x).reshape(2, 4))
+    np.testing.assert_allclose(fallen[:4, 2], -lowest, atol=1e-15)
+    assert np.ptp(feet.gaps(x)) > 1e-3
+
+
 def test_inverse_kinematics_names_the_foot_out_of_reach(sim):
     feet, x = Feet(sim), sim.neutral()
     far = feet.positions(x)[None]

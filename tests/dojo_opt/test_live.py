@@ -24,8 +24,11 @@ def test_a_notebook_shows_motions(sim):
     page = html.unescape(re.search(r'srcdoc="([^"]*)"', shown).group(1))
     assert page.startswith("<!DOCTYPE html>") and page.count("new MeshCat.Viewer") == 1 and "pendulum" in page
     assert "http://" not in shown.split("srcdoc")[0]
-    standing = sim.mechanism._repr_html_()
-    assert "new MeshCat.Viewer" in html.unescape(standing) and "Mechanism(pendulum" in standing
+    loop = dojo.closed_loop(lambda time, x: np.zeros(sim.nu), dojo.Plant(sim), 0.1)
+    assert "new MeshCat.Viewer" in html.unescape(loop._repr_html_())
+    for thing, name in ((sim.mechanism, "Mechanism"), (sim, "Simulator")):
+        standing = thing._repr_html_()
+        assert "new MeshCat.Viewer" in html.unescape(standing) and f"<p>{name}(pendulum" in standing
     plan = dojo.ilqr(dojo.problems.swingup("pendulum"), max_iterations=2)
     assert "srcdoc" in plan._repr_html_() and "<table>" in plan._repr_html_()
     plan.problem = plan.simulator = None

@@ -67,6 +67,9 @@ def test_a_mesh_of_a_box_is_a_box() -> None:
     np.testing.assert_allclose(np.ravel(shape.values), box(grid), atol=1e-9)
     with pytest.raises(ValueError, match="not closed"):
         dojo.SignedDistance.from_mesh((corners, np.array(faces[1:])), 0.05)
+    chosen = dojo.SignedDistance.from_mesh((corners, np.array(faces)))
+    off = np.linalg.norm(chosen.level_set.settled(corners)[0] - corners, axis=1).max()
+    assert chosen.spacing == 0.6 / 25.0 and 0.0 < off <= 0.6 / 40.0
 
 
 @pytest.mark.parametrize("kind", [Pair.SPHERE_FIELD, Pair.CAPSULE_FIELD], ids=["ball", "capsule"])
