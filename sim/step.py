@@ -76,7 +76,7 @@ def _checked(
 
 @inlined
 def _look_ahead(data: Data, v: Vector) -> None:
-    """Extrapolate the velocity from v and that of this step: where the next one looks first (globalization.py)."""
+    """Extrapolate the velocity from v and that of this step: where the next one looks first (known_start.py)."""
     for d in range(v.shape[0]):
         data.carry.next_velocity[d] = 2.0 * data.nu[d] - v[d]
 

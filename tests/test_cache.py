@@ -389,7 +389,7 @@ OTHER_PAIRS = (
 )  # fmt: skip
 
 
-HARD = "complementarity interior_point inequalities globalization direction step_length merit".split()
+HARD = "complementarity interior_point inequalities globalization known_start direction step_length merit".split()
 NO_CONTACTS = ("solvers.cones", "sim.contact", "sim.dynamics.joints.limits", *(f"sim.solve.{name}" for name in HARD))
 
 # lines that take numbers or lanes of them, rows of one layout or another; the loop over time, with a law and without:

@@ -22,6 +22,8 @@ from solvers.lanes import LANES, Lanes, load, spread, store, total
 from solvers.rotation import transposed_times
 from solvers.types import Matrix, Vector
 
+_WEAK = 32.0  # activation gaps beyond which e (inactive.py) is 1e-2 at most: Newton's method converges without
+
 
 @inlined
 def _add(S: Matrix, r: int, x: Lanes) -> None:
@@ -136,7 +138,8 @@ def add_corner_laws(model: Model, data: Data, h: float, indefinite: float, fresh
     for m in range(data.inactive_count[0]):
         c = data.inactive_first[m]
         row = data.inactive[c]
-        if row[Inactive.CORNERS] == 0.0:
+        weak = row[Inactive.LEAST_GAP] > _WEAK * row[Inactive.ACTIVATION]
+        if row[Inactive.CORNERS] == 0.0 or (weak and not fresh):
             continue
         if fresh or row[Inactive.SHARE] != indefinite:
             _sum_laws(model, data, h, c, indefinite)

@@ -200,6 +200,7 @@ class Data(NamedTuple):
     delassus: Matrix  # (nreach, nreach) transposed: rates by unit impulses
     reach_rate: Vector  # (nreach,) gaps and slips
     reach_impulse: Vector  # (nreach,)
+    reach_change: Vector  # (nreach,) of the impulses
     reach_friction: Vector  # (nreach,) coefficients, in the first row of a contact
     # derivatives
     A1: Matrix  # (nbody, 36) d(balance)/d(pose 1), about O

@@ -1,6 +1,6 @@
 """Globalization: the strategies from which the interior point starts, in the order in which they are tried.
 
-The first strategy begins with a known approximation (`known_start`). The others are rescues: an attempt that
+The first strategy begins with a known approximation (known_start.py). The others are rescues: an attempt that
 ends in a fold of the central path is given up, and the next one starts elsewhere, at another kappa0. Some solutions lie
 beyond folds, such as those of legs that jam between a joint limit and the ground.
 
@@ -15,30 +15,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.contact.active_contacts import lands
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import FeatureChoice, Guess, StepOptions
-from sim.solve.inequalities import (
-    keep_inequalities,
-    move_inequalities,
-    resume_inequalities,
-    start_inequalities,
-    total_impulse,
-)
-from sim.solve.merit import residuals
-from sim.solve.prediction import predict, predictable
+from sim.model.options import FeatureChoice, StepOptions
+from sim.solve.inequalities import start_inequalities
 from sim.solve.step_length import largest_turn
-from sim.solve.trial_velocity import INFEASIBLE, set_trial_velocity
+from sim.solve.trial_velocity import set_trial_velocity
 from solvers.codes import Code
 from solvers.compiler import inlined, kernel
 from solvers.types import Vector
 
-_AT_REST = 0.1  # residual at kappa, over that on the central path of kappa0, of a guess that may start at kappa
-_RESUMED = 3e-4  # [N s m] least kappa of a start near the impulses of the step before
-_BALANCED = 0.3  # residual with these impulses, over that near them, of a motion that may start at kappa
-_AHEAD = 1e-2  # share of the tolerance for the first iteration from a line: how fast errors fall is not known yet
-_GOES_ON = 0.1  # residual with these impulses, over their sum, of a motion that keeps them
 _GROWTH = 3.0  # of kappa0, from one strategy to the next
 _GROWTHS = 8  # strategies after which kappa0 is reset
 _GOLDEN = 0.6180339887498949
@@ -124,15 +110,6 @@ _FRACTION = np.array([s.velocity_fraction for s in STRATEGIES])
 _KAPPA_GROWTH = np.array([s.growth for s in STRATEGIES])
 
 
-class KnownStart(NamedTuple):
-    """The start of the strategies KNOWN, whose iterate is in `data`."""
-
-    found: bool  # otherwise the list begins with UNKNOWN
-    kappa: float  # of the central path on which it is
-    balance: tuple[float, float]  # residuals there
-    share: float  # of the tolerance, within which its first iteration has to end
-
-
 @kernel
 def strategy(k: int) -> Strategy:
     """Strategy k of the list."""
@@ -153,126 +130,6 @@ def strategy(k: int) -> Strategy:
 def from_last_iterate(s: Strategy) -> Strategy:
     """The repetition of a strategy with other features: from where it ended, on the path of the usual kappa0."""
     return Strategy(Start.LAST_ITERATE.value, False, False, s.features, s.replace_features, s.overlap, False, 1.0, 1.0)
-
-
-@kernel
-def known_start(
-    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], guess: Guess
-) -> KnownStart:
-    """The first of these that is near the solution, with its iterate in `data`:
-
-        ahead       on a line through the last two velocities, with the impulses of the step before
-        warm        at the guess, with the impulses of the step before
-        predicted   at the prediction of the linearised step (prediction.py)
-        resumed     near these impulses, on the central path of a larger kappa
-        at kappa    at the guess, with the impulses kappa / gap: a robot at rest
-
-    inputs: (q, v, u)
-    """
-    q, v, u = inputs
-    h = options.h
-    kappa = options.kappa
-    if data.active_count[0] + model.limit_dof.shape[0] + model.dry_dof.shape[0] == 0:  # without a central path
-        if set_trial_velocity(model, data, h, q, guess.velocity, 1.0):
-            return KnownStart(True, kappa, residuals(model, data, h, q, v, u), 1.0)
-        return KnownStart(False, kappa, INFEASIBLE, 1.0)
-    keep_inequalities(model, data)
-    if guess.impulses and data.active_count[0] == data.active_ground_count[0]:  # pairs may have other points now
-        if predictable(model, data):
-            start = warm_or_predicted(model, data, options, inputs, guess.velocity)
-            if start.found:
-                return start
-        return warm_or_resumed(model, data, options, inputs, guess.velocity)
-    return at_kappa(model, data, options, inputs, guess.velocity)
-
-
-@inlined
-def warm_or_predicted(
-    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], velocity: Vector
-) -> KnownStart:
-    """At kappa: with the impulses of the step before where they all but balance, otherwise as predicted.
-
-    While the same contacts press, velocities change smoothly: a line through the last two often saves an iteration,
-    or the prediction.
-    """
-    if continues_in_contact(model, data, inputs[1], velocity):
-        balance = with_last_impulses(model, data, options, inputs, data.carry.next_velocity)
-        if balance[0] < _GOES_ON * total_impulse(model, data) and not lands(model, data):
-            return KnownStart(True, options.kappa, balance, _AHEAD)
-    balance = with_last_impulses(model, data, options, inputs, velocity)
-    if balance[0] < 1e300 and balance[0] > _GOES_ON * total_impulse(model, data):
-        balance = predict(model, data, options, inputs)
-    return KnownStart(balance[0] < 1e300, options.kappa, balance, 1.0)
-
-
-@inlined
-def continues_in_contact(model: Model, data: Data, v: Vector, velocity: Vector) -> bool:
-    """Whether the step follows another one, touches the ground, and has no better guess than its incoming velocity v.
-
-    The first step of a motion has other inputs than the one before: its change of velocity says nothing of the next.
-    Next to pairs of bodies, a start further away might end in another solution.
-    """
-    same = data.carry.steps[0] > 1 and data.active_count[0] > 0 and model.pair_kind.shape[0] == 0
-    for d in range(v.shape[0]):
-        same = same and velocity[d] == v[d]
-    return same
-
-
-@inlined
-def with_last_impulses(
-    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], velocity: Vector
-) -> tuple[float, float]:
-    """Residuals at a velocity with the impulses of the step before."""
-    q, v, u = inputs
-    if not set_trial_velocity(model, data, options.h, q, velocity, 1.0):
-        return INFEASIBLE
-    move_inequalities(model, data, 0.0)
-    return residuals(model, data, options.h, q, v, u)
-
-
-@inlined
-def warm_or_resumed(
-    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], velocity: Vector
-) -> KnownStart:
-    """With the impulses of the step before: the gap of a pressing contact changes much, its impulse does not.
-
-    At kappa itself where they all but balance; otherwise near them and the gaps, on the path of a larger kappa.
-    """
-    q, v, u = inputs
-    h = options.h
-    if not set_trial_velocity(model, data, h, q, velocity, 1.0):
-        return KnownStart(False, options.kappa, INFEASIBLE, 1.0)
-    kappa = max(options.kappa, _RESUMED)
-    resume_inequalities(model, data, h, kappa, False)
-    away, _ = residuals(model, data, h, q, v, u)
-    move_inequalities(model, data, 0.0)
-    last = residuals(model, data, h, q, v, u)
-    if last[0] < _BALANCED * away:
-        return KnownStart(True, options.kappa, last, 1.0)
-    resume_inequalities(model, data, h, kappa, False)
-    return KnownStart(True, kappa, residuals(model, data, h, q, v, u), 1.0)
-
-
-@inlined
-def at_kappa(
-    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], velocity: Vector
-) -> KnownStart:
-    """At the guess with the impulses kappa / gap, where they all but balance."""
-    q, v, u = inputs
-    h = options.h
-    kappa = options.kappa
-    if not set_trial_velocity(model, data, h, q, v, 1.0):
-        return KnownStart(False, kappa, INFEASIBLE, 1.0)
-    start_inequalities(model, data, h, kappa, 1.0)
-    usual, _ = residuals(model, data, h, q, v, u)
-    placed = True  # most guess the incoming velocity: there already
-    for d in range(v.shape[0]):
-        placed = placed and velocity[d] == v[d]
-    if not placed and not set_trial_velocity(model, data, h, q, velocity, 1.0):
-        return KnownStart(False, kappa, INFEASIBLE, 1.0)
-    start_inequalities(model, data, h, kappa, 0.0)
-    hard = residuals(model, data, h, q, v, u)
-    return KnownStart(hard[0] < _AT_REST * usual, kappa, hard, 1.0)
 
 
 @inlined

@@ -29,15 +29,14 @@ from sim.solve.energy_balance import step_gained
 from sim.solve.globalization import (
     ATTEMPTS,
     UNKNOWN,
-    KnownStart,
     Start,
     Strategy,
     from_last_iterate,
-    known_start,
     start_on_path,
     strategy,
 )
 from sim.solve.inequalities import choose_inequalities, inequalities_activated
+from sim.solve.known_start import KnownStart, after_tentative, known_start
 from sim.solve.merit import Merit, follow, is_near, judge, residuals
 from sim.solve.newton_direction import direction, linearize_step
 from sim.solve.residual import absorb_residual, residual_scale, rounding
@@ -52,6 +51,7 @@ _WORSE, _WORSE_LED = 10.0, 2.0
 _SMOOTHED = 1e3  # times kappa: smoothing of friction with which a known start is led
 _PATIENCE = 30  # iterations of an attempt
 _REPETITIONS = 3  # of an attempt, with other active features
+_INSIDE = 0.9  # part of its first Newton step within the cones, from which on a tentative start is not given up
 _FEW = 4  # halvings; an attempt that needs more is given up
 
 
@@ -131,6 +131,8 @@ def solve_from(
         if not linearize_step(model, data, h, q, v, smoothing, is_near(merit, kappa), s.undamped):
             return Outcome(Status.SINGULAR.value, iterations, merit.residual, merit.violation)
         boundary = direction(model, data, h, kappa, merit.mean)
+        if known.tentative and boundary < _INSIDE and iterations == 1:
+            break
         merit, halvings = search(model, data, options, inputs, (scale, smoothing), boundary, merit, worse)
     return Outcome(Status.NO_PROGRESS.value, iterations, merit.residual, merit.violation)
 
@@ -199,7 +201,11 @@ def solve_active(
             if not (corners and known.found):
                 continue
         data.overlap_allowed[0] = 1 if s.overlap else 0
-        out, verdict = attempt(model, data, options, inputs, s, out.iterations, known)
+        while True:
+            out, verdict = attempt(model, data, options, inputs, s, out.iterations, known)
+            if not (known.tentative and out.status == Status.NO_PROGRESS and out.iterations == 1):
+                break
+            known = after_tentative(model, data, options, inputs, guess.velocity)
         corners = verdict == Verdict.VALID and out.status == Status.NO_PROGRESS and has_corners(model)
         if verdict == Verdict.VALID and (out.status == Status.SOLVED or out.status == Status.MAX_ITERATIONS):
             if out.status == Status.SOLVED:

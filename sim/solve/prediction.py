@@ -10,7 +10,7 @@ with the new residual and the old matrices, costs less than an iteration and red
 
 from __future__ import annotations
 
-from sim.contact.active_contacts import has_pyramids
+from sim.contact.active_contacts import has_pyramids, lands
 from sim.contact.contact_law import law_of
 from sim.contact.ground_contact import contact_jacobian, contact_rate
 from sim.dynamics.elimination import solve
@@ -143,7 +143,8 @@ def reached_rates(model: Model, data: Data, h: float, points: int, size: int) ->
 def reached_impulses(model: Model, data: Data, h: float, kappa: float, points: int, size: int) -> bool:
     """Impulses of the contacts and limits chosen, into cone and bound; whether they have settled."""
     l = data.reach_impulse
-    settled = gauss_seidel(data.delassus, data.reach_friction, h, kappa, points, size, data.reach_rate, l)
+    w, change = data.reach_rate, data.reach_change
+    settled = gauss_seidel(data.delassus, data.reach_friction, h, kappa, (points, size), w, l, change)
     for j in range(0, 3 * points, 3):
         z = data.cone[data.reach_of[j]]
         z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2] = l[j], l[j + 1], l[j + 2]
@@ -179,7 +180,7 @@ def predict(
     if size < 0:
         return INFEASIBLE
     delassus(model, data, h, points, size)
-    settled = True
+    settled, changed = True, False
     step = 1
     while True:
         if size > 0:
@@ -190,10 +191,18 @@ def predict(
             data.dnu[d] += data.nu[d]
         if not set_trial_velocity(model, data, h, q, data.dnu, 1.0):
             return INFEASIBLE
+        missed = not changed and lands(model, data)  # where a foot rocks, onto a corner that the last impulses lift
         resume_inequalities(model, data, h, kappa, True)
         balance = residuals(model, data, h, q, v, u)
-        if step == _STEPS or not settled or max(balance[0] / scale, balance[1]) < _CLOSE:
+        if not missed and (step == _STEPS or not settled or max(balance[0] / scale, balance[1]) < _CLOSE):
             return balance
-        step += 1
         descend(model, data)
-        reached_rates(model, data, h, points, size)
+        if missed:
+            changed = True
+            points, size = choose_reached(model, data, h, kappa)
+            if size < 0:
+                return INFEASIBLE
+            delassus(model, data, h, points, size)
+        else:
+            step += 1
+            reached_rates(model, data, h, points, size)

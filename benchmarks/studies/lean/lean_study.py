@@ -181,4 +181,4 @@ def _by_module(kernels: list[str]) -> str:
 
 CONTACT_KERNELS = tuple(
     f"sim.{name}." for name in ("contact", "dynamics.joints.limits", "solve.interior_point", "solve.inequalities")
-) + ("sim.solve.globalization.", "solvers.cones.")
+) + ("sim.solve.globalization.", "sim.solve.known_start.", "solvers.cones.")
