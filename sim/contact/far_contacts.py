@@ -23,7 +23,7 @@ from sim.model.options import StepOptions
 from sim.model.record_columns import Cluster, Kin
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
-from solvers.rotation import Vec3, cross, rotate, three
+from solvers.rotation import Mat3, Vec3, cross, quat_matrix, rotate, three, times
 
 FAR = 2  # contact_out of a far contact
 _NEAR = 0.5  # share of the gap of e = cutoff below which a far contact takes part
@@ -40,28 +40,18 @@ def far_gap(model: Model, options: StepOptions, c: int) -> float:
 
 
 @kernel
-def _turned_on(data: Data, i: int, x: Vec3) -> Vec3:
-    """A vector of body i at configuration 2, after one more turn like the one before."""
-    t = data.turn_in[i]
-    sx, sy, sz = t[1], t[2], t[3]
-    ux, uy, uz = cross(sx, sy, sz, x[0], x[1], x[2])
-    ax, ay, az = cross(sx, sy, sz, ux, uy, uz)
-    return (
-        x[0] + 2.0 * (t[0] * ux + ax),
-        x[1] + 2.0 * (t[0] * uy + ay),
-        x[2] + 2.0 * (t[0] * uz + az),
-    )
+def _look_ahead(model: Model, data: Data, c: int, turn: Mat3, move: Vec3, rates: tuple[Vec3, Vec3]) -> None:
+    """Gap, slip and arm of contact c after one more step like the one before.
 
-
-@kernel
-def _look_ahead(model: Model, data: Data, h: float, c: int) -> None:
-    """Gap, slip and arm of contact c after one more step like the one before."""
-    i, k, f, p = model.contact_body[c], data.contact_kin[c], data.contact_frame[c], model.contact_point[c]
-    rho, move, t, g = model.contact_radius[c], data.move_in[i], data.turn_in[i], 2.0 / h
-    px, py, pz = _turned_on(data, i, rotate(data.rot2, i, p[0], p[1], p[2]))
+    turn, move: of its body in that step;  rates: move/h, and 2/h times the vector of the quaternion of that turn.
+    """
+    i, k, f = model.contact_body[c], data.contact_kin[c], data.contact_frame[c]
+    rho = model.contact_radius[c]
+    px, py, pz = times(turn, *rotate(data.rot2, i, *three(model.contact_point[c], 0)))
     x, y, z = px - rho * f[0], py - rho * f[1], pz - rho * f[2]
-    vx, vy, vz = cross(g * t[1], g * t[2], g * t[3], x, y, z)
-    vx, vy, vz = vx + move[0] / h, vy + move[1] / h, vz + move[2] / h
+    (mx, my, mz), (ox, oy, oz) = rates
+    vx, vy, vz = cross(ox, oy, oz, x, y, z)
+    vx, vy, vz = vx + mx, vy + my, vz + mz
     X, Y, Z = data.pos2[i, 0] + move[0] + x, data.pos2[i, 1] + move[1] + y, data.pos2[i, 2] + move[2] + z
     k[Kin.GAP] = f[0] * X + f[1] * Y + f[2] * Z - model.contact_height[c]
     k[Kin.SLIP1] = f[3] * vx + f[4] * vy + f[5] * vz
@@ -71,12 +61,15 @@ def _look_ahead(model: Model, data: Data, h: float, c: int) -> None:
 
 @optional(Slot.CHOOSE_FAR)
 def choose_far(model: Model, data: Data, options: StepOptions, c: int) -> None:
-    """contact_out, cone variables and wrenches of the far contacts of cluster c."""
-    if model.contact_terrain[c] > 0 or model.contact_hold[c] != 0:
+    """contact_out, cone variables and wrenches of the far contacts of cluster c, which is not on terrain."""
+    if model.contact_hold[c] != 0:
         return
-    least = far_gap(model, options, c)
+    i, h, least = model.contact_body[c], options.h, far_gap(model, options, c)
+    w, x, y, z = data.turn_in[i, 0], data.turn_in[i, 1], data.turn_in[i, 2], data.turn_in[i, 3]
+    turn, move = quat_matrix(w, x, y, z), three(data.move_in[i], 0)
+    rates = (move[0] / h, move[1] / h, move[2] / h), (2.0 / h * x, 2.0 / h * y, 2.0 / h * z)
     for k in range(c, model.cluster_end[c]):
-        _look_ahead(model, data, options.h, k)
+        _look_ahead(model, data, k, turn, move, rates)
         if data.contact_kin[k, Kin.GAP] > least:
             data.contact_out[k] = FAR
             start_contact(model, data, k, options.kappa, least)

@@ -19,7 +19,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.corners import gather_corners, least_corner_gap
-from sim.contact.far_contacts import choose_far, has_far_activated
+from sim.contact.far_contacts import choose_far, far_gap, has_far_activated
 from sim.contact.pairs.inactive_pairs import COUPLED
 from sim.contact.terrain_contact import terrain_gap
 from sim.mechanism.immovable_contacts import SUNK
@@ -129,13 +129,22 @@ def _sort(model: Model, data: Data, options: StepOptions, c: int, a: float) -> f
         return a
     for k in range(c, model.cluster_end[c]):
         data.contact_out[k] = 1 if a > 0.0 else 0
-    if a == 0.0 and options.cutoff > 0.0:
-        choose_far(model, data, options, c)
-    elif a == 0.0 and model.contact_terrain[c] == 0:
-        a = _leave_out(model, data, options, c)
+    if a == 0.0 and model.contact_terrain[c] == 0:
+        if options.cutoff > 0.0 and _farther(model, options, c):
+            choose_far(model, data, options, c)
+        else:
+            a = _leave_out(model, data, options, c)
     if stiff > 0.0 or row[Inactive.STIFF] > 0.0:  # others than before
         row[Inactive.LEAST_GAP] = 0.0
     return a
+
+
+@kernel
+def _farther(model: Model, options: StepOptions, c: int) -> bool:
+    """Whether more contacts of a cluster at rest are far than `_leave_out` finds, as at all but tiny cutoffs."""
+    if options.cutoff >= COUPLED:
+        return True
+    return far_gap(model, options, c) < 2.0 * _radius(model, options, c, model.cluster[c, Cluster.CONTACTS], COUPLED)
 
 
 @kernel

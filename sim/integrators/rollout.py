@@ -20,6 +20,7 @@ from sim.derivatives.parameters.parameter_jacobian import parameter_jacobian
 from sim.derivatives.step_gradient import gradient
 from sim.dynamics.external_forces import set_external
 from sim.dynamics.state_manifold import normalize_state
+from sim.integrators.chained_derivatives import chain_step
 from sim.integrators.feedback import FeedbackRun, begin_knot, end_knot
 from sim.mechanism.checks import UNIT
 from sim.model.data import Data
@@ -221,34 +222,6 @@ def report_step(model: Model, data: Data, options: StepOptions, motion: MotionBu
 
 
 @kernel
-def _chain(data: Data, A: Matrix, B: Matrix) -> None:
-    """A := A_step A, B := A_step B + B_step."""
-    n = A.shape[0]
-    m = B.shape[1]
-    T = data.chain
-    S = data.step_A
-    for i in range(n):
-        t = T[i]
-        for k in range(n):
-            t[k] = 0.0
-        for k in range(m):
-            t[n + k] = data.step_B[i, k]
-        for j in range(n):
-            s = S[i, j]
-            a = A[j]
-            b = B[j]
-            for k in range(n):
-                t[k] += s * a[k]
-            for k in range(m):
-                t[n + k] += s * b[k]
-    for i in range(n):
-        for k in range(n):
-            A[i, k] = T[i, k]
-        for k in range(m):
-            B[i, k] = T[i, n + k]
-
-
-@kernel
 def linearize(
     model_at: Table,
     data_at: Table,
@@ -289,7 +262,7 @@ def linearize(
                 break
             report[StepReport.ACCURACY] = max(report[StepReport.ACCURACY], ACCURACY * data.contact_hard[0])
             if s > 0:
-                _chain(data, A, B)
+                chain_step(data, A, B)
             if not (is_finite_matrix(A) and is_finite_matrix(B)):
                 report[StepReport.STATUS] = _NOT_FINITE
                 break

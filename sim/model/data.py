@@ -218,7 +218,8 @@ class Data(NamedTuple):
     panel: Matrix  # (6 nbody, npanel) twists of all columns where there are couplings, otherwise scratch of deep trees
     step_A: Matrix  # (2 nv, 2 nv) of one step of a knot
     step_B: Matrix  # (2 nv, nu)
-    chain: Matrix  # (2 nv, 2 nv + nu) their product with those of the steps before
+    chain: Matrix  # (2 nv, ncolumn) the product of those of the steps before
+    chain_columns: Matrix  # (2 nv, 24) SIDE columns of their product with it
     step_x: Matrix  # (2, nq + nv) states inside a knot
     report: Vector  # (6,) report of an internal step
     loop_clock: Vector  # (2,) LoopClock: sim/model/interruptible_loops.py

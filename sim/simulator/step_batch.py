@@ -6,6 +6,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from threading import get_ident
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -94,6 +95,25 @@ class RowEngines:
         """Engines whose contact frames are not those of the first one."""
         frames = np.array([engine.model.contact_frame for engine in self.engines])
         return [int(k) for k in np.flatnonzero((frames != frames[0]).reshape(len(frames), -1).any(axis=1))]
+
+    def scratch(self, data_tables: Table) -> Table:
+        """(n, ...) tables of the Data of rows, whose chunks share those given; kept for the next call of a thread."""
+        n, count, whole = len(self.index), len(data_tables), data_tables.base
+        before, kept = self._kept_scratch.get(get_ident(), (None, data_tables))
+        if whole is not None and whole is before and not self.turned:
+            return kept
+        chunk = np.searchsorted(np.arange(1, count + 1) * n // count, np.arange(n), side="right")
+        found: Table = data_tables[chunk]
+        for k in self.turned:
+            own = self.index == k  # a Data has the contact frames of its Model
+            found[own] = self.engines[k].chunks(n)[chunk[own]]
+        self._kept_scratch[get_ident()] = whole, found
+        return found
+
+    @cached_property
+    def _kept_scratch(self) -> dict[int, tuple[Table | None, Table]]:
+        """By thread, the array that the last tables of Data are a part of, and the tables of rows."""
+        return {}
 
     def _by_row(self, tables: list[Table]) -> Table:
         found: Table = np.array(tables, dtype=tables[0].dtype)[self.index]
@@ -222,12 +242,7 @@ class RowBatch:
         n, rows = len(self.us), self.rows
         models = rows.gradient_tables if derivatives else rows.step_tables
         data_tables = rows.engines[0].chunks(n)
-        count = len(data_tables)
-        chunk = np.searchsorted(np.arange(1, count + 1) * n // count, np.arange(n), side="right")
-        scratch = data_tables[chunk]
-        for k in rows.turned:
-            own = rows.index == k  # a Data has the contact frames of its Model
-            scratch[own] = rows.engines[k].chunks(n)[chunk[own]]
+        scratch, count = rows.scratch(data_tables), len(data_tables)
         settings = rows.settings.copy()
         given = ~np.isnan(self.kappas)
         settings[given, StepSetting.KAPPA] = self.kappas[given]

@@ -71,6 +71,17 @@ def test_fewer_contacts_are_solved_for_and_all_report_their_impulses(full, rows)
     assert np.all(np.linalg.norm(found.impulse, axis=-1) > 0.0)
 
 
+def test_a_tiny_cutoff_solves_for_no_more_contacts_than_none(full, rows):
+    def unknown(sim, x, u):
+        sim.step(x, u, throw=True)
+        return int(sim._engine.last().active_count[0])
+
+    small, (X, U) = full.replace(kappa=1e-6), rows
+    for x, u in zip(X, U, strict=True):
+        without = unknown(small, x, u)
+        assert unknown(small.replace(cutoff=1e-5), x, u) <= without < len(full.mechanism.contacts)
+
+
 def test_steps_rollouts_and_batches_agree(full, rows):
     sim, (X, U) = full.replace(cutoff=CUTOFF), rows
     expected = sim.step_batch(X, U, substeps=2).x
