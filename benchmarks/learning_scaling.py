@@ -3,8 +3,8 @@
     OPENBLAS_NUM_THREADS=1 python benchmarks/learning_scaling.py
 
 Needs an idle machine with two cores. Both numbers of threads take turns, round by round, and the least time of each
-counts. A batch is that of benchmarks/learning_costs.py; an epoch has the settings of the task. The simulation is
-spread over the threads; networks, critic and the sums of an epoch are NumPy's and stay on one.
+counts. A batch is that of benchmarks/learning_costs.py; an epoch has the settings of the task. Simulation and networks
+are spread over the threads; observations, rewards, new starts and the sums of an epoch stay on one.
 """
 
 from __future__ import annotations

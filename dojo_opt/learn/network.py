@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import exp, tanh
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.network_rows import BLOCK, backward_rows, forward_rows, pack, parts, unpack
 from sim.mechanism import checks
 from sim.mechanism.memory_limit import check_room
 from solvers.compiler import kernel
+from solvers.lanes import whole
 from solvers.types import Integers, Vector
 
 Floats = NDArray[np.float64]
@@ -87,31 +90,52 @@ class Network:
             first = last
         return out
 
-    def forward(self, weights: Floats, x: Floats) -> tuple[Floats, list[Floats]]:
-        """(outputs (n, m), inputs of all layers), for rows x (n, inputs); weights (count,), or (n, count) by row."""
-        kept, layers = [x], self.layers(weights)
-        for W, b in layers[:-1]:
-            y = _affine(W, b, kept[-1])
-            kept.append(np.tanh(y) if self.activation == "tanh" else np.where(y > 0.0, y, np.expm1(np.minimum(y, 0.0))))
-        return _affine(*layers[-1], kept[-1]), kept
+    def forward(self, weights: Floats, x: Floats) -> tuple[Floats, Floats]:
+        """(outputs (n, m), values of all layers for `backward`), for rows x (n, inputs), on all threads.
 
-    def backward(self, weights: Floats, kept: list[Floats], g: Floats, out: Floats | None = None) -> Floats:
-        """Gradient by x (n, inputs) from that by the outputs, g (n, m); adds that by the weights to `out`."""
-        layers = self.layers(weights)
-        slots = [] if out is None else self.layers(out)
-        for k in range(len(kept) - 1, -1, -1):
-            if slots:
-                slots[k][0][:] += kept[k].T @ g
-                slots[k][1][:] += g.sum(axis=0)
-            g = g @ layers[k][0].T
-            if k:
-                g = g * (1.0 - kept[k] ** 2 if self.activation == "tanh" else np.where(kept[k] > 0.0, 1.0, kept[k] + 1))
-        return g
+        weights: (count,), or (n, count) by row, without values of layers.
+        """
+        if weights.ndim == 2:
+            return self._by_row(weights, x), np.zeros((0, 0))
+        layers = self._rows(len(x))
+        layers[: len(x), : self.sizes[0]] = x
+        forward_rows(self._sizes, pack(self.layers(weights)), number_of(self.activation), layers)
+        return self._outputs(layers, len(x)), layers
 
+    def backward(self, weights: Floats, kept: Floats, g: Floats, out: Floats | None = None) -> Floats:
+        """Gradient by x (n, inputs) from that by the outputs, g (n, m); adds that by the weights to `out`.
 
-def _affine(W: Floats, b: Floats, x: Floats) -> Floats:
-    """x W + b of rows x (n, inputs); W (inputs, outputs), or (n, inputs, outputs) by row."""
-    return x @ W + b if W.ndim == 2 else np.matmul(x[:, None], W)[:, 0] + b
+        kept: values of all layers, as `forward` returns them for the weights (count,).
+        """
+        slopes, turned = self._rows(len(g)), pack([(W.T, np.zeros(len(W))) for W, _ in self.layers(weights)])
+        self._outputs(slopes, len(g))[:] = g
+        count = sum((n + 1) * whole(m) for n, m in zip(self.sizes[:-1], self.sizes[1:], strict=True))
+        sums = np.empty((0 if out is None else parts(len(slopes)), count))
+        backward_rows(self._sizes, turned, number_of(self.activation), kept, slopes, sums)
+        if out is not None:
+            unpack(sums.sum(axis=0), self.layers(out))
+        return slopes[: len(g), : self.sizes[0]]
+
+    @cached_property
+    def _sizes(self) -> Integers:
+        return np.array(self.sizes, dtype=np.int64)
+
+    def _rows(self, count: int) -> Floats:
+        """Zeros for the layers of so many rows; see network_rows.py."""
+        return np.zeros((-(-count // BLOCK) * BLOCK, sum(whole(size) for size in self.sizes)))
+
+    def _outputs(self, layers: Floats, count: int) -> Floats:
+        """The outputs (count, m) in there."""
+        first = layers.shape[1] - whole(self.sizes[-1])
+        return layers[:count, first : first + self.sizes[-1]]
+
+    def _by_row(self, weights: Floats, x: Floats) -> Floats:
+        """Outputs (n, m) of rows with weights (n, count) of their own."""
+        *hidden, last = self.layers(weights)
+        for W, b in hidden:
+            y = np.matmul(x[:, None], W)[:, 0] + b
+            x = np.tanh(y) if self.activation == "tanh" else np.where(y > 0.0, y, np.expm1(np.minimum(y, 0.0)))
+        return np.asarray(np.matmul(x[:, None], last[0])[:, 0] + last[1])
 
 
 class Adam:

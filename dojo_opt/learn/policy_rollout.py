@@ -100,7 +100,7 @@ class PolicyRollout:
         self.terminated, self.unsolved, self.cut = (np.zeros((steps, rows), dtype=np.bool_) for _ in range(3))
         self._slopes: list[tuple[Floats, ...]] = []
         self._inside: list[Flags] = []
-        self._kept: list[list[Floats]] = []
+        self._kept: list[Floats] = []
 
     def act(self, t: int, noise: Noise | None, slopes: bool) -> Floats:
         """Choose the actions (n, nu) of step t.

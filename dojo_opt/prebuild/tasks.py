@@ -126,6 +126,8 @@ def _learning() -> None:
     assert found.contacts is not None
     ContactGroups(sim, ()).wrenches(found.x, found.contacts)
     network = Network((3, 4, 1), "tanh")
+    weights, x = np.zeros(network.count), np.zeros((2, 3))
+    network.backward(weights, network.forward(weights, x)[1], np.zeros((2, 1)), np.zeros(network.count))
     LearnedPolicy(network, np.zeros(network.count), np.zeros(3), np.ones(3), None).action(np.zeros(3))
 
 
