@@ -32,6 +32,7 @@ from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.adjustable_simulator import AdjustableSimulator
 from sim.simulator.simulator import Simulator
+from sim.simulator.state_space import rehearse
 from solvers.types import Flags, Matrix, Vector
 
 _ROUNDING = 1e-9  # [s]
@@ -175,6 +176,11 @@ class ParameterEstimator:
         if not np.array_equal(self.theta, self._written):
             self._write()
         self._samples: list[tuple[float, Vector, Vector]] = []  # (time, state, input after it)
+
+    def rehearse(self, x: Vector) -> None:
+        """Make the calls of an update from the state x (nx,), so that no later one loads code."""
+        rehearse(self._nominal, x, derivatives=True)
+        self._predict(self._nominal, x, np.zeros((1, self._nominal.nu)))
 
     def observe(self, time: float, x: Vector, u: Vector, ground: Ground) -> None:
         """Take a sample.

@@ -247,6 +247,30 @@ class MPC:
         self._next = None
         fallback = not np.isfinite(plan.fun) or plan.status == Status.SIMULATION_FAILED
         self._record(now, begin, plan.status, fallback, plan.nit, plan.fun, 1.0, plan.x[0])
+        if np.isfinite(plan.x).all():
+            self._rehearse(now, plan)
+
+    def _rehearse(self, now: float, plan: Plan) -> None:
+        """A tick right after the first plan, with what only some ticks do, whose results are thrown away.
+
+        It takes its time now, so that no later tick compiles, loads or lays out anything.
+        """
+        policy, start, log = self.policy, self.problem.start, self.log.copy()
+        assert policy is not None
+        try:
+            self._tick(now, policy)
+            self._rolled(Iterate(policy.x, policy.u), policy.K)
+            tail(policy, self.references, 1)
+            for rare in (self._delay, self._predict, self.estimator):
+                if rare is not None:
+                    rare.rehearse(start)
+            if self._starts is not None:
+                self._starts.best(policy.x, policy.u, policy.K)
+                self._starts.forget()
+        finally:
+            self._ground.forget()
+            self._solver.reset(plan.multipliers)
+            self.policy, self._next, self.problem.start, self.log[:] = policy, None, start, log
 
     def _tick(self, now: float, old: Policy) -> None:
         """Shift, iterate, and take the new plan when it is one."""

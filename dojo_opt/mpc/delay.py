@@ -9,6 +9,7 @@ import numpy as np
 
 from dojo_opt.mpc.measurement import Measurement
 from sim.simulator.simulator import Simulator
+from sim.simulator.state_space import rehearse
 from solvers.types import Vector
 
 _PREDICTION = 5e-3  # longest step of the prediction [s]
@@ -28,6 +29,11 @@ class Prediction:
             self._fine: Simulator | None = sim.replace(time_step=h, kappa=hard)
         else:
             self._fine = None
+
+    def rehearse(self, x: Vector) -> None:
+        """Make the calls of a prediction from x (nx,), so that no later one loads code."""
+        if self._fine is not None:
+            rehearse(self._fine, x)
 
     def __call__(self, now: float, measured: Measurement, command: Callable[[float, Vector], Vector]) -> Vector:
         """State (nx,) at the end.
@@ -60,6 +66,10 @@ class Delay:
         """No input is on its way; guess: (nu,) the input that acts until the first one arrives [N, N m]."""
         self._issued.clear()
         self._before = guess
+
+    def rehearse(self, x: Vector) -> None:
+        """As Prediction.rehearse."""
+        self._predict.rehearse(x)
 
     def issue(self, now: float, u: Vector) -> None:
         """Send the input u (nu,) off at `now` [s]; the first one is taken to have acted before, too."""

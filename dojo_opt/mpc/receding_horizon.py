@@ -17,7 +17,8 @@ __all__ = ["shift_multipliers", "tail"]
 def tail(policy: Policy, references: References, count: int) -> tuple[Matrix, Matrix]:
     """States (count, nx) and inputs (count, nu) of knots beyond the end of a plan.
 
-    The last ones, moved along with their references; states without one go where the last input takes them.
+    The last ones, moved along with their references; states without one go where the last input takes them, as far as
+    steps are solved that are not divided.
     """
     sim, end = policy.sim, policy.time + policy.knot_time * len(policy.u)
     us = np.repeat(policy.u[-1:], count, axis=0)
@@ -27,10 +28,7 @@ def tail(policy: Policy, references: References, count: int) -> tuple[Matrix, Ma
     rows = references.rows(StateTerm, end, count + 1)
     if rows is not None:
         return sim.integrate(rows[1:], sim.difference(policy.x[-1], rows[0])), us
-    moved = sim.rollout(policy.x[-1], np.repeat(us, policy.substeps, axis=0)).x[:: policy.substeps]
-    xs = np.repeat(moved[-1:], count, axis=0)  # a rollout that stopped early stays where it stopped
-    xs[: len(moved) - 1] = moved[1:]
-    return xs, us
+    return sim.horizon(1, policy.substeps).coast(policy.x[-1], us)[1:], us  # divided steps would take their time
 
 
 def shift_multipliers(constraints: Sequence[Term], knots: float) -> None:

@@ -46,8 +46,9 @@ class Subproblem:
         self._no_limits = np.full((T, sim.nu), -np.inf), np.full((T, sim.nu), np.inf)
 
     def reset(self) -> None:
-        """Forget gains and regularisation."""
+        """Forget gains, regularisation, and where steps at another smoothing ended."""
         self.schedule.reset()
+        self._apart = None
         self.detail = ""
         self.K.fill(0.0)
         self.k.fill(0.0)

@@ -118,6 +118,18 @@ class Horizon:
         kept = Steps(path.cones, path.bounds) if keep else None
         return Rollout(path.xs, path.us, STATUSES[int(path.report[StepReport.STATUS])], knot, kept)
 
+    def coast(self, x: Floats, us: Floats) -> Floats:
+        """The motion from x (nx,) under the inputs us (T, nu) of knots, of any number, at the simulator's smoothing.
+
+        Returns:
+            (T + 1, nx) states; those after the last solved knot are where it ended.
+        """
+        rolled = self._engine.roll(x, np.repeat(us, self._substeps, axis=0))
+        solved = rolled.solved_steps // self._substeps
+        xs = rolled.xs[:: self._substeps]
+        xs[solved + 1 :] = xs[solved]
+        return xs
+
     def linearize(self, xs: Floats, us: Floats, kappa: float, guess: Floats | None = None) -> Linearization:
         """Derivatives of all knots, as `Simulator.linearize_trajectory`.
 

@@ -45,6 +45,17 @@ def strategy_solves(space: StateSpace) -> Integers:
     return space._engine.strategy_solves()
 
 
+def rehearse(space: StateSpace, x: ArrayLike, *, derivatives: bool = False) -> None:
+    """Make the calls of motions through a state, so that later ones load no code: those of divided steps as well.
+
+    Args:
+        space: the simulator.
+        x: (nx,) state.
+        derivatives: whether to make those with derivatives as well (default False).
+    """
+    space._engine.rehearse(space._arguments.states("rehearse", x), derivatives=derivatives)
+
+
 class StateSpace:
     """Sizes, settings and parameters, states on their manifold, and other views of them."""
 

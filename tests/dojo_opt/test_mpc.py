@@ -10,7 +10,12 @@ from dojo_opt.mpc.settings import MPCSettings
 from dojo_opt.planning.iterate import Iterate
 from dojo_opt.planning.options import Options
 from dojo_opt.plant.tick import milliseconds
-from solvers.compiler import local_kernel
+from sim.model.record_columns import StepReport
+from sim.simulator.engines.dividing_engine import DividingEngine
+from sim.simulator.engines.engine import Engine
+from sim.simulator.engines.linked_model import LinkedModel
+from solvers.compiler import compiled, local_kernel
+from solvers.compiler.kernels import Kernel
 from solvers.status import Status
 from support.standing_hopper import HOPPER, standing_problem
 
@@ -214,6 +219,51 @@ def test_constraints_hold_in_closed_loop():
         assert loop.x[-1, 2] == pytest.approx(0.6, abs=2e-3)
         largest.append(loop.u[:, 2].max())
     assert largest[0] > 90.0 and largest[1] < 50.0  # the penalty of a tick is not the last word
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"rescue": dojo.Rescue(splines=1), "patience": 1, "kappa_grad": 1e-3},
+        {"computation": 0.02, "servo": (1.0, 0.1), "learn_ground": True},
+        {"delay": 0.02, "guess": "feedback"},
+        {"adapt": dojo.Adaptation(["friction:*"], shear=0.2), "learn_ground": True, "friction": 0.5},
+    ],
+)
+def test_no_tick_loads_code(monkeypatch, settings):
+    """Every kernel that a tick calls, with these types, and every link that it needs, was there after the first plan.
+
+    Not even where steps of a prediction are divided, the line search fails, or a foot slides.
+    """
+    used = set()
+    call, linked, steps, failed = Kernel.__call__, LinkedModel.linked, Engine.take_steps, iter(range(10_000))
+
+    def called(self, *args):
+        used.add((self.__qualname__, tuple(map(self.entry.typeof_pyval, args))))
+        return call(self, *args)
+
+    def needed(self, *given):
+        used.update(given)
+        return linked(self, *given)
+
+    def refused(self, model, motion, *given):
+        if type(self) is DividingEngine and next(failed) % 5 == 4:
+            motion.reports[0, StepReport.STATUS] = Status.MAX_ITERATIONS
+            return 0
+        return steps(self, model, motion, *given)
+
+    monkeypatch.setattr(Kernel, "__call__", called)
+    monkeypatch.setattr(LinkedModel, "linked", needed)
+    monkeypatch.setattr(Engine, "take_steps", refused)
+    mpc = dojo.MPC(standing_problem(constraints=[dojo.constraint.ControlBounds(-1.0, 60.0)]), **settings)
+    mpc(0.0, HOPPER.neutral())
+    before, count, log = used.copy(), len(compiled(users=True)), len(mpc.log)
+    random = np.random.default_rng(0)
+    for tick in range(1, 40):
+        mpc(0.01 * tick, HOPPER.integrate(HOPPER.neutral(), 0.02 * random.standard_normal(HOPPER.ndx)))
+    assert len(mpc.log) == 8 and log == 1
+    assert (next(failed) > 10) == bool(settings.keys() & {"computation", "delay", "adapt"})  # plans refuse such steps
+    assert used == before and len(compiled(users=True)) == count
 
 
 @pytest.mark.parametrize("guess", ["states", "feedback", "open loop"])

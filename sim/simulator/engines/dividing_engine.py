@@ -198,6 +198,15 @@ class DividingEngine(Engine):
         A, B = chained(ahead, divided.rolled)
         return back @ A, back @ B
 
+    def rehearse(self, x: Vector, *, derivatives: bool = False) -> None:
+        """As Engine.rehearse, with the calls of divided steps and the engines of their parts."""
+        super().rehearse(x, derivatives=derivatives)
+        self.intervals.rehearse(x)
+        parts = 1
+        while 2 * parts <= LARGEST_DIVISION:
+            parts *= 2
+            self.part(parts).rehearse(x, derivatives=derivatives)
+
     def forget_parts(self) -> None:
         """As Engine.forget_parts."""
         self._ended.parts = None

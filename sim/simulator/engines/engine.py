@@ -211,6 +211,16 @@ class Engine(LinkedModel):
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
         return Rolled(knot, xs, reports, contacts, A, B, division)
 
+    def rehearse(self, x: Vector, *, derivatives: bool = False) -> None:
+        """Make the calls of a motion through the state x (nx,) once: later ones load no code, and lay out no buffers.
+
+        derivatives: those of motions with derivatives as well.
+        """
+        us = np.zeros((1, self.nu))
+        self.roll(x, us)
+        if derivatives:
+            self.roll(x, us, derivatives=True)
+
     def take_steps(
         self,
         model: Table,

@@ -39,6 +39,13 @@ class Intervals:
         """Of the undivided steps [s]."""
         return self._h
 
+    def rehearse(self, x: Vector) -> None:
+        """Call every kernel of conversions once, at the state x (nx,)."""
+        self.state(self._h, self.momentum(self.of_one(x), x), x)
+        self.mass(x)
+        self._damping(self._h)
+        self.momentum_slopes(self._h, x)
+
     def floating(self) -> Integers:
         """Degrees of freedom of the roots that float."""
         model = self._engine.model

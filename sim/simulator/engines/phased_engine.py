@@ -62,6 +62,11 @@ class PhasedEngine(PythonLoopEngine):
         self._second = (DividingEngine if settings.divide else Engine)(model, settings._replace(order=2))
         self._kept = threading.local()  # tables, and whether the last step was `near`
 
+    def rehearse(self, x: Vector, *, derivatives: bool = False) -> None:
+        """As Engine.rehearse, with the steps of order 2."""
+        super().rehearse(x, derivatives=derivatives)
+        self._second.rehearse(x, derivatives=derivatives)
+
     def march(self, x: Vector, us: Floats, wrenches: Cube | None = None, kappa: float | None = None) -> March:
         """Steps from x under us (T, nu) and external wrenches (T, nbody, 6)."""
         steps, t = len(us), 0
