@@ -261,9 +261,10 @@ class MPC:
             self._tick(now, policy)
             self._rolled(Iterate(policy.x, policy.u), policy.K)
             tail(policy, self.references, 1)
-            for rare in (self._delay, self._predict, self.estimator):
-                if rare is not None:
-                    rare.rehearse(start)
+            self._delay.rehearse(start)
+            self._predict.rehearse(start)
+            if self.estimator is not None:
+                self.estimator.rehearse(start)
             if self._starts is not None:
                 self._starts.best(policy.x, policy.u, policy.K)
                 self._starts.forget()
@@ -288,6 +289,8 @@ class MPC:
         if guess is None:
             self._record(now, begin, Status.SIMULATION_FAILED, True, 0, self.log[-1].cost, 1.0, shifted.x[0])
             return
+        if self._starts is not None:
+            self._starts.begin()
         result = solver.iterate(guess, shifted.K, began=begin[0])
         after = result.now if self._usable(result, guess) else None
         result, after = self._rescued(shifted, result, after)
@@ -314,6 +317,8 @@ class MPC:
         if start is None or (after is not None and start.merit >= after.merit):
             return result, after
         before = list(result.history)
+        if self._starts.exhausted:
+            return result._replace(now=start, K=shifted.K), start
         other = self._solver.iterate(start, shifted.K)
         return other._replace(history=[*before, *other.history]), other.now
 

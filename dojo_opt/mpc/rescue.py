@@ -17,21 +17,27 @@ from solvers.types import Matrix, Stack
 __all__ = ["SCALES", "Rescue", "Starts"]
 
 SCALES = (1.0, 0.5, 0.0)  # of the gains of the rollouts that are compared
+# iterations of a time step, at most: most rollouts under the gains of a lost plan end in a step without a solution
+_FEW_ITERATIONS = 60
 
 
 @dataclass(frozen=True)
 class Rescue:
     """Further starts of a tick of `MPC` whose plan is rejected.
 
-    All of them are rollouts from the measured state: of the previous plan under its gains, half of them and none, and
-    of its inputs with random splines added. The planner iterates from the one of the least merit, within the same tick,
-    and the result is the plan. So a plan that has been lost, as after an impact that it did not foresee, is replaced at
-    once by one that begins where the robot is.
+    All of them are rollouts from the measured state: of the previous plan without its gains, under half of them and
+    all, and of its inputs with random splines added. A rollout fails where a step takes more than 60 iterations. The
+    planner iterates from the one of the least merit, within the same tick, and the result is the plan. So a plan that
+    has been lost, as after an impact that it did not foresee, is replaced at once by one that begins where the robot
+    is.
 
     Attributes:
         splines: number of random splines; each costs a rollout (default 8).
         points: points of a spline along the horizon, linear in between (default 5).
         spread: standard deviation of a point, a number or (nu,) [N, N m] (default 0.05).
+        iterations: iterations of time steps that the rollouts of a tick may take, those of its rejected plan included:
+            no further start is tried after that many, and the best one becomes the plan as it is. A measure of time
+            that is the same on every machine (default None: no limit).
         always: whether every tick tries them, and takes a start that is better than its plan, not only one that is
             stuck (default False).
         seed: seed of the splines, which are drawn anew in every tick (default 0).
@@ -40,6 +46,7 @@ class Rescue:
     splines: int = 8
     points: int = 5
     spread: ArrayLike = 0.05
+    iterations: int | None = None
     always: bool = False
     seed: int = 0
 
@@ -48,6 +55,8 @@ class Rescue:
     def __post_init__(self) -> None:
         for name, least in (("splines", 0), ("points", 2), ("seed", 0)):
             whole_number(f"Rescue({name}=...)", getattr(self, name), least)
+        if self.iterations is not None:
+            whole_number("Rescue(iterations=...)", self.iterations)
         checks.flag("Rescue(always=...)", self.always)
         spread = checks.floats("Rescue(spread=...)", self.spread)
         if spread.ndim > 1 or not np.all(np.isfinite(spread)) or not np.all(spread >= 0.0):
@@ -77,6 +86,17 @@ class Starts:
     def forget(self) -> None:
         """Draw the same splines again."""
         self._random = np.random.default_rng(self._settings.seed)
+        self._last = np.inf  # iterations of the planner's steps after which a tick has none left
+
+    def begin(self) -> None:
+        """A tick begins."""
+        if self._settings.iterations is not None:
+            self._last = self._solver.step_iterations + self._settings.iterations
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether the tick has used its iterations up."""
+        return self._solver.step_iterations >= self._last
 
     def best(self, x: Matrix, u: Matrix, K: Stack) -> Iterate | None:
         """The rollout of the least merit.
@@ -90,9 +110,15 @@ class Starts:
             The rollout; None when the simulator can step none of them to its end.
         """
         nominal, none = Iterate(x, u), np.zeros_like(K)
-        shots = [self._solver.rollout(nominal, scale * K) for scale in SCALES]
-        shots += [self._solver.rollout(Iterate(x, u + change), none) for change in self._splines(*u.shape)]
-        return min((shot for shot in shots if shot is not None), key=lambda shot: shot.merit, default=None)
+        starts = [(nominal, scale * K) for scale in reversed(SCALES)]  # without gains is the best in nearly all ticks
+        starts += [(Iterate(x, u + change), none) for change in self._splines(*u.shape)]
+        found: Iterate | None = None
+        for start, gains in starts:
+            shot = self._solver.rollout(start, gains, _FEW_ITERATIONS)
+            found = shot if found is None or (shot is not None and shot.merit < found.merit) else found
+            if self.exhausted:
+                break
+        return found
 
     def _splines(self, horizon: int, nu: int) -> Stack:
         """(splines, T, nu) changes of the inputs."""

@@ -178,6 +178,11 @@ class Solver:
         """The present regularisation, in units of the mean control weight."""
         return self._subproblem.schedule.mu
 
+    @property
+    def step_iterations(self) -> int:
+        """Iterations of the time steps of all rollouts so far."""
+        return self._horizon.iterations
+
     def states(self, call: str, xs: ArrayLike) -> Matrix:
         """A copy of the states xs (..., nx) with unit quaternions; a ValueError names the call."""
         return np.asarray(self._horizon.states(call, xs))
@@ -187,14 +192,16 @@ class Solver:
         cost, merit = self.objective.at_kappa(self.options.stages[0].kappa_eval).evaluate(xs, us)
         return Iterate(xs, us, cost=cost, merit=merit)
 
-    def rollout(self, now: Iterate, K: Stack | None = None) -> Iterate | None:
+    def rollout(self, now: Iterate, K: Stack | None = None, max_iterations: int | None = None) -> Iterate | None:
         """The motion from the start of the problem at the first smoothing, under the gains K (T, nu, ndx) around `now`.
+
+        max_iterations: of a time step, where it may fail sooner than the simulator gives up.
 
         Returns:
             The motion, without gaps; None when the simulator cannot step it to the end.
         """
         kappa = self.options.stages[0].kappa_eval
-        shot = self._search.rollout(now, K, kappa)
+        shot = self._search.rollout(now, K, kappa, max_iterations=max_iterations)
         return self._search.iterate_of(shot, None, kappa) if shot.status == Status.SOLVED else None
 
     def iterate(self, now: Iterate, K: Stack | None = None, *, began: float | None = None) -> Iteration:

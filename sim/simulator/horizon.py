@@ -54,6 +54,7 @@ class Horizon:
     """Trajectories of `knots` knots, each of `substeps` time steps, with inputs within `limits`.
 
     Arrays are float64, C-contiguous and finite, states have unit quaternions: `states` makes them so.
+    `iterations` counts those of all steps of rollouts so far, as a measure of work that is the same on every machine.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class Horizon:
     ) -> None:
         self._engine, self._arguments, self._substeps, self._limits = engine, arguments, substeps, limits
         engine.prepare()
+        self.iterations = 0
         self._k = np.zeros((knots, engine.nu))
         self._K = np.zeros((knots, engine.nu, engine.ndx))
         self._gaps = np.zeros((knots + 1, engine.ndx))
@@ -115,6 +117,8 @@ class Horizon:
         knot, path = self._engine.roll_feedback(
             x0, policy, alpha, self._limits, self._substeps, kappa, keep=keep, max_iterations=max_iterations
         )
+        self.iterations += int(path.report[StepReport.ITERATIONS])  # of the whole, or of its unsolved step
+        self.iterations += int(path.report[StepReport.EARLIER]) if knot < len(us) else 0
         kept = Steps(path.cones, path.bounds) if keep else None
         return Rollout(path.xs, path.us, STATUSES[int(path.report[StepReport.STATUS])], knot, kept)
 

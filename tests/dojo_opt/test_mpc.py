@@ -318,6 +318,26 @@ def test_a_tick_whose_plan_is_rejected_starts_again_from_the_best_rollout(monkey
     assert not rollouts and len(begun) == 1
 
 
+@pytest.mark.parametrize(("iterations", "tried", "begun"), [(1, 1, 1), (10_000, 5, 2)])
+def test_a_rescue_ends_with_its_iterations(monkeypatch, iterations, tried, begun):
+    """The best start so far is then the plan as it is: it begins where the robot is, and has no gaps."""
+    mpc = dojo.MPC(standing_problem(), rescue=dojo.Rescue(splines=2, iterations=iterations))
+    x = HOPPER.neutral()
+    mpc(0.0, x)
+    shots, closed, counts = [], [], []
+    roll, iterate = mpc._solver.rollout, mpc._solver.iterate
+    monkeypatch.setattr(mpc._solver, "rollout", lambda *given: (shots.append(roll(*given)), shots[-1])[1])
+    monkeypatch.setattr(mpc._solver, "iterate", lambda *a, **b: (closed.append(iterate(*a, **b)), closed[-1])[1])
+    monkeypatch.setattr(mpc, "_usable", lambda result, guess: False)
+    for tick in (1, 2):  # every tick has as many
+        before = mpc._solver.step_iterations
+        mpc(0.05 * tick, HOPPER.integrate(x, 1e-3 * np.eye(14)[tick]))
+        counts.append((len(shots), len(closed)))
+        assert mpc._solver.step_iterations > before and not mpc.log[-1].fallback
+    assert counts == [(tried, begun), (2 * tried, 2 * begun)]
+    np.testing.assert_array_equal(mpc.policy.u, shots[-1].u if begun == 1 else closed[-1].now.u)
+
+
 @pytest.mark.parametrize(("factor", "begun"), [(0.5, 2), (2.0, 1)])
 def test_every_tick_takes_a_better_start_if_it_is_asked_to(monkeypatch, factor, begun):
     mpc = dojo.MPC(standing_problem(), rescue=dojo.Rescue(splines=0, always=True))
@@ -357,6 +377,7 @@ def test_plans_find_bodies_thinner_by_the_shrinkage():
     [
         ({"splines": -1}, r"Rescue\(splines=...\)"),
         ({"points": 1}, r"Rescue\(points=...\)"),
+        ({"iterations": 0}, r"Rescue\(iterations=...\)"),
         ({"spread": -0.1}, r"Rescue\(spread=...\)"),
         ({"spread": [[0.1]]}, r"Rescue\(spread=...\)"),
     ],

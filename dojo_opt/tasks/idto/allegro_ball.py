@@ -31,6 +31,7 @@ _ANGLE = np.radians(15.0)  # [rad] off the goal at the end
 _HEIGHT, _QUATERNION = JOINTS + 2, slice(JOINTS + 3, JOINTS + 7)  # of the ball, columns of a state
 _KAPPA = 1e-5  # [N s m]
 _BACKTRACKING = 0.25  # of the line search, whose rollouts take most of a tick
+_WORK = 500  # iterations of the steps of a tick after which a rescue ends; one takes about 60 us
 _EFFORT = 0.1  # [1/(N m)^2]
 _FINGERS, _BALL = 0.01, 10.0  # weights of places while the ball turns
 _FINGER_RATES, _BALL_RATES = 1e-3, 1.0  # those of velocities
@@ -104,7 +105,7 @@ def turning(task: BallTurn, settings: Mapping[str, Any]) -> SuiteTask:
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=guess)
     given = timed(_RATE) | {"servo": own, "gain_scale": 0.0}
     given |= {"options": replace(OPTIONS, backtracking=_BACKTRACKING)}
-    given |= {"shrinkage": task.shrinkage, "rescue": Rescue() if task.rescued else None}
+    given |= {"shrinkage": task.shrinkage, "rescue": Rescue(iterations=_WORK) if task.rescued else None}
     given |= {"kappa": _KAPPA, "first": Options(stages=tuple(Stage(*pair) for pair in task.smoothing))}
     mpc = MPC(problem, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)
