@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import dojo_opt as dojo
+from sim.mechanism import signed_distance
 from sim.model.shape_kinds import Pair
 from support.collide import collide_rows
 from support.jacobians import differences
@@ -67,9 +68,19 @@ def test_a_mesh_of_a_box_is_a_box() -> None:
     np.testing.assert_allclose(np.ravel(shape.values), box(grid), atol=1e-9)
     with pytest.raises(ValueError, match="not closed"):
         dojo.SignedDistance.from_mesh((corners, np.array(faces[1:])), 0.05)
-    chosen = dojo.SignedDistance.from_mesh((corners, np.array(faces)))
-    off = np.linalg.norm(chosen.level_set.settled(corners)[0] - corners, axis=1).max()
-    assert chosen.spacing == 0.6 / 25.0 and 0.0 < off <= 0.6 / 40.0
+
+
+def test_a_spacing_is_chosen_by_the_distance_from_the_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first one is as long as the ball; the second one keeps to a fortieth of it, and to its volume."""
+    monkeypatch.setattr(signed_distance, "_PARTS_OF_LONGEST", (1, 8))
+    vertices, faces = dojo.SignedDistance.from_function(ball, BOUNDS, 0.1).level_set.surface
+    longest = np.ptp(vertices, axis=0).max()
+    chosen = dojo.SignedDistance.from_mesh((vertices, faces))
+    off = np.linalg.norm(chosen.level_set.settled(vertices)[0] - vertices, axis=1).max()
+    assert chosen.spacing == longest / 8 and off <= longest / 40
+    monkeypatch.setattr(signed_distance, "_PARTS_OF_LONGEST", (1,))
+    with pytest.raises(ValueError, match="too thin for a spacing of 0.6"):
+        dojo.SignedDistance.from_mesh((vertices, faces))
 
 
 @pytest.mark.parametrize("kind", [Pair.SPHERE_FIELD, Pair.CAPSULE_FIELD], ids=["ball", "capsule"])
