@@ -1,4 +1,7 @@
-"""Report `compile`: time of the first plan in a new process: cache empty, cache filled, code shipped."""
+"""Report `compile`: time of the first plan in a new process: cache empty, cache filled, code shipped.
+
+The plan is a hop, or a swing-up in a quick study, which compiles half as much.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +29,10 @@ def spent():
 wall, cpu = time.perf_counter(), spent()
 import dojo_opt as dojo
 imported = time.perf_counter() - wall, spent() - cpu
-plan = dojo.ilqr(dojo.problems.hop())
+plan = dojo.ilqr(dojo.problems.PROBLEM())
 first = time.perf_counter() - wall, spent() - cpu
 wall, cpu = time.perf_counter(), spent()
-again = dojo.ilqr(dojo.problems.hop())
+again = dojo.ilqr(dojo.problems.PROBLEM())
 second = time.perf_counter() - wall, spent() - cpu
 from solvers.compiler import compiled, compiled_signatures, shipped
 kernels = compiled_signatures()
@@ -50,14 +53,14 @@ class CompileTimeStudy:
 
     def run(self, progress: Progress) -> Report:
         """Measure."""
-        report = Report("Start of a new process, to the first planned hop")
-        several = 1 if self.quick else 5
+        report = Report("Start of a new process, to the first plan")
+        several, problem = (1, "swingup") if self.quick else (5, "hop")
         starts = ["cold", *["warm"] * several]
         with tempfile.TemporaryDirectory() as folder:
-            cold, *warm = [_start(folder) for _ in progress([(name, None) for name in starts], "compile")]
+            cold, *warm = [_start(folder, problem) for _ in progress([(name, None) for name in starts], "compile")]
             size = sum(f.stat().st_size for f in Path(folder).rglob("*") if f.is_file())
         with tempfile.TemporaryDirectory() as folder:
-            shipped = [_start(folder, shipped=True) for _ in range(several)] if len(shipped_code()) else []
+            shipped = [_start(folder, problem, shipped=True) for _ in range(several)] if len(shipped_code()) else []
         report.details = {"cold": cold, "warm": warm, "shipped": shipped, "cache_bytes": size}
 
         def median(quantity: str, clock: int, runs: list[dict[str, Any]] = warm) -> float:
@@ -92,11 +95,13 @@ class CompileTimeStudy:
         return report
 
 
-def _start(folder: str, shipped: bool = False) -> dict[str, Any]:
+def _start(folder: str, problem: str, shipped: bool = False) -> dict[str, Any]:
     """Run the program in a new process with its cache below `folder`, with or without shipped code."""
     own = {"NUMBA_CACHE_DIR": folder, "DOJO_OPT_CACHE": "1", "DOJO_OPT_SHIPPED": str(int(shipped))}
     environment = {**os.environ, **own}
-    done = subprocess.run([sys.executable, "-c", _PROGRAM], env=environment, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", _PROGRAM.replace("PROBLEM", problem)], env=environment, capture_output=True, text=True
+    )
     if done.returncode != 0:
         raise RuntimeError(f"report compile: the measured process failed\n{done.stderr}")
     return json.loads(done.stdout)
