@@ -47,10 +47,10 @@ class Feet:
         if not names:
             raise ValueError(f"Feet({mech.name!r}): no body at the end of the tree has a contact; give names=...")
         for name in names:
-            checks.one_of("Feet(names=...)", name, mech.contact_names)
+            checks.one_of("Feet(names=...)", name, mech.ground_contact_names)
         self.sim = sim
         self.names = tuple(names)
-        self.contacts = [mech.contacts[mech.contact_names.index(name)] for name in names]
+        self.contacts = [mech.contacts[mech.ground_contact_names.index(name)] for name in names]
         self.base = mech.joints[0].nv
         self._body = np.array([mech.body_names.index(c.body) for c in self.contacts])
         self._point = np.array([np.asarray(c.point) for c in self.contacts])
@@ -118,14 +118,24 @@ class Feet:
 
         Returns:
             (nx,) state.
+
+        Raises:
+            ValueError: the robot has no floating base, or no height is found at which it touches the ground.
         """
+        first = self.sim.mechanism.joints[0]
+        if first.kind != "floating":
+            raise ValueError(
+                f"Feet.put_down(x): expected a robot on a floating base, but joint {first.name!r} is {first.kind}"
+            )
         out = x.copy()
         for _ in range(_ITERATIONS):
             least = float((self.gaps(out) / self.normals(out)[:, 2]).min())
             out[2] -= least
             if abs(least) < _CLOSE:
-                break
-        return out
+                return out
+        raise ValueError(
+            f"Feet.put_down(x): found no height at which the lowest ball touches the ground near {out[:2]}"
+        )
 
     def normals(self, x: Floats) -> Floats:
         """Outward normals of the ground at the balls.

@@ -153,7 +153,7 @@ def _feet_of(mech: Mechanism, given: Any) -> list[Contact]:
     if not mech.contacts:
         raise ValueError(f"Legs(robot): {mech.name!r} has no contact with the ground; name its feet with feet=...")
     ends = set(mech.body_names) - {joint.parent for joint in mech.joints}
-    everything = Feet(sim, mech.contact_names[: len(mech.contacts)]).positions(x)
+    everything = Feet(sim, mech.ground_contact_names).positions(x)
     low: dict[str, float] = {}
     for contact, at in zip(mech.contacts, everything, strict=True):
         if contact.body in ends:

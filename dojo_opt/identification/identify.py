@@ -60,13 +60,13 @@ class Identified:
     Attributes:
         success: whether the last smoothing converged.
         status: SOLVED, or the reason for an early end: MAX_ITERATIONS, LINE_SEARCH if no damped step decreases the
-            cost as the linear model expects, SIMULATION_FAILED.
+            cost as the linear model expects, SIMULATION_FAILED if no window can be predicted.
         message: the same as a sentence.
         labels: names of the fitted values.
         values: (n,) fitted values, in the units of their parameters.
         start: (n,) values before the fit.
         covariance: (n, n); infinite on the diagonal for parameters that the data do not determine.
-        simulator: the simulator with the fitted values.
+        simulator: the simulator with the fitted values, and the kappa of the one that the fit began with.
         rms: root mean square of the errors over their noise: 1 if the given noise is right.
         unseen: combinations, by label, that change no prediction and have no prior.
         outliers: share of states with reduced weight.
@@ -76,6 +76,7 @@ class Identified:
         noise: (ndx,) standard deviations of the measurement.
         solved: whether each window could be predicted at the end.
         history: one record per iteration.
+        kappa: smoothing of the last iterations, by which the errors and predictions are [N s m].
         cpu_seconds: processor time [s].
     """
 
@@ -96,6 +97,7 @@ class Identified:
     noise: Floats = field(default_factory=lambda: np.zeros(0))
     solved: list[bool] = field(default_factory=list)
     history: list[dict[str, Any]] = field(default_factory=list)
+    kappa: float = float("nan")
     cpu_seconds: float = 0.0
 
     starts = renamed("window_starts")
@@ -129,7 +131,7 @@ class Identified:
 
     @cached_property
     def _predictions(self) -> list[tuple[Window, Trajectory, Floats]]:
-        out, sim = [], self.simulator
+        out, sim = [], self.simulator.replace(kappa=self.kappa)
         for window, start, solved in zip(self.windows, self.window_starts, self.solved, strict=True):
             path = sim.rollout(start, window.u) if solved else None
             if path is not None and path.success:
@@ -306,8 +308,13 @@ class IdentifyOptions:
             checks.whole_number(f"identify({name}=...)", getattr(self, name))
         for name in ("outlier", "tolerance"):
             checks.number(f"identify({name}=...)", getattr(self, name), above=0.0)
-        for kappa in () if self.kappas is None else checks.floats("identify(kappas=...)", self.kappas).ravel().tolist():
-            checks.number("identify(kappas=...)", kappa, above=0.0)
+        if self.kappas is not None:
+            kappas = checks.floats("identify(kappas=...)", self.kappas).ravel().tolist()
+            for kappa in kappas:
+                checks.number("identify(kappas=...)", kappa, above=0.0)
+            if not kappas:
+                raise ValueError("identify(kappas=...): expected at least one number")
+            object.__setattr__(self, "kappas", tuple(kappas))
 
 
 def identify(
@@ -401,12 +408,12 @@ def _fitted(
     fit = _Fit(space, windows, Predictor(space, noise, o.every), o.outlier, known)
     fit.theta = values.copy()
     history: list[dict[str, Any]] = []
-    levels, status = o.kappas or (fit.base.kappa,), Status.SOLVED
+    levels, status = (fit.base.kappa,) if o.kappas is None else o.kappas, Status.SOLVED
     for kappa in levels:
         status = _descend(fit, kappa, o, began, history)
         if status == Status.SIMULATION_FAILED:
             break
-    return _identified(fit, levels[-1], status, history, began)
+    return _identified(fit, kappa, status, history, began)
 
 
 def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history: list[dict[str, Any]]) -> Status:
@@ -418,7 +425,9 @@ def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history:
     data, weights, far = fit.weigh(found, usable)
     damping, cost = _DAMPING, fit.rest(data, found, usable)
     for _ in range(o.max_iterations):
-        if data <= _EXACT * sum(w.errors.size for w in found):
+        if not any(usable):
+            return Status.SIMULATION_FAILED
+        if data <= _EXACT * sum(w.errors.size for w, use in zip(found, usable, strict=True) if use):
             return Status.SOLVED
         accepted, gain, equations = False, 0.0, NormalEquations(found, weights, fit.unit)
         expected = None  # of the least damped step
@@ -495,5 +504,5 @@ def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str,
         status == Status.SOLVED, status, _MESSAGES[status], space.labels, fit.theta, space.values, covariance,
         space.simulator(fit.theta), float(np.sqrt(cost / max(count, 1))), unseen, far,
         fit.rest(cost, found, usable), fit.starts, space.delayed(fit.windows, fit.theta), fit.predictor.noise, usable,
-        history, time.process_time() - began,
+        history, kappa, time.process_time() - began,
     )  # fmt: skip

@@ -49,7 +49,7 @@ class Ground:
         self._sim = sim
         contacts = sim.mechanism.contacts
         names = sim.mechanism.body_names
-        self.names = sim.mechanism.contact_names[: len(contacts)]  # those with the ground, collisions are no ground
+        self.names = sim.mechanism.ground_contact_names
         self._body = np.array([names.index(c.body) for c in contacts], dtype=np.int64)
         self._point = np.array([c.point for c in contacts], dtype=np.float64).reshape(-1, 3)
         self._radius = np.array([c.radius for c in contacts], dtype=np.float64)[:, None]

@@ -36,7 +36,7 @@ class UsedFriction:
     """
 
     def __init__(self, mechanism: Mechanism, labels: Sequence[str]) -> None:
-        names = mechanism.contact_names[: len(mechanism.contacts)]  # those with the ground
+        names = mechanism.ground_contact_names
         self._gravity = float(np.linalg.norm(mechanism.gravity))
         own = [[label in ("friction:*", f"friction:{name}") for name in names] for label in labels]
         self._of = np.array(own, dtype=np.bool_).reshape(len(labels), len(names))  # whose friction a parameter is

@@ -213,14 +213,15 @@ class Perturbation:
         Raises:
             ValueError: the ground is moved, and the robot has no floating base.
         """
-        if not (self.slope or self.ground_height):
-            return x
+        changed = [name for name in ("slope", "ground_height", "terrain") if getattr(self, name)]
         first = mechanism.joints[0]
-        if first.kind != "floating":
+        if changed and first.kind != "floating":
             raise ValueError(
-                f"Perturbation(slope=..., ground_height=...): expected a robot on a floating base, but joint "
+                f"Perturbation({changed[0]}=...): expected a robot on a floating base, but joint "
                 f"{first.name!r} is {first.kind}"
             )
+        if not (self.slope or self.ground_height):
+            return x
         turn = _rotation(self.slope, self.slope_heading)
         axis = np.array([np.sin(self.slope_heading), -np.cos(self.slope_heading), 0.0])
         half = 0.5 * self.slope

@@ -79,7 +79,7 @@ class Plant:
             x = sim.integrate(x, checks.array("Plant(offset=...)", p.offset, (sim.ndx,)))
         self._x0 = p.on_ground(sim.mechanism, x)
         if p.terrain is not None:
-            self._x0 = Feet(self.simulator, self.simulator.mechanism.contact_names).put_down(x)
+            self._x0 = Feet(self.simulator, self.simulator.mechanism.ground_contact_names).put_down(x)
         self.fall_check = FallCheck(self.simulator.mechanism, self._x0, self.normal)
         self.reset()
 

@@ -6,9 +6,10 @@ direction, is inactive if its stiffness, relative to the inertia behind it, is b
     e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) <= 1000 tolerance
     M = 1/m + W^2 (+ 2 spread W/sqrt(J0)),     T = |J^-1/2 (p x f)|/sqrt(J0)
 
-n: contacts of the mechanism, a: half the gap that is ahead, W: largest |J^-1/2 (r x f)| of a unit impulse f, J0: least
-moment of inertia, p: mean point. Contacts of a near cluster are inactive up to e = 1e-2, in derivatives active
-(stiff_contacts.py); of a cluster of many points up to 10, with their stiffness in the matrix (corner_laws.py).
+n: contacts of the mechanism with the ground, a: half the gap that is ahead, W: largest |J^-1/2 (r x f)| of a unit
+impulse f, J0: least moment of inertia, p: mean point. Contacts of a near cluster are inactive up to e = 1e-2, in
+derivatives active (stiff_contacts.py); of a cluster of many points up to 10, with their stiffness in the matrix
+(corner_laws.py).
 Derivation: docs/theory/inactive_contacts.md.
 
 Columns of `inactive` and `cluster`: Inactive and Cluster of sim/model/record_columns.py.

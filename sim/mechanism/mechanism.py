@@ -148,9 +148,14 @@ class Mechanism:
         return tuple(j.name for j in self.joints)
 
     @cached_property
+    def ground_contact_names(self) -> tuple[str, ...]:
+        """Names of the contacts with the ground."""
+        return tuple(c.name for c in self.contacts)
+
+    @cached_property
     def contact_names(self) -> tuple[str, ...]:
         """Names of the contacts: those with the ground, then the contact points of the collisions."""
-        return (*(c.name for c in self.contacts), *(candidate.name for candidate in self.contact_candidates))
+        return (*self.ground_contact_names, *(candidate.name for candidate in self.contact_candidates))
 
     @cached_property
     def contact_candidates(self) -> tuple[ContactCandidate, ...]:

@@ -13,8 +13,9 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes
 from sim.mechanism.shapes import Solid
 from sim.model.model import Model
-from sim.simulator.omitted_contacts import reach
+from sim.simulator.omitted_contacts import far_reach, reach
 from sim.simulator.settings import Settings
+from solvers.types import Floats
 
 
 def describe(mech: Mechanism, model: Model, settings: Settings, rank: str, second_order_reason: str = "") -> str:
@@ -37,6 +38,7 @@ def describe(mech: Mechanism, model: Model, settings: Settings, rank: str, secon
         *_collision_lines(mech),
         "a step",
         *(f"  {part:<18}{state}" for part, state in _parts(mech, settings.order, second_order_reason)),
+        *_inactive_lines(mech, model, settings),
         *_far_lines(mech, model, settings),
     ]
     return "\n".join(lines)
@@ -131,18 +133,31 @@ def _count(number: int, one: str, many: str) -> str:
     return f"{number} {one if number == 1 else many}"
 
 
-def _far_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
+def _inactive_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
     """The gap beyond which contacts are inactive at this kappa and tolerance."""
-    if not len(model.contact_body):
-        return []
     distances = reach(model, settings.time_step, settings.kappa, settings.tolerance)
     if not np.isfinite(distances).any():
         return []
+    span, rest = _gap_span(mech, distances), "they still push with an impulse of kappa/gap"
+    return [f"  {'inactive contacts':<18}omitted from the solver beyond a gap of {span}; {rest}"]
+
+
+def _far_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
+    """The gap beyond which contacts with the ground are far at this kappa and cutoff."""
+    if not settings.cutoff:
+        return []
+    distances = far_reach(model, settings.time_step, settings.kappa, settings.cutoff)
+    if not np.isfinite(distances).any():
+        return []
+    span, rest = _gap_span(mech, distances), "their impulses are given for the whole step, and derivatives omit them"
+    return [f"  {'far contacts':<18}omitted from the solver beyond a gap of {span}; {rest}"]
+
+
+def _gap_span(mech: Mechanism, distances: Floats) -> str:
+    """The least of the gaps, and the largest with its contact."""
     last = int(np.argmax(np.where(np.isfinite(distances), distances, -np.inf)))
     nearest, farthest = f"{distances.min():.2g}", f"{distances[last]:.2g}"
-    span = f"{nearest} m" if nearest == farthest else f"{nearest} m ({mech.contact_names[last]}: {farthest} m)"
-    rest = "they still push with an impulse of kappa/gap"
-    return [f"  {'inactive contacts':<18}omitted from the solver beyond a gap of {span}; {rest}"]
+    return f"{nearest} m" if nearest == farthest else f"{nearest} m ({mech.contact_names[last]}: {farthest} m)"
 
 
 def _parts(mech: Mechanism, order: int, second_order_reason: str) -> list[tuple[str, str]]:

@@ -1,4 +1,4 @@
-"""Inactive contacts of a step, and the gap beyond which a contact is inactive (see contact/inactive.py)."""
+"""Gaps beyond which contacts are inactive (contact/inactive.py), or far (contact/far_contacts.py)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 from sim.contact.pairs.inactive_pairs import COUPLED, STEEPEST
 from sim.mechanism.pack_clusters import STIFFNESS
 from sim.model.model import Model
-from sim.model.record_columns import PairBound
+from sim.model.record_columns import Cluster, PairBound
+
+_OF_BODY = [Cluster.FRICTION, Cluster.CONTACTS]
 
 
 def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDArray[np.float64]:
@@ -18,13 +20,12 @@ def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDA
 
     1000 tolerance a^2 = n kappa ((mu^2 + h (1 + mu)) M + h (1 + mu) T a)
     """
-    out = np.zeros(len(model.contact_body))
+    out, ground = np.zeros(len(model.contact_body)), len(model.contact_height)
     for first in np.flatnonzero(model.cluster_end):
-        _, _, _, _, _, mobility, mu, turn, _, _ = model.cluster[first]
-        scale = len(out) * kappa / (STIFFNESS * tolerance)
+        mobility, mu, turn = model.cluster[first, [Cluster.MOBILITY, Cluster.FRICTION, Cluster.TURNING]]
+        scale = ground * kappa / (STIFFNESS * tolerance)
         b, c = scale * time_step * (1.0 + mu) * turn, scale * (mu * mu + time_step * (1.0 + mu)) * mobility
         out[first : model.cluster_end[first]] = b + np.sqrt(b * b + 4.0 * c)
-    ground = len(model.contact_height)
     for j in np.flatnonzero(model.pair_feature == 0):
         bound = model.pair_bound[j]
         points, limit = int(bound[PairBound.POINTS]), bound[PairBound.REACH]
@@ -35,4 +36,18 @@ def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDA
         b = scale * time_step * (1.0 + mu) * (bound[PairBound.TURNING] + bound[PairBound.MOBILITY] * STEEPEST / limit)
         c = scale * (mu * mu + time_step * (1.0 + mu)) * bound[PairBound.MOBILITY]
         out[ground + j : ground + j + points] = min(b + np.sqrt(b * b + 4.0 * c), limit)
+    return out
+
+
+def far_reach(model: Model, time_step: float, kappa: float, cutoff: float) -> NDArray[np.float64]:
+    """Gap beyond which each contact with the ground is far, (nground,) [m]; infinite if it never is.
+
+    The gap of e = cutoff in far_contacts.py:    cutoff m gap^2 = n kappa (mu^2 + h (1 + mu))
+    """
+    out = np.full(len(model.contact_height), np.inf)
+    for first in np.flatnonzero(model.cluster_end):
+        mass, (mu, count) = model.body_mass[model.contact_body[first]], model.cluster[first, _OF_BODY]
+        if model.contact_terrain[first] == 0 and model.contact_hold[first] == 0 and mass > 0.0:
+            stiffness = count * kappa * (mu * mu + time_step * (1.0 + mu))
+            out[first : model.cluster_end[first]] = np.sqrt(stiffness / (cutoff * mass))
     return out

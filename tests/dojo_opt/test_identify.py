@@ -76,6 +76,20 @@ def test_a_fit_whose_steps_all_raise_the_cost_is_not_called_solved(monkeypatch):
     assert not found.success and found.status == Status.LINE_SEARCH and "cost" in found.message
 
 
+def test_a_fit_without_any_prediction_is_not_called_solved():
+    motions = _motions(_arm(), np.random.default_rng(4), 0.0)
+    found = dojo.identify(_arm(0.1).replace(max_iterations=1, divide=False), motions, ("damper",))
+    assert found.unsolved == len(motions)
+    assert (found.success, found.status) == (False, Status.SIMULATION_FAILED)
+
+
+def test_predictions_are_those_of_the_last_smoothing():
+    motions = _motions(_arm(), np.random.default_rng(4), 0.0)
+    found = dojo.identify(_arm(0.1), motions, ("damper",), kappas=np.array([1e-3, 1e-4]))
+    assert found.success and found.kappa == 1e-4 != found.simulator.kappa
+    assert {path.simulator.kappa for _, path, _ in found.predictions()} == {1e-4}
+
+
 def test_unidentifiable_parameters_are_named():
     """Of a body that hangs still on a hinge without gravity, mass and inertia about the hinge act as one."""
     sim = _arm().replace(gravity=(0.0, 0.0, 0.0))

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
 import dojo_opt as dojo
+from sim.mechanism.pack import pack
+from sim.simulator.omitted_contacts import reach
 
 
 def test_collisions_are_contacts_of_a_step() -> None:
@@ -58,3 +61,29 @@ def test_the_gap_of_inactive_collisions_is_that_of_a_step() -> None:
         x = sim.neutral()
         x[:3], x[7:10] = (0.2 + share * float(found[1]), 0.0, 0.0), 0.0
         assert sim.inactive_contacts(x) == omitted
+
+
+def test_the_gap_of_far_contacts_is_that_of_a_step() -> None:
+    """A ball at rest: beyond the gap of the description its contact is far, below it is not."""
+    mech = dojo.Mechanism(
+        [dojo.Body("ball", 2.0, shape=dojo.Sphere(0.1))],
+        [dojo.Joint("floating", None, "ball")],
+        [dojo.Contact("ball", radius=0.1, name="foot")],
+        gravity=(0.0, 0.0, 0.0),
+    )
+    sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-3, cutoff=0.3)
+    found = re.search(r"far contacts +omitted from the solver beyond a gap of (\S+) m", sim.describe())
+    assert found is not None
+    for share, omitted in ((1.05, ("foot",)), (0.95, ())):
+        x = sim.neutral()
+        x[2] = 0.1 + share * float(found[1])
+        assert sim.inactive_contacts(x) == omitted
+    assert "far contacts" not in sim.replace(cutoff=0.0).describe()
+
+
+def test_collisions_do_not_change_the_gap_of_inactive_contacts_with_the_ground() -> None:
+    mech = dojo.models.block()
+    wall = dojo.Collision(mech.body_names[0], shape_a=dojo.Box(1.0, 1.0, 1.0), shape_b=dojo.Box(1.0, 1.0, 1.0))
+    alone, beside = (reach(pack(m), 0.01, 1e-6, 1e-10) for m in (mech, replace(mech, collisions=[wall])))
+    assert len(beside) > len(alone) == len(mech.contacts)
+    np.testing.assert_array_equal(beside[: len(alone)], alone)
