@@ -11,6 +11,7 @@ from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
+from dojo_opt.learn.policy_rollout import Noise
 from dojo_opt.learn.shared_object import Shared
 from solvers.status import Status
 from solvers.types import Floats
@@ -30,6 +31,7 @@ class PairInputs(NamedTuple):
     kappa: Floats | None  # (n,)
     parameters: Mapping[str, Floats]  # each (n, components), or (1, components) of all rows
     delay: int  # [control steps]
+    seed: int  # of the noise of observations and of the pushes
 
 
 class PairReturns(NamedTuple):
@@ -61,17 +63,21 @@ def pair_returns(shared: Shared, given: PairInputs, horizon: int, shift: float) 
     drawn = models.drawn(given.substeps, given.kappa, given.parameters, given.delay).rows(rows)
     out, alive, x = np.zeros(2 * n), np.arange(2 * n), given.x[rows]
     seen, steps, unsolved = ObservationStatistics.empty(task.observations), 0, 0
+    noise = Noise.of_observations(np.random.default_rng(given.seed), task, (horizon, n), models.randomization)
     delays, impulses = ActionDelay(given.delay, 2 * n, task.sim.nu), drawn.sim.row_impulses(2 * n)
     for t in range(horizon):
         here, own = x[alive], drawn.rows(alive)
         observed = task.observe(here)[0]
         seen.add(observed)
-        actions, _ = delays.apply(t, policy.actions(observed, weights[alive]), given.delay, alive)
+        blurred = 0.0 if noise is None else noise.observations[t, rows[alive]]
+        actions, _ = delays.apply(t, policy.actions(observed, weights[alive], blurred), given.delay, alive)
         found = own.step(here, task.inputs(actions), impulses=impulses)
         bad, over = found.status != Status.SOLVED, task.ends(found.x)
         rewards = task.rewards(here, actions, found.x)[0] + task.survival * ~over - shift
         out[alive] += np.where(bad, 0.0, rewards)
         x[alive] = found.x
+        if noise is not None and noise.pushes is not None:
+            x[alive, task.sim.nq : task.sim.nx] += noise.pushes[t, rows[alive]]
         steps, unsolved = steps + len(alive), unsolved + int(bad.sum())
         if (bad | over).any():
             alive, impulses = alive[~(bad | over)], impulses.of_rows(~(bad | over))

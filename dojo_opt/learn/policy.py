@@ -88,18 +88,19 @@ class LearnedPolicy:
         """
         return np.clip(outputs, -1.0, 1.0) if self.linear else np.tanh(outputs)
 
-    def actions(self, observations: Floats, weights: Floats | None = None) -> Floats:
+    def actions(self, observations: Floats, weights: Floats | None = None, noise: Floats | float = 0.0) -> Floats:
         """(n, nu) actions of rows of observations.
 
         Args:
             observations: (n, no).
             weights: (n, network.count) of each row, or none: those of the policy.
+            noise: of the observations, in their standard deviations, a number or (n, no) (default 0).
 
         Returns:
             (n, nu) actions in [-1, 1].
         """
         weights = self.weights if weights is None else weights
-        return self.squashed(self.network.forward(weights, self.scaled(observations))[0])
+        return self.squashed(self.network.forward(weights, self.scaled(observations) + noise)[0])
 
     def action(self, observation: Floats) -> Floats:
         """(nu,) action of one observation.

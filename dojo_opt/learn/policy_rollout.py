@@ -51,6 +51,13 @@ class Noise:
             pushes = push_factor * draw_pushes(rng, task, shape, given.pushes)
         return cls(actions, observations, pushes)
 
+    @classmethod
+    def of_observations(
+        cls, rng: np.random.Generator, task: Task, shape: tuple[int, int], given: Randomization
+    ) -> Noise | None:
+        """As `draw` without noise of actions; None, and nothing drawn, where a randomisation has no noise or pushes."""
+        return cls.draw(rng, task, shape, 0.0, given) if given.noise or given.pushes is not None else None
+
 
 @dataclass(frozen=True)
 class PolicyGradient:

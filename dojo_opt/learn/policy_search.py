@@ -23,7 +23,7 @@ from dojo_opt.learn.network import Network
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.pair_returns import PairInputs, PairReturns, pair_returns
 from dojo_opt.learn.policy import LearnedPolicy
-from dojo_opt.learn.policy_rollout import roll_policy_batch
+from dojo_opt.learn.policy_rollout import Noise, roll_policy_batch
 from dojo_opt.learn.randomization import Drawn, Models, Randomization
 from dojo_opt.learn.shared_object import Shared
 from dojo_opt.learn.task import Task
@@ -169,7 +169,7 @@ class RandomSearch(WeightSearch):
     algorithm = "ars"
 
     def update(self) -> tuple[float, float, float]:
-        """As WeightSearch.update; a pair shares its first state and its model."""
+        """As WeightSearch.update; a pair shares its first state, its model, its noise and its pushes."""
         o, policy = self.options, self.policy
         directions = self.rng.standard_normal((o.directions, policy.network.count))
         x = self.task.starts([self.rng] * o.directions)
@@ -194,13 +194,13 @@ class RandomSearch(WeightSearch):
         """Returns of all groups of directions, which workers find as the caller does."""
         o, policy = self.options, self.policy
         scale = policy.mean.copy(), policy.deviation.copy()
-        calls = []
+        calls, seeds = [], np.random.default_rng((self.seed, 4, self.epoch))
         for part in groups:
             rows = drawn.rows(np.arange(part.start, part.stop))
             moves = o.noise * directions[part]
             given = PairInputs(
                 policy.network, policy.weights, scale, moves, x[part], rows.substeps, rows.kappa, rows.parameters,
-                rows.delay,
+                rows.delay, int(seeds.integers(2**63)),
             )  # fmt: skip
             calls.append((self.shared, given, self.horizon, o.shift))
         return list(results_in_order(pair_returns, calls, self.executor))
@@ -221,7 +221,10 @@ class GradientSearch(WeightSearch):
         o, task, policy = self.options, self.task, self.policy
         x = task.starts([self.rng] * o.environments)
         drawn = self.models.draw(self.rng, o.environments)
-        roll = roll_policy_batch(policy, x, self.horizon, drawn=drawn, slopes=True, kappa_grad=o.kappa_grad)
+        noise = Noise.of_observations(self.rng, task, (self.horizon, o.environments), o.randomization)
+        roll = roll_policy_batch(
+            policy, x, self.horizon, drawn=drawn, noise=noise, slopes=True, kappa_grad=o.kappa_grad
+        )
         over = np.logical_or.accumulate(roll.terminated | roll.unsolved, axis=0)
         weights = np.ones_like(roll.rewards)
         weights[1:] = ~over[:-1]

@@ -108,7 +108,7 @@ class Models:
         self, task: Task, randomization: Randomization, rng: np.random.Generator, cutoff: float | None = None
     ) -> None:
         """cutoff: of the simulators; None: that of the task."""
-        self._task, self._given = task, randomization
+        self._task, self.randomization = task, randomization
         self._choices = randomization.substeps or (task.substeps,)
         sim, count = task.sim if cutoff is None else task.sim.replace(cutoff=cutoff), randomization.models
         check_pushes("Randomization", randomization.pushes, sim.nv)
@@ -127,20 +127,20 @@ class Models:
     def draw(self, rng: np.random.Generator, rows: int) -> Drawn:
         """The models of an epoch."""
         substeps = int(rng.choice(self._choices))
-        count = rows if self._given.by_row else 1
-        chosen = rng.integers(self._given.models, size=count)
+        count = rows if self.randomization.by_row else 1
+        chosen = rng.integers(self.randomization.models, size=count)
         kappa = None
-        if self._given.kappa is not None:
-            low, high = np.log(self._given.kappa)
+        if self.randomization.kappa is not None:
+            low, high = np.log(self.randomization.kappa)
             kappa = np.broadcast_to(np.exp(rng.uniform(low, high, count)), rows)
         parameters = {name: table[chosen] for name, table in self._tables[substeps].items()}
-        delay = int(rng.choice(self._given.delays)) if self._given.delays else 0
+        delay = int(rng.choice(self.randomization.delays)) if self.randomization.delays else 0
         return self.drawn(substeps, kappa, parameters, delay)
 
     def drawn(self, substeps: int, kappa: Floats | None, parameters: Mapping[str, Floats], delay: int) -> Drawn:
         """Models of these values, of rows."""
         touch = self._task.touch_groups
-        return Drawn(self._sims[substeps], substeps, kappa, parameters, self._given.noise, delay, touch)
+        return Drawn(self._sims[substeps], substeps, kappa, parameters, delay, touch)
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,6 @@ class Drawn:
     substeps: int
     kappa: Floats | None  # (n,)
     parameters: Mapping[str, Floats]  # each (n, components), or (1, components) of all rows
-    noise: float
     delay: int = 0  # of actions [control steps]
     touch: ContactGroups | None = None  # whose forces end the states
 
@@ -192,4 +191,4 @@ class Drawn:
     @classmethod
     def of(cls, task: Task) -> Drawn:
         """The model of the task, for all rows."""
-        return cls(task.sim, task.substeps, None, {}, 0.0, touch=task.touch_groups)
+        return cls(task.sim, task.substeps, None, {}, touch=task.touch_groups)

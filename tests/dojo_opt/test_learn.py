@@ -193,6 +193,16 @@ MODELS = dojo.learn.Randomization(
 )
 
 
+@pytest.mark.parametrize("algorithm", ["ars", "gradient_search"])
+def test_noise_and_pushes_of_a_randomization_reach_whole_episodes(task, algorithm):
+    learn, options = getattr(dojo.learn, algorithm), {**ALGORITHMS[algorithm], "epochs": 1, "evaluations": 1}
+    plain, noisy, pushed = (
+        learn(task, seed=2, randomization=dojo.learn.Randomization(**given), **options).policy.weights
+        for given in ({}, {"noise": 0.1}, {"pushes": (0.1, 0.5)})
+    )
+    assert min(np.abs(a - b).max() for a, b in ((plain, noisy), (plain, pushed), (noisy, pushed))) > 1e-6
+
+
 def test_adam_moves_weights_as_its_paper_says_however_many_steps_are_behind():
     adam, weights, rng = Adam(3, (0.7, 0.95)), np.zeros(3), np.random.default_rng(0)
     m, v, expected = np.zeros(3), np.zeros(3), np.zeros(3)
