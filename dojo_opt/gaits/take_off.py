@@ -59,8 +59,9 @@ def _stroke(feet: Feet, places: Floats, dz: float) -> list[Floats]:
     x = feet.sim.neutral()
     while True:
         x = x.copy()
-        x[BaseState.POSITION.stop - 1] += dz
-        if x[2] <= places[:, 2].min():
+        height = BaseState.POSITION.stop - 1
+        x[height] += dz
+        if x[height] <= places[:, 2].min():
             return out
         try:
             x = feet.place(x, places[None])[0]

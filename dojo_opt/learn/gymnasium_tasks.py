@@ -75,7 +75,7 @@ DISTURBED = replace(
     pushes=(0.05, (0.1, 0.2, 0.45, 0.8, 0.9, 2.0, 0.9, 1.5, 1.5)),
 )
 
-# The same as TRANSFER for robots that fall: steps of milliseconds carry small impulses, which ask for a small kappa.
+# Models for robots that fall: steps of milliseconds carry small impulses, which ask for a small kappa.
 BALANCE = Randomization(
     factors={"friction": (0.6, 1.2), "damper": (0.7, 1.3), "armature": (0.9, 1.1), "mass": (0.9, 1.1)},
     substeps=(2, 2, 4),
@@ -146,7 +146,12 @@ def least_gap(mech: Mechanism) -> Callable[[Floats], float]:
     def least(q: Floats) -> float:
         z = sim.maximal(np.concatenate([q, still]))[bodies]
         w, x, y, s = z[:, BodyState.QUATERNION].T
-        heights = z[:, 2] + 2.0 * (x * s - w * y) * px + 2.0 * (y * s + w * x) * py + (1.0 - 2.0 * (x * x + y * y)) * pz
+        heights = (
+            z[:, BodyState.POSITION][:, 2]
+            + 2.0 * (x * s - w * y) * px
+            + 2.0 * (y * s + w * x) * py
+            + (1.0 - 2.0 * (x * x + y * y)) * pz
+        )
         return float((heights - offsets).min())
 
     return least

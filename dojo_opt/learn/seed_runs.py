@@ -114,9 +114,8 @@ def best_of(
     if not begun:
         raise ValueError("best_of(numbers): expected at least one seed")
     chosen = max(begun, key=_earned)
-    if begun[-1].status == Status.INTERRUPTED or chosen.success:
-        return chosen
-    found = algorithm(task, seed=chosen.seed, resume=chosen, epochs=epochs, **options)
+    ended = begun[-1].status == Status.INTERRUPTED or chosen.success
+    found = chosen if ended else algorithm(task, seed=chosen.seed, resume=chosen, epochs=epochs, **options)
     others = [run for run in begun if run is not chosen]
     more = {name: sum(getattr(run, name) for run in others) for name in ("steps", "unsolved", "seconds")}
     history = [record | {name: record[name] + more[name] for name in more} for record in found.history]

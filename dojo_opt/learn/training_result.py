@@ -39,7 +39,7 @@ def table_line(record: dict[str, Any]) -> str:
 
 @dataclass(repr=False)
 class Learned:
-    """The result of `shac`, `ars` and `gradient_search`. `policy` is the best of the evaluated policies.
+    """The result of `shac`, `ars`, `gradient_search` and `imitate`. `policy` is the best of the evaluated policies.
 
     Attributes:
         policy: the best policy.
@@ -49,7 +49,7 @@ class Learned:
         algorithm: its name.
         seed: of all random numbers.
         best: mean return of `policy` in the task, without noise.
-        steps: control steps of all environments.
+        steps: control steps of all environments; of `imitate`, evaluations of the policy.
         unsolved: steps of environments that were not solved; these environments started anew.
         infinite: epochs whose gradient was not finite; they left the policy as it was.
         seconds: processor time.

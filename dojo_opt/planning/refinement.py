@@ -78,8 +78,8 @@ def _missed(problem: Problem, plan: Plan, options: Options) -> Plan | None:
     if at_first <= options.violation_tolerance or off < at_first:
         return None
     message = MESSAGES[Status.INFEASIBLE] + (
-        f" With its own time steps the plan comes no nearer than the start to what the refined problem asks: {off:.2g} "
-        f"off, {culprit}.{overload(problem, plan.u)} {problem.advice}"
+        " With its own time steps the plan violates the constraints of the refined problem no less than the start does, "
+        f"by {off:.2g}, {culprit}.{overload(problem, plan.u)} {problem.advice}"
     )
     options.say(f"INFEASIBLE: {message.rstrip()}")
     return replace(plan, success=False, status=Status.INFEASIBLE, message=message.rstrip(), violation=off)

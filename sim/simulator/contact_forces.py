@@ -78,7 +78,7 @@ def least_forces(A: Floats, load: Floats, friction: Floats) -> tuple[Floats, flo
     f, missed = dual.forces(y if solved else dual.follow(unit))
     if balanced(missed, load):
         return f, missed
-    acting = matrix @ f.ravel()  # of what the cones allow, f is known to about 1e-4 here; its best multiple exactly
+    acting = matrix @ f.ravel()  # f is known to about 1e-4 within the cones; its best multiple exactly
     f *= max(float(acting @ load), 0.0) / max(float(acting @ acting), 1e-300)
     return f, float(np.abs(matrix @ f.ravel() - load).max())
 

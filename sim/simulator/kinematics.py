@@ -384,7 +384,7 @@ class Kinematics:
         takes about a second to compile in a process. It runs in any number of threads.
 
         Args:
-            quantity: what it evaluates, one of the table.
+            quantity: name of the result, one of the table.
             frame: name of the frame; None for the centre of mass.
 
         Returns:

@@ -12,21 +12,12 @@ import numpy as np
 
 from sim.mechanism import checks
 from sim.mechanism.archive import VERSION, Arrays, packed_part, part_of
+from sim.mechanism.input import Input
 from sim.simulator.npz_file import check_head, check_shapes, read_npz, reading
+from sim.simulator.settings import SETTING_NAMES
 from solvers.types import Floats
 
 __all__ = ["archived", "contact_rows", "export", "joint_trajectory", "opened", "restored", "with_new_names"]
-
-_SETTINGS = (
-    "time_step",
-    "kappa",
-    "tolerance",
-    "max_iterations",
-    "order",
-    "divide",
-    "accuracy",
-    "cutoff",
-)  # of Simulator(...), in order
 
 
 def archived(sim: Any, kind: str) -> tuple[dict[str, Any], Arrays]:
@@ -44,7 +35,7 @@ def archived(sim: Any, kind: str) -> tuple[dict[str, Any], Arrays]:
     if sim is not None:
         mechanism, *settings = sim.__reduce__()[1]  # as given: kappa None for the default
         head["simulator"] = {"part": "Simulator", "mechanism": packed_part(mechanism, arrays)}
-        head["simulator"] |= dict(zip(_SETTINGS, settings, strict=True))
+        head["simulator"] |= dict(zip(SETTING_NAMES, settings, strict=True))
     return head, arrays
 
 
@@ -201,21 +192,35 @@ def joint_trajectory(sim: Any, time: Floats, x: Floats, u: Floats) -> dict[str, 
 
     Returns:
         {"joint_names": [...], "points": [{"positions", "velocities", "effort", "time_from_start"}, ...]}; the effort of
-        the last point is that of the one before, and a joint without an input has none, 0.
+        the last point is that of the input before, that of a servo follows from its gains, the state of the point and
+        its limits, and a joint without an input has none, 0.
     """
     mech = sim.mechanism
     joints = [joint for joint in mech.joints if joint.nv == 1 and joint.nq == 1]
     q = [mech.q_slice(joint.name).start for joint in joints]
     v = [mech.v_slice(joint.name).start for joint in joints]
-    driver = {part.joint: k for k, part in enumerate(mech.inputs or ()) if part.joint is not None}
     held = np.concatenate([u, u[-1:]]) if len(u) else np.zeros((len(x), sim.nu))
+    efforts = np.zeros((len(x), len(joints)))
+    places = {joint.name: k for k, joint in enumerate(joints)}
+    for drive, targets in zip(mech.inputs or (), held.T, strict=True):
+        if drive.joint in places:
+            k = places[drive.joint]
+            efforts[:, k] += _drive_force(drive, targets, x[:, q[k]], x[:, sim.nq + v[k]])
     points = [
         {
             "positions": x[t, q].tolist(),
             "velocities": x[t, [sim.nq + i for i in v]].tolist(),
-            "effort": [float(held[t, driver[joint.name]]) if joint.name in driver else 0.0 for joint in joints],
+            "effort": efforts[t].tolist(),
             "time_from_start": float(time[t]),
         }
         for t in range(len(x))
     ]
     return {"joint_names": [joint.name for joint in joints], "points": points}
+
+
+def _drive_force(drive: Input, u: Floats, q: Floats, v: Floats) -> Floats:
+    """Force of an input on its joint, (T,) each [N, N m]: u, or that of its servo."""
+    if drive.servo is None:
+        return u
+    target = drive.stiffness * (u - q) - drive.damping * v if drive.servo == "position" else drive.damping * (u - v)
+    return np.clip(target, *drive.force_limits)

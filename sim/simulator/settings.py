@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
@@ -16,7 +15,11 @@ from sim.model.record_columns import StepSetting
 from sim.solve.energy_balance import LARGEST_GAIN
 from solvers.types import Vector
 
-__all__ = ["LEAST_ACCURACY", "Settings", "checked_settings", "default_kappa", "free_parts", "of_call", "with_accuracy"]
+__all__ = ["LEAST_ACCURACY", "SETTING_NAMES", "Settings", "checked_settings", "default_kappa", "free_parts", "of_call",
+           "with_accuracy"]  # fmt: skip
+
+# of Simulator(...), in order; files of motions have them by these names
+SETTING_NAMES = ("time_step", "kappa", "tolerance", "max_iterations", "order", "divide", "accuracy", "cutoff")
 
 LEAST_ACCURACY = 1e-12  # [m/s, rad/s]
 _ORDERS = (2, 4, 6, 8)
@@ -43,9 +46,9 @@ class Settings(NamedTuple):
     accuracy: float = 0.0  # error of coordinates that steps may make [m/s, rad/s]; 0: steps are not divided for it
     cutoff: float = 0.0  # stiffness over mass of far contacts (contact/far_contacts.py); 0: none is far
 
-    def shown(self, names: Sequence[str]) -> str:
+    def shown(self) -> str:
         """Settings by name, as text; those that are 0 by default only where they are not."""
-        given = [name for name in names if name not in ("accuracy", "cutoff") or getattr(self, name)]
+        given = [name for name in SETTING_NAMES if name not in ("accuracy", "cutoff") or getattr(self, name)]
         return ", ".join(f"{name}={getattr(self, name):g}" for name in given)
 
     def array(self, kappa: float | None = None) -> Vector:
@@ -101,9 +104,10 @@ def with_accuracy(settings: Settings, accuracy: float | None, mechanism: Mechani
 
         kappa <= .01 accuracy^2 h / w,    at least `least_kappa`
 
-    w is the velocity of the most mobile coordinate per impulse in it [1/kg, 1/(kg m^2)] (mobility.py): a contact or
-    limit that opens pushes it away with sqrt(w kappa/h), and repeatedly in short steps. Where bodies collide kappa is
-    at most 3e-4 m accuracy^2 h with the mass m of the lightest part.
+    w is the velocity of the most mobile coordinate per impulse in it [1/kg, 1/(kg m^2)] (mobility.py), or of the
+    lightest free part where that is larger: a contact or limit that opens pushes it away with sqrt(w kappa/h), and
+    repeatedly in short steps. Where bodies collide kappa is at most 3e-4 m accuracy^2 h with the mass m of the lightest
+    part.
     """
     if accuracy is None:
         return settings
@@ -125,12 +129,13 @@ def with_accuracy(settings: Settings, accuracy: float | None, mechanism: Mechani
 
 
 def least_kappa(mass: float, collides: bool) -> float:
-    """The least kappa of steps with an accuracy [N s m]: 1e-18 m^2/s times the mass of all parts [kg], at most 1e-13.
+    """The least kappa of steps with an accuracy [N s m]: 1e-18 m^2/s times the mass of all parts, or of 1 kg if that is
+    more, and at most 1e-13 N s m.
 
     A light limit that opens after an impact is still pushed little in the short steps there. Where bodies collide it is
     1e-13: gaps below a load have to stay above the rounding of positions.
     """
-    return _SMALLEST if collides else float(np.clip(_FINEST * mass, _FINEST, _SMALLEST))
+    return _SMALLEST if collides else min(_FINEST * max(mass, 1.0), _SMALLEST)
 
 
 def free_parts(mechanism: Mechanism) -> list[float]:

@@ -35,7 +35,7 @@ from sim.simulator.rolled_results import step_result, trajectory
 from sim.simulator.rollout_duration import simulator_for_duration
 from sim.simulator.row_impulses import RowImpulses
 from sim.simulator.row_steps import RowSteps
-from sim.simulator.settings import checked_settings, with_accuracy
+from sim.simulator.settings import SETTING_NAMES, checked_settings, with_accuracy
 from sim.simulator.state_space import StateSpace
 from sim.simulator.step_batch import StepBatch
 from solvers.types import Floats
@@ -44,8 +44,6 @@ if TYPE_CHECKING:
     from sim.simulator.linearizer import Linearizer
 
 Wrenches = ArrayLike | Mapping[str, ArrayLike]
-
-_SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order", "divide", "accuracy", "cutoff")
 
 
 class Simulator(StateSpace):
@@ -106,11 +104,11 @@ class Simulator(StateSpace):
 
     def _given(self) -> dict[str, Any]:
         """The settings as given: kappa None for the default."""
-        given = {name: getattr(self._engine.settings, name) for name in _SETTINGS}
+        given = {name: getattr(self._engine.settings, name) for name in SETTING_NAMES}
         return {**given, "order": 2 if self.accuracy else self.order, "kappa": self._kappa, "accuracy": self.accuracy}
 
     def __repr__(self) -> str:
-        return f"Simulator({self.mechanism.name}, {self._engine.settings.shown(_SETTINGS)})"
+        return f"Simulator({self.mechanism.name}, {self._engine.settings.shown()})"
 
     def replace(self, **settings: Any) -> Simulator:
         """The same simulator with other settings. Compiled code is shared, and a default kappa remains the default.
@@ -125,7 +123,7 @@ class Simulator(StateSpace):
         Raises:
             ValueError: for an unknown setting or contact, or a value out of range.
         """
-        known = ("mechanism", *_SETTINGS, "friction", "law", "gravity")
+        known = ("mechanism", *SETTING_NAMES, "friction", "law", "gravity")
         for key in settings:
             checks.one_of("Simulator.replace(...)", key, known)
         mech = settings.pop("mechanism", self.mechanism)

@@ -18,7 +18,7 @@ from sim.mechanism.short_repr import short_repr
 from sim.model.interruptible_loops import pieces
 from sim.model.record_columns import StepReport, StepSetting
 from sim.simulator.engines.division import DIVISIBLE
-from sim.simulator.engines.engine import REPORT, Engine, finite_rows, refuse
+from sim.simulator.engines.engine import REPORT, Engine, chained, finite_rows, refuse
 from sim.simulator.results import Contacts, Result
 from sim.simulator.row_impulses import RowImpulses
 from solvers.compiler import Table
@@ -37,7 +37,8 @@ class StepBatch(Result):
     Attributes:
         x: (n, nx) states after the knot.
         status: (n,) Status of each row.
-        iterations: (n,) iterations of the last step of each row.
+        iterations: (n,) iterations of the last step of each row; 0 for orders above 2 and an accuracy, whose steps have
+            several solves or none.
         A: (n, ndx, ndx) derivatives by the state of each row, or (0, ndx, ndx).
         B: (n, ndx, nu) derivatives by its input, held over the knot, or (0, ndx, nu).
         detail: sentence about an unsolved row, with its numbers.
@@ -294,9 +295,7 @@ class RowBatch:
         if len(self.contacts):
             self.contacts[row] = rolled.contacts[-1]
         if derivatives:
-            A[row], B[row] = np.eye(engine.ndx), 0.0
-            for dx, du in zip(rolled.A, rolled.B, strict=True):
-                A[row], B[row] = dx @ A[row], dx @ B[row] + du
+            A[row], B[row] = chained(np.eye(engine.ndx), rolled)
 
     def _by_engine(self, derivatives: bool, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
         """Steps that compiled loops cannot make, the rows of an engine at a time."""

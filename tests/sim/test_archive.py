@@ -8,6 +8,7 @@ import pytest
 
 import dojo_opt as dojo
 from sim.mechanism.archive import packed_part, part_of
+from sim.simulator.motion_file import joint_trajectory
 from sim.simulator.simulator import Simulator
 
 HILL = dojo.Terrain(np.random.default_rng(0).random((4, 4)), spacing=(0.5, 0.5))
@@ -67,6 +68,24 @@ def test_a_trajectory_is_exported_by_names(tmp_path):
     assert ros["points"][2]["positions"] == made.x[2, :7].tolist() and ros["points"][3]["time_from_start"] == 0.06
     with pytest.raises(ValueError, match="suffix"):
         made.export(tmp_path / "motion.bag")
+
+
+def test_efforts_of_exported_servos_are_their_forces():
+    inputs = [
+        dojo.Input("a", servo="position", stiffness=80.0, damping=2.0, force_limits=(-3.0, 3.0)),
+        dojo.Input("a", name="more"),
+        dojo.Input("b", servo="velocity", damping=5.0),
+    ]
+    joints = [
+        dojo.Joint("revolute", parent, name, name=name, axis=(0, 1, 0)) for parent, name in ((None, "a"), ("a", "b"))
+    ]
+    mech = dojo.Mechanism([dojo.Body(name, 1.0, shape=dojo.Sphere(0.1)) for name in "ab"], joints, [], inputs)
+    x = np.array([[0.1, 0.2, 0.3, 0.4], [0.1, 0.0, 0.0, 0.0]])
+    points = joint_trajectory(Simulator(mech, time_step=0.01), np.array([0.0, 0.01]), x, np.array([[0.12, 0.5, 1.0]]))
+    found = [point["effort"] for point in points["points"]]
+    np.testing.assert_allclose(found, [[80.0 * 0.02 - 2.0 * 0.3 + 0.5, 5.0 * 0.6], [80.0 * 0.02 + 0.5, 5.0]])
+    far = joint_trajectory(Simulator(mech, time_step=0.01), np.array([0.0, 0.01]), x, np.array([[9.0, 0.0, 0.0]]))
+    assert far["points"][0]["effort"][0] == 3.0
 
 
 def test_other_files_are_refused(tmp_path):

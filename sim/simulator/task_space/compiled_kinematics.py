@@ -173,7 +173,7 @@ class CompiledKinematics:
 
     Args:
         sim: the simulator, whose mechanism is copied.
-        quantity: what it evaluates.
+        quantity: name of the result, as in `Kinematics.compiled`.
         body: number of the frame's body, -1 for the world.
         place: (7,) point and quaternion of the frame on its body.
     """
