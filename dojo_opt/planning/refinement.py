@@ -78,7 +78,7 @@ def _missed(problem: Problem, plan: Plan, options: Options) -> Plan | None:
     if at_first <= options.violation_tolerance or off < at_first:
         return None
     message = MESSAGES[Status.INFEASIBLE] + (
-        " With its own time steps the plan violates the constraints of the refined problem no less than the start does, "
+        " With its own time steps the plan violates the constraints of the refined problem no less than the start, "
         f"by {off:.2g}, {culprit}.{overload(problem, plan.u)} {problem.advice}"
     )
     options.say(f"INFEASIBLE: {message.rstrip()}")
