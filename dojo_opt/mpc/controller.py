@@ -33,6 +33,7 @@ from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.adjustable_simulator import AdjustableSimulator
+from sim.simulator.results import SimulationError
 from solvers.status import Status
 from solvers.types import Matrix, Stack, Vector
 
@@ -145,6 +146,7 @@ class MPC:
     def reset(self) -> None:
         """Forget plan, measurements and log."""
         self.log: list[Tick] = []
+        self._fallbacks = 0  # ticks in a row without a new plan
         self.policy: Policy | None = None  # in force
         self._next: Policy | None = None  # made, and not yet in force
         self._measured = Measurement(self.sim, self.settings.mean_velocity)
@@ -174,6 +176,8 @@ class MPC:
         Raises:
             ValueError: for a time before the last plan or 100,000 knots after it, or a state of the wrong shape or with
                 numbers that are not finite.
+            SimulationError: the model cannot predict the first plan's start, over the delay; later such ticks keep the
+                previous plan, with that status in the log.
         """
         now = checks.number("MPC(time)", time)
         last = self.log[-1].time if self.log else now
@@ -255,7 +259,7 @@ class MPC:
 
         It takes its time now, so that no later tick compiles, loads or lays out anything.
         """
-        policy, start, log = self.policy, self.problem.start, self.log.copy()
+        policy, start, log, fallbacks = self.policy, self.problem.start, self.log.copy(), self._fallbacks
         assert policy is not None
         try:
             self._tick(now, policy)
@@ -272,12 +276,18 @@ class MPC:
             self._ground.forget()
             self._solver.reset(plan.multipliers)
             self.policy, self._next, self.problem.start, self.log[:] = policy, None, start, log
+            self._fallbacks = fallbacks
 
     def _tick(self, now: float, old: Policy) -> None:
         """Shift, iterate, and take the new plan when it is one."""
         begin = clock.perf_counter(), clock.thread_time()
         solver, problem = self._solver, self.problem
-        start = solver.states("MPC(x)", self._ahead(now))
+        try:
+            start = solver.states("MPC(x)", self._ahead(now))
+        except SimulationError:
+            self._due = now + self.period
+            self._record(now, begin, Status.SIMULATION_FAILED, True, 0, self.log[-1].cost, 1.0, problem.start)
+            return
         if self.settings.learn_ground:
             self._ground.learn(old, now, self._measured.last[1], self._measured.first)
         self._due = now + self.period
@@ -285,15 +295,17 @@ class MPC:
         shifted = old.shifted(now + self._later, lambda count: tail(old, self.references, count))
         problem.start = start
         shift_multipliers(problem.constraints, (now - self.log[-1].time) / problem.knot_time)
+        if self._starts is not None:
+            self._starts.begin(begin[0] + self.settings.time_limit)
         guess = self._guess(shifted)
+        if guess is None and self._starts is not None:
+            guess = self._starts.best(shifted.x, shifted.u, shifted.K)
         if guess is None:
             self._record(now, begin, Status.SIMULATION_FAILED, True, 0, self.log[-1].cost, 1.0, shifted.x[0])
             return
-        if self._starts is not None:
-            self._starts.begin()
         result = solver.iterate(guess, shifted.K, began=begin[0])
         after = result.now if self._usable(result, guess) else None
-        result, after = self._rescued(shifted, result, after)
+        result, after = self._rescued(shifted, result, after, begin[0])
         if after is not None and after.gaps is None:  # the violations of an inconsistent trajectory say little
             solver.update_multipliers(after)
         taken = after is not None
@@ -309,18 +321,25 @@ class MPC:
         iterations = len(result.history)
         self._record(now, begin, result.status, not taken, iterations, cost, result.alpha, shifted.x[0])
 
-    def _rescued(self, shifted: Policy, result: Iteration, after: Iterate | None) -> tuple[Iteration, Iterate | None]:
-        """The result of a tick and its trajectory, or those from another start where these are none, or worse."""
-        if self._starts is None or not (after is None or self._starts.always):
+    def _rescued(
+        self, shifted: Policy, result: Iteration, after: Iterate | None, began: float
+    ) -> tuple[Iteration, Iterate | None]:
+        """The result of a tick and its trajectory, or those from another start where these are none, or worse.
+
+        A start from which no plan follows is one itself: it is a rollout.
+        """
+        if self._starts is None or not (after is None or self._starts.always) or result.status == Status.TIME_LIMIT:
             return result, after
         start = self._starts.best(shifted.x, shifted.u, shifted.K)
         if start is None or (after is not None and start.merit >= after.merit):
             return result, after
         before = list(result.history)
-        if self._starts.exhausted:
-            return result._replace(now=start, K=shifted.K), start
-        other = self._solver.iterate(start, shifted.K)
-        return other._replace(history=[*before, *other.history]), other.now
+        if not self._starts.exhausted:
+            other = self._solver.iterate(start, shifted.K, began=began)
+            before += other.history
+            if self._usable(other, start):
+                return other._replace(history=before), other.now
+        return result._replace(status=Status.LINE_SEARCH, now=start, K=shifted.K, history=before), start
 
     def _rolled(self, guess: Iterate, K: Stack) -> Iterate | None:
         """After a rejected step: the rollout of the shifted plan under its gains, None when it is nowhere near it."""
@@ -348,8 +367,7 @@ class MPC:
         A plan that has been in force for `patience` ticks is no guess of states any more.
         """
         solver, patience = self._solver, self.settings.patience
-        last = self.log[-patience:] if patience else []
-        stalled = len(last) == patience and all(tick.fallback for tick in last)
+        stalled = patience is not None and self._fallbacks >= patience
         if self.settings.guess == "states" and not stalled:
             xs = shifted.x.copy()
             xs[0] = self.problem.start
@@ -377,6 +395,7 @@ class MPC:
         contacts = self._ground.touching(self._measured.last[1])
         ms, cpu = 1e3 * (clock.perf_counter() - begin[0]), 1e3 * (clock.thread_time() - begin[1])
         gap, error = float(np.abs(off[0]).max()), off[1:, : self.sim.nv].ravel()
+        self._fallbacks = self._fallbacks + 1 if fallback else 0
         self.log.append(
             Tick(now, ms, cpu, iterations, float(cost), alpha, gap, status, fallback, contacts, error, x, first)
         )

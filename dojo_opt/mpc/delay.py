@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from dojo_opt.mpc.measurement import Measurement
+from sim.simulator.adjustable_simulator import AdjustableSimulator
 from sim.simulator.simulator import Simulator
 from sim.simulator.state_space import rehearse
 from solvers.types import Vector
@@ -19,16 +20,19 @@ __all__ = ["Delay", "Prediction"]
 
 
 class Prediction:
-    """The motion of the model over `length` [s] from a measurement, in short steps."""
+    """The motion of the model over `length` [s] from a measurement, in short steps.
+
+    The model may change in place: each prediction has the ground and the parameters of its moment.
+    """
 
     def __init__(self, sim: Simulator, length: float) -> None:
+        self._sim = sim
         self._steps = int(np.ceil(length / _PREDICTION - 1e-9))
+        self._fine: AdjustableSimulator | None = None
         if self._steps:
             h = length / self._steps
             hard = min(_HARD, sim.kappa * h / sim.time_step)
-            self._fine: Simulator | None = sim.replace(time_step=h, kappa=hard)
-        else:
-            self._fine = None
+            self._fine = AdjustableSimulator.like(sim.replace(time_step=h, kappa=hard))
 
     def rehearse(self, x: Vector) -> None:
         """Make the calls of a prediction from x (nx,), so that no later one loads code."""
@@ -42,13 +46,17 @@ class Prediction:
             now: time of the measurement [s].
             measured: the measurements.
             command: input (nu,) at a time [s] and a state (nx,).
+
+        Raises:
+            SimulationError: a step of the prediction could not be solved.
         """
         if self._fine is None:
             return measured.state()
+        self._fine.follow(self._sim)
         ends, h = [], self._fine.time_step
         x = measured.over(h)
         for k in range(self._steps):
-            x = self._fine.step(x, command(now + (k + 0.5) * h, x)).x
+            x = self._fine.step(x, command(now + (k + 0.5) * h, x), throw=True).x
             ends.append((now + (k + 1) * h, x))
         return measured.after(ends)
 
@@ -81,7 +89,10 @@ class Delay:
             self._issued.popleft()
 
     def ahead(self, now: float, measured: Measurement) -> Vector:
-        """State (nx,) of the model when an input sent at `now` arrives: the measured one, advanced by the delay."""
+        """State (nx,) of the model when an input sent at `now` arrives: the measured one, advanced by the delay.
+
+        SimulationError: a step of the prediction could not be solved.
+        """
         return self._predict(now, measured, self._acting)
 
     def acting(self, now: float, u: Vector) -> Vector:

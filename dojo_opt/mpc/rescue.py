@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from time import perf_counter
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,7 +41,7 @@ class Rescue:
             that is the same on every machine (default None: no limit).
         always: whether every tick tries them, and takes a start that is better than its plan, not only one that is
             stuck (default False).
-        seed: seed of the splines, which are drawn anew in every tick (default 0).
+        seed: seed of the splines, which are drawn anew in every rescue (default 0).
     """
 
     splines: int = 8
@@ -86,17 +87,19 @@ class Starts:
     def forget(self) -> None:
         """Draw the same splines again."""
         self._random = np.random.default_rng(self._settings.seed)
+        self._until = np.inf  # end of the tick by `perf_counter` [s]
         self._last = np.inf  # iterations of the planner's steps after which a tick has none left
 
-    def begin(self) -> None:
-        """A tick begins."""
+    def begin(self, until: float) -> None:
+        """A tick begins, which may last until this time of `perf_counter` [s]."""
+        self._until = until
         if self._settings.iterations is not None:
             self._last = self._solver.step_iterations + self._settings.iterations
 
     @property
     def exhausted(self) -> bool:
-        """Whether the tick has used its iterations up."""
-        return self._solver.step_iterations >= self._last
+        """Whether the tick has used up its iterations or its time."""
+        return self._solver.step_iterations >= self._last or perf_counter() > self._until
 
     def best(self, x: Matrix, u: Matrix, K: Stack) -> Iterate | None:
         """The rollout of the least merit.
@@ -107,7 +110,7 @@ class Starts:
             K: (T, nu, ndx) its gains.
 
         Returns:
-            The rollout; None when the simulator can step none of them to its end.
+            The rollout; None when the simulator can step none of them to its end with a finite merit.
         """
         nominal, none = Iterate(x, u), np.zeros_like(K)
         starts = [(nominal, scale * K) for scale in reversed(SCALES)]  # without gains is the best in nearly all ticks
@@ -115,7 +118,8 @@ class Starts:
         found: Iterate | None = None
         for start, gains in starts:
             shot = self._solver.rollout(start, gains, _FEW_ITERATIONS)
-            found = shot if found is None or (shot is not None and shot.merit < found.merit) else found
+            if shot is not None and np.isfinite(shot.merit) and (found is None or shot.merit < found.merit):
+                found = shot
             if self.exhausted:
                 break
         return found

@@ -33,8 +33,8 @@ class MPCSettings:
         guess: first trajectory of a tick: "states" keeps the shifted states, "feedback" rolls out from the measured
             state under the gains, "open loop" without them (default "states").
         patience: ticks in a row without a new plan after which the next one begins with rollouts, whatever `guess` is;
-            None never does. Manipulators get out of stalled plans, while a robot that balances falls: of 100 runs of
-            `quadruped_mpc` under random disturbances 4 fell with 3, and none with None (default None).
+            None never does. Manipulators get out of stalled plans, while a robot that balances may fall
+            (default None).
         rescue: further starts of a tick whose plan is rejected, a `Rescue` (default None: the previous plan stays in
             force).
         gain_scale: factor of the feedback between plans; 0 applies the planned inputs without feedback (default 1).
@@ -52,9 +52,9 @@ class MPCSettings:
             True); see `dojo_opt.mpc.measurement`.
         friction: coefficient of friction that plans assume (default None: that of the model). A value below that of the
             ground is safer.
-        shrinkage: how much thinner than they are plans find the bodies of collisions [m]: about the gap across
-            which smooth contact presses, kappa over the impulse of a knot, so that fingers that follow a plan touch
-            what they hold (default 0).
+        shrinkage: reduction of the radius of one sphere or capsule of every collision in the model of the plans [m]:
+            about the gap across which smooth contact presses, kappa over the impulse of a knot, so that fingers that
+            follow a plan touch the object (default 0).
         learn_ground: whether to estimate the height of the ground from the stance contacts; "slope" estimates their
             plane, for a robot on a floating base, and turns the references with it (default False).
         adapt: parameters of the model that are estimated from the measurements while the controller runs, an

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
 from sim.mechanism.axes import contact_frame
+from sim.model.model import Model
 from sim.simulator.simulator import Simulator
 
 __all__ = ["AdjustableSimulator"]
@@ -47,6 +48,17 @@ class AdjustableSimulator(Simulator):
         if np.any(self.model.contact_hold) or self.order != 2 or self.accuracy:
             raise ValueError(f"{call}: expected steps of order 2, and contacts that move freely")
         self._engine.turn_ground(contact_frame(unit))
+
+    def follow(self, other: Simulator) -> None:
+        """Take over the parameters and the ground of another simulator, as they are now.
+
+        Args:
+            other: a simulator of the same mechanism, also one that was changed; time step and kappa stay.
+        """
+        for name, own, theirs in zip(Model._fields, self.model, other.model, strict=True):
+            if name != "optional":  # addresses of the kernels that each has linked
+                np.copyto(own, theirs)
+        self._engine.refresh()
 
     def set_parameters(self, values: Mapping[str, ArrayLike]) -> None:
         """Give parameters other values; those that are not named have the values that the simulator was made with.

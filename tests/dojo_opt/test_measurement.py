@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from dojo_opt.mpc.delay import Delay
+from dojo_opt.mpc.delay import Delay, Prediction
 from dojo_opt.mpc.measurement import Measurement
+from sim.simulator.adjustable_simulator import AdjustableSimulator
 from support.standing_hopper import HOPPER, standing_problem
 
 
@@ -32,6 +33,22 @@ def test_measured_velocity_is_left_alone_when_no_sample_is_a_model_step_old():
     assert measured.state()[8] == 0.7
     measured.add(0.2, x)
     assert measured.state()[8] == 0.7
+
+
+def test_predictions_have_the_parameters_of_a_model_that_has_changed():
+    sim = AdjustableSimulator.like(HOPPER)
+    measured, predict = Measurement(sim), Prediction(sim, 0.02)
+    measured.add(0.0, HOPPER.neutral())
+    before = predict(0.0, measured, lambda time, x: np.zeros(3))
+    heavy = 2.0 * float(HOPPER.parameters(("mass",)).values[0])
+    sim.set_parameters({f"mass:{HOPPER.mechanism.body_names[0]}": heavy})
+    sim.model.contact_height[:] = 0.01
+    changed = AdjustableSimulator.like(HOPPER.with_parameters({f"mass:{HOPPER.mechanism.body_names[0]}": heavy}))
+    changed.model.contact_height[:] = 0.01
+    expected = Prediction(changed, 0.02)(0.0, measured, lambda time, x: np.zeros(3))
+    after = predict(0.0, measured, lambda time, x: np.zeros(3))
+    assert np.abs(after - before).max() > 1e-3
+    np.testing.assert_array_equal(after, expected)
 
 
 def test_prediction_over_the_delay_ends_a_free_fall_where_it_ends():

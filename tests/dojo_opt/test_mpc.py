@@ -11,6 +11,7 @@ from dojo_opt.planning.iterate import Iterate
 from dojo_opt.planning.options import Options
 from dojo_opt.plant.tick import milliseconds
 from sim.model.record_columns import StepReport
+from sim.simulator.adjustable_simulator import AdjustableSimulator
 from sim.simulator.engines.dividing_engine import DividingEngine
 from sim.simulator.engines.engine import Engine
 from sim.simulator.engines.linked_model import LinkedModel
@@ -66,7 +67,7 @@ def test_stalled_ticks_begin_with_rollouts_after_the_patience(monkeypatch, patie
     """From the measured state, without gaps: the states of an old plan are far from it by then. The first plan counts
     as a new one; rollouts under the gains, half of them, and none are compared.
     """
-    mpc = dojo.MPC(standing_problem(), patience=patience)
+    mpc = dojo.MPC(standing_problem(), patience=patience, log=1)  # a log that is shorter than the patience
     x = HOPPER.neutral()
     mpc(0.0, x)
     rollouts, closed = [], []
@@ -304,7 +305,7 @@ def test_a_tick_whose_plan_is_rejected_starts_again_from_the_best_rollout(monkey
 
     monkeypatch.setattr(mpc._solver, "rollout", rolled)
     monkeypatch.setattr(mpc._solver, "iterate", iterated)
-    monkeypatch.setattr(mpc, "_usable", lambda result, guess: False)
+    monkeypatch.setattr(mpc, "_usable", lambda result, guess: any(guess is shot for shot in rollouts))
     moved = HOPPER.integrate(x, 1e-3 * np.eye(14)[0])
     mpc(0.05, moved)
     assert len(rollouts) == 5 and len(begun) == 2 and mpc.log[-1].iterations == 2
@@ -328,7 +329,7 @@ def test_a_rescue_ends_with_its_iterations(monkeypatch, iterations, tried, begun
     roll, iterate = mpc._solver.rollout, mpc._solver.iterate
     monkeypatch.setattr(mpc._solver, "rollout", lambda *given: (shots.append(roll(*given)), shots[-1])[1])
     monkeypatch.setattr(mpc._solver, "iterate", lambda *a, **b: (closed.append(iterate(*a, **b)), closed[-1])[1])
-    monkeypatch.setattr(mpc, "_usable", lambda result, guess: False)
+    monkeypatch.setattr(mpc, "_usable", lambda result, guess: any(guess is shot for shot in shots))
     for tick in (1, 2):  # every tick has as many
         before = mpc._solver.step_iterations
         mpc(0.05 * tick, HOPPER.integrate(x, 1e-3 * np.eye(14)[tick]))
@@ -358,6 +359,53 @@ def test_every_tick_takes_a_better_start_if_it_is_asked_to(monkeypatch, factor, 
     mpc(0.05, HOPPER.integrate(x, 1e-3 * np.eye(14)[0]))
     assert len(starts) == begun
     np.testing.assert_array_equal(mpc.policy.u, starts[-1].now.u)
+
+
+def test_a_start_of_a_rescue_is_the_plan_where_none_follows_from_it(monkeypatch):
+    """It is finite, and the log has no status of a failed plan; a tick without time has no rescue."""
+    mpc = dojo.MPC(standing_problem(), rescue=dojo.Rescue(splines=0))
+    x = HOPPER.neutral()
+    mpc(0.0, x)
+    shots, roll = [], mpc._solver.rollout
+
+    def rolled(*given):
+        shot = roll(*given)
+        shots.append(shot if shots else shot._replace(merit=np.nan))
+        return shots[-1]
+
+    monkeypatch.setattr(mpc._solver, "rollout", rolled)
+    monkeypatch.setattr(mpc, "_usable", lambda result, guess: False)
+    mpc(0.05, HOPPER.integrate(x, 1e-3 * np.eye(14)[0]))
+    assert len(shots) == 3 and (mpc.log[-1].status, mpc.log[-1].fallback) == (Status.LINE_SEARCH, False)
+    best = min(shots[1:], key=lambda shot: shot.merit)
+    np.testing.assert_array_equal(mpc.policy.u, best.u)
+    late = dojo.MPC(standing_problem(), rescue=dojo.Rescue(), time_limit=1e-9)
+    late(0.0, x)
+    late(0.05, HOPPER.integrate(x, 1e-3 * np.eye(14)[0]))
+    assert late.log[-1].fallback and late.log[-1].status == Status.TIME_LIMIT
+
+
+def test_a_rescue_has_a_start_where_no_rollout_under_gains_reaches_the_end(monkeypatch):
+    mpc = dojo.MPC(standing_problem(), guess="feedback", rescue=dojo.Rescue(splines=1))
+    x = HOPPER.neutral()
+    mpc(0.0, x)
+    roll = mpc._solver.rollout
+    monkeypatch.setattr(mpc._solver, "rollout", lambda start, gains, *few: roll(start, gains, *few) if few else None)
+    mpc(0.05, HOPPER.integrate(x, 1e-3 * np.eye(14)[0]))
+    assert not mpc.log[-1].fallback and mpc.log[-1].status != Status.SIMULATION_FAILED
+
+
+def test_a_tick_whose_start_cannot_be_predicted_keeps_the_old_plan():
+    mpc = dojo.MPC(standing_problem(), computation=0.02)
+    x = HOPPER.neutral()
+    mpc(0.0, x)
+    before, fine = mpc.policy, mpc._predict._fine
+    mpc._predict._fine = AdjustableSimulator.like(fine.replace(max_iterations=1, divide=False))
+    mpc(0.05, HOPPER.integrate(x, 1e-2 * np.ones(14)))
+    assert mpc.policy is before and mpc.log[-1].fallback and mpc.log[-1].status == Status.SIMULATION_FAILED
+    mpc._predict._fine = fine
+    mpc(0.1, x)
+    assert not mpc.log[-1].fallback
 
 
 def test_plans_find_bodies_thinner_by_the_shrinkage():
