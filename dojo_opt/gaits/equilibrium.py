@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -62,19 +62,14 @@ def least_pushes(pushes: Floats, load: Floats, even: float) -> Floats:
     return np.asarray(nnls(rows, np.concatenate([load, np.zeros(len(pushes))]))[0])
 
 
-def _between_stops(sim: Simulator, x: Floats) -> Iterator[tuple[str, Floats, Floats, Floats]]:
-    """(joint, q, lo, hi) of all joints with scalar coordinates."""
-    for joint in sim.mechanism.joints:
-        if joint.nrot != 3:
-            lo, hi = np.array(list(joint.limits or ()), dtype=np.float64).reshape(-1, 2).T
-            yield joint.name, x[sim.mechanism.q_slice(joint.name)], lo, hi
-
-
 def _stop_distances(sim: Simulator, x: Floats) -> tuple[Floats, Floats]:
-    """(nv,) distances of the joints from their lower and upper stops, infinite without one."""
+    """(nv,) distances of the joints from their lower and upper stops, infinite without one; cones are no stops here."""
     below, above = np.full(sim.nv, np.inf), np.full(sim.nv, np.inf)
-    for name, q, lo, hi in _between_stops(sim, x):
-        below[sim.mechanism.v_slice(name)], above[sim.mechanism.v_slice(name)] = q - lo, hi - q
+    low, high = sim.mechanism.coordinate_limits
+    for joint in sim.mechanism.joints:
+        q, v = sim.mechanism.q_slice(joint.name).start, sim.mechanism.v_slice(joint.name).start
+        for k in range(joint.scalar_count):
+            below[v + k], above[v + k] = x[q + k] - low[q + k], high[q + k] - x[q + k]
     return below, above
 
 
@@ -94,16 +89,19 @@ def _off_stops(sim: Simulator, x: Floats) -> Floats:
     """
     out, h = x.copy(), sim.time_step
     load = float(np.abs(potential_gradient(sim, x)).max(initial=0.0))
-    for name, q, lo, hi in _between_stops(sim, x):
-        span = np.where(np.isfinite(hi - lo), hi - lo, 1.0)
-        if np.any((q < lo - 1e-9 * span) | (q > hi + 1e-9 * span)):
+    q, (lo, hi) = x[: sim.nq], sim.mechanism.coordinate_limits
+    span = np.where(np.isfinite(lo) & np.isfinite(hi), hi - lo, 1.0)
+    beyond = (q < lo - 1e-9 * span) | (q > hi + 1e-9 * span)
+    for joint in sim.mechanism.joints:
+        at = sim.mechanism.q_slice(joint.name)
+        if beyond[at].any():
             raise ValueError(
-                f"equilibrium({sim.mechanism.name}): joint {name!r} is beyond its stops: {q} in [{lo}, {hi}]"
+                f"equilibrium({sim.mechanism.name}): joint {joint.name!r} is beyond its stops: {q[at]} in [{lo[at]}, "
+                f"{hi[at]}]"
             )
-        least = sim.kappa / (h * max(load, 1e-9))
-        off = np.minimum(np.maximum(least, np.minimum(least / _ABOUND, _ABOUND * span)), 0.5 * span)
-        at = sim.mechanism.q_slice(name)
-        out[at] = np.where(q <= lo, lo + off, np.where(q >= hi, hi - off, q))
+    least = sim.kappa / (h * max(load, 1e-9))
+    off = np.minimum(np.maximum(least, np.minimum(least / _ABOUND, _ABOUND * span)), 0.5 * span)
+    out[: sim.nq] = np.where(q <= lo, lo + off, np.where(q >= hi, hi - off, q))
     return out
 
 
@@ -248,7 +246,7 @@ class _Rest(NamedTuple):
         """The state that the robot sinks into with its driven joints held, on contacts that become hard as it sinks.
 
         Along `loose`, from where nothing touches: which contacts carry is found by the smoothing, from afar. Inputs
-        that hold all joints of an arm lift it off what it touches.
+        that hold all joints of an arm lift it off the ground.
         """
         sim, feet, (_, allowed, loose) = self.sim, self.feet, self.motions
         along = loose if loose.size else allowed
@@ -354,7 +352,7 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     weight = float(np.abs(potential_gradient(sim, state)).max(initial=0.0))
     most = max(_LEFT * weight, _NOTHING * sum(body.mass for body in mech.bodies))
     motions = StaticMotions.at(sim, state)
-    names = mech.contact_names[: len(mech.contacts)]
+    names = mech.ground_contact_names
     if not names:
         return state, _held(sim, motions, potential_gradient(sim, state) - stop_torques(sim, state), most, "inputs")
     rest = _Rest(sim, Feet(sim, names), motions)

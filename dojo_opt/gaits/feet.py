@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -239,20 +238,16 @@ class Feet:
 
     def _check_stops(self, x: Floats) -> None:
         """Refuse angles beyond the limits of a joint."""
+        low, high = self.sim.mechanism.coordinate_limits
         for joint in self.sim.mechanism.joints[1:]:
-            q = x[:, self.sim.mechanism.q_slice(joint.name)]
-            for dof, (lo, hi) in enumerate(_limits(joint)):
-                worst = float(np.maximum(lo - q[:, dof], q[:, dof] - hi).max())
+            at = self.sim.mechanism.q_slice(joint.name)
+            for q, lo, hi in zip(x[:, at].T, low[at], high[at], strict=True):
+                worst = float(np.maximum(lo - q, q - hi).max())
                 if worst > 0.0:
                     raise ValueError(
                         f"Feet.place(targets): joint {joint.name!r} would have to go {worst:.3g} rad beyond its limits "
                         f"[{lo:g}, {hi:g}]"
                     )
-
-
-def _limits(joint: Any) -> list[tuple[float, float]]:
-    """(lo, hi) of the scalar coordinates of a joint."""
-    return [] if joint.nrot == 3 else list(joint.limits)
 
 
 def _grounds(contacts: Sequence[Contact]) -> list[tuple[Contact, int | list[int]]]:

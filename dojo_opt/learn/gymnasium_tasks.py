@@ -115,15 +115,6 @@ def _model(file: str) -> MjcfMechanism:
     return mech
 
 
-def _coordinate_limits(mech: Mechanism) -> tuple[Floats, Floats]:
-    """(lower, upper) limits of the coordinates, (nq,) each, infinite where there are none."""
-    low, high = np.full(mech.nq, -np.inf), np.full(mech.nq, np.inf)
-    for joint in mech.joints:
-        if joint.nrot < 3 and joint.limits is not None:
-            low[mech.q_slice(joint.name)], high[mech.q_slice(joint.name)] = np.transpose(joint.limits)
-    return low, high
-
-
 def least_gap(mech: Mechanism) -> Callable[[Floats], float]:
     """Distance of the lowest contact from level ground, as all contacts of these models have it, quickly.
 
@@ -168,7 +159,7 @@ def _starts(
         if joint.nrot == 3:
             stop = mech.q_slice(joint.name).stop
             quaternions.append(slice(stop - 4, stop))
-    (low, high), lowest = _coordinate_limits(mech), least_gap(mech)
+    (low, high), lowest = mech.coordinate_limits, least_gap(mech)
 
     def start(rng: np.random.Generator) -> Floats:
         q = home + rng.uniform(-position, position, len(home))
@@ -341,7 +332,7 @@ def half_cheetah() -> Task:
 def _legged(name: str, file: str, observations: int, limit_cost: float = 0.0) -> Task:
     """A robot in a plane that moves forward on one leg or two, and ends where it falls."""
     mech, functions = _model(file), FUNCTIONS[name]()
-    limits = _coordinate_limits(mech)
+    limits = mech.coordinate_limits
     functions["reward"] = with_limit_cost(f"dojo.learn.{name.lower()}", functions["reward"], limits, limit_cost)
     return _task(
         mech, 4, 0.002, observations=observations,

@@ -60,7 +60,7 @@ def check_gears(call: str, gears: Sequence[Gear], joints: Sequence[Joint]) -> No
     for g in gears:
         for name, dof in ((g.joint, g.dof), (g.other, g.other_dof)):
             joint = by_name[checks.one_of(f"{call}: joint of gear {g.name!r}", name, by_name)]
-            scalar = joint.ntrans if joint.nrot == 3 else joint.nv
+            scalar = joint.scalar_count
             if not isinstance(dof, int | np.integer) or not 0 <= dof < scalar:
                 raise ValueError(
                     f"{call}: gear {g.name!r}: joint {name!r} has {scalar} scalar coordinates, got {dof!r}"

@@ -152,6 +152,11 @@ class Joint:
         return self.ntrans + self.nrot
 
     @property
+    def scalar_count(self) -> int:
+        """Number of its coordinates that are numbers of their own, the first ones: all but those of three rotations."""
+        return self.ntrans if self.nrot == 3 else self.nv
+
+    @property
     def nq(self) -> int:
         """Number of coordinates: one per degree of freedom, four for three rotations."""
         return self.nv + (self.nrot == 3)

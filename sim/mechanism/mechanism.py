@@ -22,6 +22,7 @@ from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.gear import Gear, check_gears
 from sim.mechanism.input import Input
 from sim.mechanism.joint import WORLD, Joint
+from sim.mechanism.joint_coordinates import coordinate_limits, coordinates
 from sim.mechanism.loop_joints import carried
 from sim.mechanism.naming import name_contacts, name_inputs
 from sim.mechanism.renamed import renamed
@@ -98,7 +99,7 @@ class Mechanism:
         check_gears(f"{call})", self.gears, joints)
         if self.nv == 0:
             raise ValueError(f"{call}): no joint is free to move")
-        object.__setattr__(self, "neutral", self._coordinates(f"{call}, neutral=...)", self.neutral))
+        object.__setattr__(self, "neutral", coordinates(f"{call}, neutral=...)", self.joints, self.neutral))
         if itself:
             object.__setattr__(self, "collisions", tuple(self.self_collisions()[0]))
         ends = dict.fromkeys([*self.body_names, WORLD])
@@ -168,6 +169,11 @@ class Mechanism:
         out = np.array([np.asarray(c.normal) for c in self.contacts], dtype=np.float64).reshape(-1, 3)
         out.flags.writeable = False
         return out
+
+    @cached_property
+    def coordinate_limits(self) -> tuple[Floats, Floats]:
+        """(lower, upper) limits of the coordinates, (nq,) each, infinite where there are none [m, rad]."""
+        return coordinate_limits(self.joints)
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -325,27 +331,6 @@ class Mechanism:
             """The error for a name that a mechanism does not have, with the way to those of a simulator."""
             way = f"; a simulator has: dojo.Simulator(mechanism, time_step=0.01).{name}" * (name in _OF_SIMULATORS)
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{way}", name=name, obj=self)
-
-    def _coordinates(self, call: str, given: Any) -> tuple[float, ...]:
-        """q from a dict by joint, or from a vector; quaternions are checked and normalised."""
-        q = np.zeros(self.nq)
-        table = {} if given is None else given
-        if isinstance(table, Mapping):
-            for name in table:
-                checks.one_of(f"{call}: joint", name, self._slices)
-        else:
-            values = checks.array(call, table, (self.nq,))
-            table = {j.name: values[self.q_slice(j.name)] for j in self.joints}
-        for joint in self.joints:
-            at = self.q_slice(joint.name)
-            if joint.nrot == 3:
-                q[at.stop - 4] = 1.0
-            if joint.name in table:
-                value = checks.array(f"{call}: joint {joint.name!r}", np.atleast_1d(table[joint.name]), (joint.nq,))
-                q[at] = value
-                if joint.nrot == 3:
-                    q[at.stop - 4 : at.stop] = checks.quaternion(f"{call}: joint {joint.name!r}", value[-4:])
-        return tuple(float(x) for x in q)
 
 
 _KINDS = {

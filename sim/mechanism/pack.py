@@ -138,8 +138,7 @@ def _pack_joints(joints: Sequence[Joint], model: Model) -> None:
         model.joint_swing_axes[i] = translation_axes(2, joint.axis)[:2].ravel()
         model.dof_body[dofs] = i
         # the three degrees of freedom of a quaternion all point at its start
-        last = joint.ntrans if joint.nrot == 3 else joint.nv
-        model.dof_qadr[dofs] = model.body_qadr[i] + np.minimum(np.arange(joint.nv), last)
+        model.dof_qadr[dofs] = model.body_qadr[i] + np.minimum(np.arange(joint.nv), joint.scalar_count)
         model.dof_spring[dofs], model.dof_damper[dofs] = np.asarray(joint.spring), np.asarray(joint.damper)
         model.dof_armature[dofs], model.dof_rest[dofs] = np.asarray(joint.armature), np.asarray(joint.rest)
         for dof, sign, bound in _bounds(joint):

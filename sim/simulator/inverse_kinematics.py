@@ -267,7 +267,7 @@ def _bounds(kin: Kinematics, fixed: Sequence[str], limits: bool) -> tuple[Floats
 def _limitable(kin: Kinematics) -> Iterator[tuple[slice, slice]]:
     """By joint, its coordinates without those of a quaternion, and their degrees of freedom."""
     for joint in kin.mechanism.joints:
-        count = joint.ntrans if joint.nrot == 3 else joint.nv
+        count = joint.scalar_count
         first, v = kin.mechanism.q_slice(joint.name).start, kin.mechanism.v_slice(joint.name).start
         yield slice(first, first + count), slice(v, v + count)
 

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import dojo_opt as dojo
+from dojo_opt.gaits.equilibrium import stop_torques
 from sim.mechanism.axes import contact_frame, translation_axes
 from sim.mechanism.body import Body
 from sim.mechanism.contact import Contact
@@ -146,3 +148,24 @@ def test_mechanisms_are_values() -> None:
     assert two() == two() and hash(two()) == hash(two())
     assert replace(two(), gravity=(0, 0, 0)) != two()
     assert replace(two(), name="other").neutral == two().neutral
+
+
+def test_limits_of_coordinates_include_the_slides_of_joints_that_turn_freely() -> None:
+    joints = [
+        dojo.Joint("cylindrical_free", None, "a", axis=(0, 0, 1), limits=[(-0.1, 0.2), None, None, None]),
+        dojo.Joint("revolute", "a", "b", axis=(0, 1, 0), limits=(-1.0, 2.0)),
+        dojo.Joint("spherical", "b", "c", cone=0.5),
+    ]
+    mech = dojo.Mechanism([dojo.Body(name, 1.0, (0.1, 0.1, 0.1)) for name in "abc"], joints)
+    low, high = mech.coordinate_limits
+    free = [np.inf] * 4
+    np.testing.assert_array_equal(low, np.negative([0.1, *free, 1.0, *free]))
+    np.testing.assert_array_equal(high, [0.2, *free, 2.0, *free])
+    sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-4)
+    x = sim.neutral()
+    x[0] = 0.15
+    torques = stop_torques(sim, x)
+    np.testing.assert_allclose(torques[0], 1e-2 * (1.0 / 0.25 - 1.0 / 0.05))
+    x[0] = 0.3
+    with pytest.raises(ValueError, match="joint 'a' is beyond its stops"):
+        dojo.equilibrium(sim, x)

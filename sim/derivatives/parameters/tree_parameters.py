@@ -108,7 +108,7 @@ def joint_parameters(joint: Joint, d: int, driven: Set[str | None]) -> list[Para
 
     driven: names of joints with position servos, whose springs are one with theirs: they have no rest.
     """
-    plain = joint.ntrans if joint.nrot == 3 else joint.nv
+    plain = joint.scalar_count
     springs = np.asarray(joint.spring)[: plain + (joint.nrot == 3)]
     rests = () if joint.name in driven else joint.rest
     if joint.name in driven and np.any(joint.rest):
