@@ -27,10 +27,12 @@ from sim.integrators.substep_lengths import (
     lengthen,
     lengthen_kink,
     next_length,
+    note_miss,
     shorten,
     shorten_impact,
     shorten_unsolved,
     shorter,
+    stalls,
 )
 from sim.integrators.substeps import AccuracyGoal, Clock, Embedded, SubstepState, begin_substeps, keep, rest_contacts
 from sim.model.data import Data
@@ -47,6 +49,7 @@ _SOLVED = int(Status.SOLVED)
 _ACCURACY_NOT_REACHED = int(Status.ACCURACY_NOT_REACHED)
 _NOT_FINITE, _CONTACT_SUNK = int(Status.NOT_FINITE), int(Status.CONTACT_SUNK)
 _KINK, _KINKS = 0.05, 0.2  # error of a step with a kink, and of all in a step, in accuracies
+_LONGER = 3.0  # times a length beyond the shortest that was not kept
 _INSTANT = 1e-13  # [s] between a landing and the node before it
 _SUDDEN = 8.0  # ratio of the lengths of steps on a kink and before it
 
@@ -115,7 +118,7 @@ def _allows(clock: Vector, h: float, shortest: float, ratio: float) -> bool:
     sudden = _SUDDEN * h < clock[Clock.RECENT] or clock[Clock.HIT] > 0.0
     kink = sudden and clock[Clock.LEAST] > 0.0 and error < _KINK and error + clock[Clock.KINKS] < _KINKS
     beyond = clock[Clock.BEYOND] > 0.0 and (error < 1.0 or clock[Clock.ANY] > 0.0)
-    return ratio <= 1.0 or kink or h <= shortest or beyond
+    return ratio <= 1.0 or kink or h <= shortest or beyond or stalls(clock, error)
 
 
 @kernel
@@ -123,11 +126,11 @@ def _go_beyond(clock: Vector, h: float, rest: float, shortest: float, status: in
     """The next length after one beyond the shortest that was not kept; from the beginning, where none was, with any
     error allowed. The Status.
     """
-    clock[Clock.BEYOND] = 1.7 * h
+    clock[Clock.BEYOND] = _LONGER * h
     if h < rest:
         return _SOLVED
     if clock[Clock.ANY] == 0.0:
-        clock[Clock.ANY], clock[Clock.BEYOND] = 1.0, 1.7 * shortest
+        clock[Clock.ANY], clock[Clock.BEYOND] = 1.0, _LONGER * shortest
         return _SOLVED
     return _ACCURACY_NOT_REACHED if status == _SOLVED or status == LANDS else status
 
@@ -148,7 +151,7 @@ def take_short(
     if status == _SOLVED and _allows(clock, h, shortest, ratio):
         if ratio > 1.0:
             lengthen_kink(clock, h, ratio, shortest)
-            clock[Clock.KINKS] += ratio * h
+            clock[Clock.KINKS] += ratio * h if ratio * h < _KINK else 0.0
         else:
             lengthen(clock, h, ratio, shortest)
         keep(line, h, int(clock[Clock.ORDER]))
@@ -161,13 +164,14 @@ def take_short(
         return _go_beyond(clock, h, rest, goal[AccuracyGoal.IMPACT], status)
     if status == _SOLVED and clock[Clock.HIT] > 0.0:  # its error is h times the rest of the accuracy for it
         left = min(_KINK, _KINKS - clock[Clock.KINKS])
+        note_miss(clock, ratio * h)
         shorten_impact(clock, h, max(h * min(0.5, max(0.01, 0.8 * left / (ratio * h))), shortest))
     elif status == _SOLVED:
         shorten(clock, h, ratio, shortest)
     elif status == LANDS:
         return _SOLVED if h > _INSTANT else _ACCURACY_NOT_REACHED
     elif h <= shortest:
-        clock[Clock.BEYOND] = 1.7 * h
+        clock[Clock.BEYOND] = _LONGER * h
     else:
         shorten_unsolved(clock, h, shortest)
     return _SOLVED

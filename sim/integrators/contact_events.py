@@ -20,6 +20,7 @@ from solvers.types import Vector
 NEVER = 1e300  # [s]
 UNKNOWN, BEGINS = -1.0, -2.0  # in place of a slip
 _ACCELERATION = 1e3  # [m/s^2] of impacts at least that forget the slip
+LANDED = 0.25  # error of a contact at its node before it lands, in accuracies
 _HIT = 1e2  # [m/s^2, rad/s^2] of impacts at least
 
 
@@ -81,19 +82,22 @@ def landing(
     """The Landing of the step just solved, which began at mean = (q, v15); configuration 3 is used up.
 
     Its error is twice the gap at the beginning, or the way of the velocity's jump in the time of the step: the jump by
-    more than twice the impulse kappa/gap of the step before. Contacts that land have no slip before.
+    more than twice the impulse kappa/gap of the step before. Contacts that land have no slip before. Those that are
+    closed and feel the impact of others land at once: they count where no other lands.
     """
     h, nq = options.h, data.theta1.shape[0]
     error, ahead, longest, depth, hits = 0.0, NEVER, NEVER, 0.0, False
+    least, apart = LANDED * accuracy, NEVER
     for k in range(model.limit_dof.shape[0]):
         gap, time = _limit_reached(model, data, k, mean)
         depth = max(depth, -gap)
         if gap > 8.0 * data.bound_gap[k]:  # it is touched in the end
             jump = h * abs(data.nu[model.limit_dof[k]] - mean[nq + model.limit_dof[k]])
             error, ahead = max(error, min(2.0 * gap, jump)), min(ahead, time)
+            apart = min(apart, time if min(2.0 * gap, jump) > least else NEVER)
             hits = hits or jump > h * h * _HIT
     if data.active_count[0] == 0:
-        return Landing(error, ahead, longest, depth, hits)
+        return Landing(error, apart if apart < NEVER else ahead, longest, depth, hits)
     look_back(model, data, h, 1)
     look_back(model, data, h, 2)
     for m in range(data.active_count[0]):
@@ -106,8 +110,9 @@ def landing(
         if jump > 0.0:
             push = h * jump / mass if mass > 0.0 else NEVER
             error = max(error, min(2.0 * gap, push))
-            ahead = min(ahead, _time_to_land(model, data, h, c, m < data.active_ground_count[0]))
+            time = _time_to_land(model, data, h, c, m < data.active_ground_count[0])
+            ahead, apart = min(ahead, time), min(apart, time if min(2.0 * gap, push) > least else NEVER)
             if push > h * h * _ACCELERATION:
                 slips[c] = UNKNOWN
             hits = hits or push > h * h * _HIT
-    return Landing(error, ahead, longest, depth, hits)
+    return Landing(error, apart if apart < NEVER else ahead, longest, depth, hits)

@@ -15,8 +15,8 @@ from sim.dynamics.kinematics import displace
 from sim.dynamics.state_manifold import configuration_difference
 from sim.integrators.mean_velocity import close_node
 from sim.integrators.node_step import begin_part, followed, mean_of_node, node_of_mean, part_of, step_mean
-from sim.integrators.slip_stop import friction_turns
-from sim.integrators.substeps import Embedded, SubstepState
+from sim.integrators.slip_stop import friction_turn
+from sim.integrators.substeps import Clock, Embedded, SubstepState
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
@@ -76,12 +76,14 @@ def raise_order(model: Model, data: Data, line: SubstepState, embedded: Embedded
     1e300 where it stays of order 2: with loops or gears, where friction turns, and where q1 and q2 are so far apart
     that gaps between them are no straight line.
     """
-    if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0 or friction_turns(line.parts, accuracy):
+    if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0:
         return 1e300
     apart = 0.0
     for d in range(embedded.distance.shape[0]):
         apart = max(apart, abs(embedded.distance[d]))
-    if apart > _STRAIGHT:
+    rough = max(friction_turn(line.parts, accuracy), (apart / _STRAIGHT) ** (1.0 / 3.0))
+    line.clock[Clock.ROUGH] = rough
+    if rough > 1.0:
         return 1e300
     combine_pair(model, data, line.node, line.trial, line.trial, embedded.rate)
     one, other, whole = line.parts[0], line.parts[1], line.parts[2]

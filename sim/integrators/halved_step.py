@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from sim.contact.contact_report import report_contacts
 from sim.dynamics.state_manifold import configuration_difference
-from sim.integrators.contact_events import NEVER, Landing, landing
+from sim.integrators.contact_events import LANDED, NEVER, Landing, landing
 from sim.integrators.extrapolated_step import CLOSED, NOISE, extrapolate, raise_order
 from sim.integrators.node_step import (
     begin_part,
@@ -35,13 +35,14 @@ LANDS = -2  # in place of a Status, beside NEAR: a contact or limit is reached w
 FAILED = 1e300
 
 _SOLVED = int(Status.SOLVED)
-_TOUCHING = 0.125  # gap of a contact that closes, in accuracies
 _PRESSED, _HELD = 8.0, 4.0
 _OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes deeper ones, whatever its length
 _LITTLE, _WAIT = 0.01, 4.0  # least ratio of a step that is extrapolated; steps without that after one in vain
 _NEAR_START = 0.01  # share of the tolerance
 _SETTLES = 1.5  # times the length in which contacts settle: in shorter steps their gaps oscillate
-_FEW = 40  # iterations of a step that may be shorter: at folds, the interior point would try all its starts
+# iterations of a step that may be shorter, and of one that may be longer: at folds, the interior point would try all
+# its starts
+_FEW, _MANY = 40, 100
 _AHEAD = 1e-3  # [s] least length of the steps behind an impact whose velocities are compared
 
 
@@ -176,10 +177,12 @@ def _extrapolated(
 
 @kernel
 def _patient(model: Model, goal: Vector, settings: Vector, clock: Vector, h: float) -> StepOptions:
-    """Options of a step of length h in two parts: with few iterations where a shorter one can be tried instead."""
+    """Options of a step of length h in two parts: with few iterations where another length can be tried instead."""
     options = part_of(goal, settings, h, 2)
-    needed = h <= goal[AccuracyGoal.IMPACT] or clock[Clock.BEYOND] > 0.0
-    return within(options, options.max_iterations if needed else _FEW, _share(model))
+    if clock[Clock.ANY] > 0.0:
+        return within(options, options.max_iterations, _share(model))
+    shortest = h <= goal[AccuracyGoal.IMPACT] or clock[Clock.BEYOND] > 0.0
+    return within(options, _MANY if shortest else _FEW, _share(model))
 
 
 @kernel
@@ -214,7 +217,7 @@ def _ends_before(goal: Vector, line: SubstepState, found: Landing, h: float) -> 
     if found.hits and h > clock[Clock.IMPACT] and clock[Clock.BEYOND] == 0.0:
         shorten_impact(clock, h, clock[Clock.IMPACT])
         return True
-    if found.error > 2.0 * _TOUCHING * goal[AccuracyGoal.ACCURACY]:
+    if found.error > LANDED * goal[AccuracyGoal.ACCURACY]:
         clock[Clock.CUT] = before_landing(h, found.ahead)
         return True
     return False
@@ -250,7 +253,7 @@ def try_short(
     """line.trial = the node one step of length h after line.x; (Status or LANDS, error over allowed)."""
     model, data, clock = model_view(models[1]), data_view(data_tables[0]), line.clock
     options = _patient(model, goal, settings, clock, h)
-    clock[Clock.ORDER], clock[Clock.PUSH] = 2.0, 0.0
+    clock[Clock.ORDER], clock[Clock.PUSH], clock[Clock.ROUGH] = 2.0, 0.0, 0.0
     status = _whole(models[1], data_tables[0], options, line)
     if status != _SOLVED:
         return status, FAILED

@@ -64,14 +64,14 @@ def stopping_error(model: Model, parts: Cube, slips: Vector, h: float) -> float:
 
 
 @kernel
-def friction_turns(parts: Cube, accuracy: float) -> bool:
-    """Whether the friction of a contact that slides, over its normal impulse, differs in both halves by more than the
-    accuracy [m/s, rad/s] in 1 m/s.
+def friction_turn(parts: Cube, accuracy: float) -> float:
+    """Largest change of the friction of a contact that slides, over its normal impulse, from one half to the other,
+    over the accuracy [m/s, rad/s] in 1 m/s.
 
     It acts along the slip in the end of a step. Where that turns, the error is of order 1, and alike in a step and its
     halves.
     """
-    most = max(accuracy, _TURN)
+    most, largest = max(accuracy, _TURN), 0.0
     for c in range(parts.shape[1]):
         one, other = parts[0, c], parts[1, c]
         before, after = _normal_impulse(one), _normal_impulse(other)
@@ -82,6 +82,5 @@ def friction_turns(parts: Cube, accuracy: float) -> bool:
             n1, n2 = one[ContactRow.NORMAL + k], other[ContactRow.NORMAL + k]
             change = other[ContactRow.IMPULSE + k] / after - n2 - one[ContactRow.IMPULSE + k] / before + n1
             turned += change * change
-        if turned > most * most:
-            return True
-    return False
+        largest = max(largest, turned)
+    return sqrt(largest) / most

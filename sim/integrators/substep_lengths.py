@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 from sim.integrators.contact_events import NEVER
 from sim.integrators.substeps import Clock
 from solvers.compiler import kernel
@@ -12,6 +14,9 @@ _FAR = 0.1  # error over allowed of a step that is much too short
 _AGAIN = 0.5  # most of a length that was refused a second time at a node
 _RISES = 1.25  # share of the longest length after each step that was kept
 _TRIES = 4.0  # lengths 5, 25, ... times the shortest that are tried in turn, where that misses the accuracy
+_STALLED = 0.5  # error of an impact over that in a longer step
+_SLIGHT, _LARGE = 0.1, 1.0  # errors of impacts, in accuracies
+_PRESSED = 8.0  # error over allowed of a step of order 2 in contact, over that of the same step of order 4
 _UP_TO, _NEARLY, _HALF_WAY = 0.98, 16.0, 0.5  # of the time to an impact; where impacts are so much shorter than it
 
 
@@ -44,13 +49,24 @@ def _power(clock: Vector) -> float:
 
 
 @kernel
+def _straight(clock: Vector, h: float, ratio: float, length: float) -> float:
+    """The length, at most the longest with order 4 after a step of order 4, or that with order 2 where this is longer:
+    its error over allowed is 8 times as large.
+    """
+    if clock[Clock.ORDER] != 4.0 or clock[Clock.ROUGH] == 0.0:
+        return length
+    rough = h * sqrt(0.5 / (_PRESSED * max(ratio, 1e-12)))
+    return min(length, max(_SAFE * h / clock[Clock.ROUGH], rough))
+
+
+@kernel
 def lengthen(clock: Vector, h: float, ratio: float, shortest: float) -> None:
     """After a step of order 2 to 6 with an error that is allowed.
 
     Impacts come in cascades: the step behind one is as short as that. A length without a solution is not tried again
     before lengths have risen to it.
     """
-    length = longer(h, ratio, clock[Clock.SHORT_RATIO], _power(clock))
+    length = _straight(clock, h, ratio, longer(h, ratio, clock[Clock.SHORT_RATIO], _power(clock)))
     clock[Clock.RECENT], clock[Clock.SHORT_RATIO], clock[Clock.MISSES] = h, max(ratio, 1e-4), 0.0
     clock[Clock.SHORT] = max(length, clock[Clock.SHORT] if h < 0.99 * clock[Clock.SHORT] else shortest)
     if clock[Clock.HIT] > 0.0:
@@ -79,7 +95,10 @@ def shorten(clock: Vector, h: float, ratio: float, shortest: float) -> None:
     """After a step without an impact whose error is too large; the second one of a node may be on a kink."""
     most = 0.9 if clock[Clock.REFUSED] == 0.0 else _AGAIN
     clock[Clock.REFUSED] = 1.0
-    length = min(next_length(h, ratio, 1.0, _power(clock)), most * h)
+    length = next_length(h, ratio, 1.0, _power(clock))
+    if clock[Clock.ROUGH] > 1.0:  # with order 4
+        length = max(length, _SAFE * h * min(1.0 / clock[Clock.ROUGH], sqrt(_PRESSED / ratio)))
+    length = min(length, most * h)
     clock[Clock.SHORT] = max(length, shortest) if clock[Clock.MISSES] == 0.0 else shortest
 
 
@@ -87,6 +106,23 @@ def shorten(clock: Vector, h: float, ratio: float, shortest: float) -> None:
 def shorten_unsolved(clock: Vector, h: float, shortest: float) -> None:
     """After a step that has no solution."""
     clock[Clock.SHORT], clock[Clock.CEILING] = max(0.25 * h, shortest), 0.5 * h
+
+
+@kernel
+def stalls(clock: Vector, error: float) -> bool:
+    """Whether an impact is kept since shorter steps make it no more exact: once where its error is slight, twice
+    where it is large, and told. That of bodies which hit in turn may depend on the order, and jump.
+    """
+    stalled = clock[Clock.HIT] > 0.0 and 0.0 < _STALLED * clock[Clock.MISS] < error
+    return stalled and (error < _SLIGHT or clock[Clock.STALLS] > 0.0 and error > _LARGE)
+
+
+@kernel
+def note_miss(clock: Vector, error: float) -> None:
+    """After an impact that was refused for its error, in accuracies."""
+    stalled = 0.0 < _STALLED * clock[Clock.MISS] < error
+    clock[Clock.STALLS] = clock[Clock.STALLS] + 1.0 if stalled else 0.0
+    clock[Clock.MISS] = error
 
 
 @kernel

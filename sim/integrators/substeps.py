@@ -41,6 +41,9 @@ class Clock(Code):
     REFUSED = 22  # 1 where the error of a step from this node was too large
     MISSES = 23  # steps of the shortest length in a row whose error is too large
     PUSH = 24  # velocity that contacts give as they open, in the step just tried [m/s, rad/s]
+    MISS = 25  # error of the last impact that was refused, in accuracies; 0: none since the last one kept
+    STALLS = 26  # impacts refused in a row that were no more exact than the one before
+    ROUGH = 27  # length of the step just tried over the longest of order 4, 0 where that is not known
 
 
 class AccuracyGoal(Code):
@@ -68,7 +71,7 @@ class SubstepState(NamedTuple):
     half: Vector
     node: Vector  # (nx,) scratch: the node after the undivided step
     ahead: Vector  # (nx,) scratch: mean state of a step from there
-    clock: Vector  # (25,) in place
+    clock: Vector  # (28,) in place
     report: Vector  # (6,)
     parts: Cube  # (3, ncontact, 11) scratch: contacts of both halves, and of the whole step
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the step
@@ -120,6 +123,7 @@ def keep(line: SubstepState, h: float, order: int) -> None:
     line.clock[Clock.BEYOND] = line.clock[Clock.ANY] = 0.0
     if order == 8 or line.clock[Clock.HIT] > 0.0:
         line.clock[Clock.IMPACT] = NEVER
+        line.clock[Clock.MISS] = line.clock[Clock.STALLS] = 0.0
     if order != 8:
         line.clock[Clock.READY] = 0.0
         add_contacts(line)

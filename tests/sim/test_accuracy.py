@@ -13,8 +13,8 @@ from scipy.integrate import solve_ivp
 import dojo_opt as dojo
 from dojo_opt import models
 from sim.integrators.adaptive import _allows, _go_beyond
-from sim.integrators.slip_stop import friction_turns
-from sim.integrators.substep_lengths import lengthen, lengthen_kink, shorten, shorten_unsolved
+from sim.integrators.slip_stop import friction_turn
+from sim.integrators.substep_lengths import lengthen, lengthen_kink, note_miss, shorten, shorten_unsolved, stalls
 from sim.integrators.substeps import Clock
 from sim.mechanism.mobility import largest_mobility
 from sim.model.record_columns import ContactRow
@@ -219,16 +219,48 @@ def test_impulses_are_those_of_the_momentum() -> None:
     np.testing.assert_allclose(impulse, gained, rtol=0.0, atol=1e-8)
 
 
+def test_impacts_that_get_no_more_exact_are_kept() -> None:
+    """Errors of shorter and shorter steps with an impact: slight ones once they stay, large ones a second time."""
+
+    def tried(*errors: float) -> int:
+        clock = np.zeros(len(Clock))
+        clock[Clock.HIT] = 1.0
+        for k, error in enumerate(errors):
+            if stalls(clock, error):
+                return k
+            note_miss(clock, error)
+        return len(errors)
+
+    assert tried(40.0, 0.09, 0.08) == 2
+    assert tried(40.0, 0.7, 0.6, 0.5, 0.4) == 5  # a part of what is allowed: shorter ones may lose it
+    assert tried(40.0, 41.0, 39.0) == 2
+    assert tried(40.0, 41.0, 3.0, 2.9, 2.8) == 4
+
+
+def test_lengths_end_where_the_order_would_fall() -> None:
+    """A step of order 4 allows 8 times the error of order 2, as long as friction turns little."""
+    clock = np.zeros(len(Clock))
+    clock[Clock.CEILING], clock[Clock.SHORT_RATIO] = np.inf, 1.0
+    clock[Clock.ORDER], clock[Clock.ROUGH] = 4.0, 0.8
+    lengthen(clock, 1e-3, 0.1, 1e-6)
+    assert clock[Clock.SHORT] == pytest.approx(0.95e-3 / 0.8)
+    lengthen(clock, 1e-3, 1e-3, 1e-6)  # so exact that order 2 does
+    assert clock[Clock.SHORT] > 2e-3
+    clock[Clock.ORDER], clock[Clock.ROUGH] = 2.0, 2.0
+    shorten(clock, 1e-3, 20.0, 1e-6)
+    assert clock[Clock.SHORT] == pytest.approx(0.95e-3 / 2.0)
+
+
 def test_friction_that_turns_is_seen() -> None:
     """Rows of both halves: friction over the normal impulse is compared where the contact slides."""
     parts = np.zeros((3, 1, 11))
     parts[:, 0, ContactRow.NORMAL + 2], parts[:, 0, ContactRow.SLIP] = 1.0, 0.5
     parts[0, 0, :3], parts[1, 0, :3] = (0.3, 0.0, 1.0), (0.6, 0.0, 2.0)
-    assert not friction_turns(parts, 1e-3)
+    assert friction_turn(parts, 1e-3) == 0.0
     parts[1, 0, 1] = 0.01
-    assert friction_turns(parts, 1e-3) and not friction_turns(parts, 1e-2)
+    assert friction_turn(parts, 1e-3) == pytest.approx(5.0)
     parts[:, 0, ContactRow.SLIP] = 0.0
-    assert not friction_turns(parts, 1e-3)
+    assert friction_turn(parts, 1e-3) == 0.0
 
 
 def test_lengths_that_fail_are_not_tried_again_at_once() -> None:
@@ -409,7 +441,7 @@ def test_steps_whose_lengths_all_miss_the_accuracy_take_any_error() -> None:
     assert _go_beyond(clock, 0.1, rest, shortest, dojo.Status.SOLVED) == dojo.Status.SOLVED
     assert not _allows(clock, *missed)
     assert _go_beyond(clock, rest, rest, shortest, dojo.Status.SOLVED) == dojo.Status.SOLVED
-    assert shortest < clock[Clock.BEYOND] < 2.0 * shortest
+    assert clock[Clock.BEYOND] == pytest.approx(3.0 * shortest)
     assert _allows(clock, *missed)
     assert _go_beyond(clock, rest, rest, shortest, dojo.Status.SOLVED) == dojo.Status.ACCURACY_NOT_REACHED
     assert _go_beyond(clock, rest, rest, shortest, dojo.Status.NO_PROGRESS) == dojo.Status.NO_PROGRESS
