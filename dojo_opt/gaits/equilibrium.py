@@ -134,7 +134,7 @@ def _check_friction(name: str, feet: Feet, cosines: Floats, force: Floats) -> No
 class _Balance(NamedTuple):
     """The forces at a state, and how they change by motions along (nv, n)."""
 
-    left: Floats  # (m,) what nothing holds
+    left: Floats  # (m,) imbalance
     slope: Floats  # (m, n) its derivative
     change: Callable[[Floats], float]  # largest relative change of a gap, or distance from a stop, by a motion (nv,)
     weight: float  # largest generalised force of gravity and springs
@@ -183,7 +183,7 @@ class _Rest(NamedTuple):
         return self.pressed(state, allowed, sim.kappa, _ROUNDS)
 
     def pressed(self, state: Floats, along: Floats, kappa: float, rounds: int) -> Floats:
-        """The state moved until the forces kappa / (h gap) of all contacts balance what nothing else holds.
+        """The state moved until the forces kappa / (h gap) of all contacts balance the load.
 
         Newton's method with the smallest motion. Four balls under a rigid foot cannot float at four given heights, so
         the forces that share a load most evenly are nearly, and not quite, those of a state.
@@ -230,7 +230,7 @@ class _Rest(NamedTuple):
         return state
 
     def tipping(self, state: Floats) -> Floats:
-        """(m, n) derivative of what nothing holds by the motions allowed, at given forces of the contacts."""
+        """(m, n) derivative of the imbalance by the motions allowed, at given forces of the contacts."""
         sim, (_, allowed, loose) = self.sim, self.motions
         force = self.forces(state, sim.kappa)
         out = np.empty((loose.shape[1], allowed.shape[1]))
@@ -325,15 +325,16 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     slopes friction carries a share of the weight, and creeps by an amount proportional to kappa. Contacts that carry
     load have to be within 1 cm of the same distance from the ground: `dojo_opt.gaits.feet.Feet.place` puts a robot with
     legs there on terrain. A robot whose weight is beside its feet leans over them, or sinks onto the ground with its
-    joints as they are, by a twentieth of its size at most. A joint at its stop is moved off it, so little that the
-    torque of the stop is a small part of the load. Contacts of bodies with one another carry nothing.
+    joints as they are, by a twentieth of its size, or 1 cm if that is more. A joint at its stop is moved off it, so
+    little that the torque of the stop is a small part of the load. Contacts of bodies with one another carry nothing.
 
     The state need not be stable: under constant torques a robot on legs falls within some tenths of a second.
 
     Args:
         sim: the simulator.
         x: (nx,) state (default None: the neutral state).
-        iterations: limit of the Newton iterations.
+        iterations: limit of the Newton iterations of a search on contacts that stay; a robot that leans or sinks has
+            limits of its own.
 
     Returns:
         (state (nx,), input (nu,) [N, N m]).

@@ -140,6 +140,20 @@ def test_mobility_is_a_bound_and_near(name: str) -> None:
     assert inverse.max() <= bound < 100.0 * inverse.max()
 
 
+def test_mobility_is_a_bound_beside_bodies_without_mass(rng: np.random.Generator) -> None:
+    """A rod and a ball on a hub without mass, whose joints turn them out of its axes."""
+    bodies = [dojo.Body("hub", 0.0), dojo.Body("rod", 1.0, (1e-5, 1e-2, 1e-2)), dojo.Body("ball", 0.5, (0.1, 0.1, 0.1))]
+    across = (0.5**0.5, 0.0, 0.5**0.5, 0.0)  # a quarter of a turn about y
+    joints = [dojo.Joint("revolute", None, "hub", axis=(0, 0, 1), limits=(-3.0, 3.0))]
+    for name, orientation in (("ball", (1.0, 0.0, 0.0, 0.0)), ("rod", across)):
+        joints.append(dojo.Joint("revolute", "hub", name, axis=(0, 1, 0), orientation=orientation, limits=(-3.0, 3.0)))
+    for order in ((0, 1, 2), (0, 2, 1)):
+        mech = dojo.Mechanism(bodies, [joints[k] for k in order])
+        kin = dojo.Kinematics(dojo.Simulator(mech, kappa=1e-6))
+        inverses = [np.diag(np.linalg.inv(kin.mass_matrix(q))) for q in rng.uniform(-2.0, 2.0, (20, 3))]
+        assert np.max(inverses) <= largest_mobility(mech)
+
+
 def test_an_input_acts_at_second_order_in_contact() -> None:
     """A ball rolls under a force along x: its acceleration is F/(1.4 m)."""
     sim = dojo.Simulator(ball(), accuracy=1e-5)
