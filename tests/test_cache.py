@@ -415,7 +415,11 @@ SCENES: dict[str, tuple[str, tuple[str, ...]]] = {  # each with kernels that nei
         "sim.rollout(sim.neutral(), np.ones((3, sim.nu)))\nsim.linearize(sim.neutral())",
         (*FEATURES, "sim.contact.", "sim.solve.loop_branch"),
     ),
-    "hop": ("dojo.ilqr(dojo.problems.hop(), max_iterations=4)", FEATURES),
+    "block": (
+        "sim = dojo.Simulator(dojo.models.block())\n"
+        "sim.rollout(sim.neutral(), np.zeros((3, sim.nu)))\nsim.linearize(sim.neutral())",
+        FEATURES,
+    ),
     "two balls": (
         "balls = [dojo.Body(name, 1.0, shape=dojo.Sphere(0.1)) for name in 'ab']\n"
         "joints = [dojo.Joint('floating', None, name) for name in 'ab']\n"

@@ -20,7 +20,8 @@ def test_a_task_is_solved_from_zero_inputs(name):
     assert outcome.success, outcome
     sim = task.problem.sim
     steps = [sim.rollout(x, u[None]) for x, u in zip(plan.x[:-1], plan.u, strict=True)]
-    np.testing.assert_allclose([step.x[-1] for step in steps], plan.x[1:], atol=1e-5)
+    # impacts of steps with a tolerance of 1e-8 leave their velocities uncertain by 1e-5
+    np.testing.assert_allclose([step.x[-1] for step in steps], plan.x[1:], atol=4e-5)
     assert min(step.contacts.gap.min() for step in steps) > -1e-6
 
 

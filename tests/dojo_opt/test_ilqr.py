@@ -142,7 +142,7 @@ def test_a_plan_that_goes_away_from_what_the_refined_problem_asks_is_not_refined
     problem.refined_constraints = (Goal(deeper, components="body z", knots=10),)
     plan = ilqr(problem, verbose=True, stream=stream)
     assert plan.status == Status.INFEASIBLE and plan.nit == coarse.nit and plan.violation > 1.0
-    assert "no nearer than the start" in plan.message and "Goal of body z at knot 10" in plan.message
+    assert "no less than the start" in plan.message and "Goal of body z at knot 10" in plan.message
     assert plan.message.endswith(" Try less.") and stream.getvalue().rstrip().endswith(plan.message)
 
 
