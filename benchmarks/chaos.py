@@ -97,7 +97,7 @@ def killed(count: int, rng: np.random.Generator, filled: Filled) -> list[str]:
         pair = [
             subprocess.Popen(
                 [sys.executable, "-c", SMALL],
-                env=environment(NUMBA_CACHE_DIR=str(cache), **COMPILED),
+                env=environment(NUMBA_CACHE_DIR=str(cache), **filled.own),
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
             )
@@ -115,13 +115,14 @@ def killed(count: int, rng: np.random.Generator, filled: Filled) -> list[str]:
 class Filled:
     """A cache that a process has filled, and its results."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.expected = answer(SMALL, folder, **COMPILED)
+    def __init__(self, folder: Path, quick: bool) -> None:
+        """quick: whether code is compiled without optimisation, which takes half the time."""
+        self.folder, self.own = folder, COMPILED | ({"NUMBA_OPT": "0"} if quick else {})
+        self.expected = answer(SMALL, folder, **self.own)
 
     def compare(self, cache: Path) -> str:
         """Whether a process with another cache computes the same."""
-        said = answer(SMALL, cache, **COMPILED)
+        said = answer(SMALL, cache, **self.own)
         return "same" if said == self.expected else said or "nothing printed"
 
 
@@ -134,7 +135,7 @@ def run(args: argparse.Namespace) -> Report:
         _add_signals(report, signals(12 if args.quick else args.interrupts, rng))
     if {"caches", "killed"} & set(parts):
         with tempfile.TemporaryDirectory() as folder:
-            _add_caches(report, parts, args, rng, Filled(Path(folder) / "filled"))
+            _add_caches(report, parts, args, rng, Filled(Path(folder) / "filled", args.quick))
     if "forks" in parts:
         layers = ("omp", "workqueue")
         outcomes = {layer: _forked(layer) for layer in layers}
