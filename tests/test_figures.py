@@ -1,10 +1,12 @@
 """docs/figures.py: every measured number of the pages is the one in docs/measured, and the script finds those that are not."""
 
 import json
+import re
 
 import pytest
 
 from support.benchmark import loaded
+from support.programs import HOME
 
 
 @pytest.fixture(scope="module")
@@ -110,3 +112,12 @@ def test_taken_reports_have_six_digits_and_nothing_bulky(figures, tmp_path, monk
     (tmp_path / "gaits.json").write_text(json.dumps({"command": "python benchmarks/gaits.py --quick", "rows": []}))
     with pytest.raises(SystemExit, match="gaits.json is of a --quick run"):
         figures.take(tmp_path)
+
+
+def test_measured_files_name_no_folder_of_the_machine_that_measured() -> None:
+    found = {
+        path.name: hit.group()
+        for path in sorted((HOME / "docs" / "measured").glob("*.json"))
+        for hit in re.finditer(r"/(tmp|home|root|work|Users|mnt)/\S*", path.read_text())
+    }
+    assert found == {}
