@@ -282,15 +282,14 @@ class MPC:
         """Shift, iterate, and take the new plan when it is one."""
         begin = clock.perf_counter(), clock.thread_time()
         solver, problem = self._solver, self.problem
+        self._due = now + self.period
         try:
             start = solver.states("MPC(x)", self._ahead(now))
         except SimulationError:
-            self._due = now + self.period
             self._record(now, begin, Status.SIMULATION_FAILED, True, 0, self.log[-1].cost, 1.0, problem.start)
             return
         if self.settings.learn_ground:
             self._ground.learn(old, now, self._measured.last[1], self._measured.first)
-        self._due = now + self.period
         self.references.move(now + self._later, self._ground.plane, start)
         shifted = old.shifted(now + self._later, lambda count: tail(old, self.references, count))
         problem.start = start

@@ -136,10 +136,7 @@ def _count(number: int, one: str, many: str) -> str:
 def _inactive_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
     """The gap beyond which contacts are inactive at this kappa and tolerance."""
     distances = reach(model, settings.time_step, settings.kappa, settings.tolerance)
-    if not np.isfinite(distances).any():
-        return []
-    span, rest = _gap_span(mech, distances), "they still push with an impulse of kappa/gap"
-    return [f"  {'inactive contacts':<18}omitted from the solver beyond a gap of {span}; {rest}"]
+    return _beyond(mech, "inactive contacts", distances, "they still push with an impulse of kappa/gap")
 
 
 def _far_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
@@ -147,17 +144,18 @@ def _far_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
     if not settings.cutoff:
         return []
     distances = far_reach(model, settings.time_step, settings.kappa, settings.cutoff)
+    rest = "their impulses are given for the whole step, and derivatives omit them"
+    return _beyond(mech, "far contacts", distances, rest)
+
+
+def _beyond(mech: Mechanism, title: str, distances: Floats, rest: str) -> list[str]:
+    """The line of contacts that are omitted beyond these gaps: the least one, and the largest with its contact."""
     if not np.isfinite(distances).any():
         return []
-    span, rest = _gap_span(mech, distances), "their impulses are given for the whole step, and derivatives omit them"
-    return [f"  {'far contacts':<18}omitted from the solver beyond a gap of {span}; {rest}"]
-
-
-def _gap_span(mech: Mechanism, distances: Floats) -> str:
-    """The least of the gaps, and the largest with its contact."""
     last = int(np.argmax(np.where(np.isfinite(distances), distances, -np.inf)))
     nearest, farthest = f"{distances.min():.2g}", f"{distances[last]:.2g}"
-    return f"{nearest} m" if nearest == farthest else f"{nearest} m ({mech.contact_names[last]}: {farthest} m)"
+    span = f"{nearest} m" if nearest == farthest else f"{nearest} m ({mech.contact_names[last]}: {farthest} m)"
+    return [f"  {title:<18}omitted from the solver beyond a gap of {span}; {rest}"]
 
 
 def _parts(mech: Mechanism, order: int, second_order_reason: str) -> list[tuple[str, str]]:

@@ -10,8 +10,6 @@ from sim.mechanism.pack_clusters import STIFFNESS
 from sim.model.model import Model
 from sim.model.record_columns import Cluster, PairBound
 
-_OF_BODY = [Cluster.FRICTION, Cluster.CONTACTS]
-
 
 def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDArray[np.float64]:
     """Gap beyond which each contact of a body at rest is inactive, (ncontact,) [m]; infinite if it never is.
@@ -46,7 +44,8 @@ def far_reach(model: Model, time_step: float, kappa: float, cutoff: float) -> ND
     """
     out = np.full(len(model.contact_height), np.inf)
     for first in np.flatnonzero(model.cluster_end):
-        mass, (mu, count) = model.body_mass[model.contact_body[first]], model.cluster[first, _OF_BODY]
+        mass = model.body_mass[model.contact_body[first]]
+        mu, count = model.cluster[first, [Cluster.FRICTION, Cluster.CONTACTS]]
         if model.contact_terrain[first] == 0 and model.contact_hold[first] == 0 and mass > 0.0:
             stiffness = count * kappa * (mu * mu + time_step * (1.0 + mu))
             out[first : model.cluster_end[first]] = np.sqrt(stiffness / (cutoff * mass))
