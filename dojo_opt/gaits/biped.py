@@ -175,10 +175,8 @@ def over_its_feet(sim: Simulator) -> Floats:
 
 def _inside(sim: Simulator) -> Floats:
     """The stance (nx,) with all hinges off their stops, where a smooth stop would push with an infinite torque."""
-    x, mech = sim.neutral(), sim.mechanism
-    for joint in mech.joints[1:]:
-        if joint.limits and joint.nrot != 3:
-            at, (lo, hi) = mech.q_slice(joint.name), np.array(list(joint.limits), dtype=np.float64).T
-            off = np.minimum(_OFF, _OFF * (hi - lo))
-            x[at] = np.clip(x[at], lo + off, hi - off)
+    x, legs = sim.neutral(), slice(sim.mechanism.joints[0].nq, sim.nq)
+    lo, hi = (bound[legs] for bound in sim.mechanism.coordinate_limits)
+    off = np.minimum(_OFF, _OFF * (hi - lo))
+    x[legs] = np.clip(x[legs], lo + off, hi - off)
     return x
