@@ -111,7 +111,8 @@ const shade = new MeshCat.THREE.ShadowMaterial({{opacity: {shade}, depthWrite: f
 const ground = new MeshCat.THREE.Mesh(new MeshCat.THREE.PlaneGeometry(2 * reach, 2 * reach), shade);
 ground.receiveShadow = true;
 Object.assign(sun.shadow.camera, {{left: -reach, right: reach, bottom: -reach, top: reach, far: 8 * reach}});
-Object.assign(sun.shadow, {{radius: 5, blurSamples: 8, bias: -0.001}});  // else the ground has spots
+Object.assign(sun.shadow, {{radius: 2.5, blurSamples: 8, bias: -0.001}});  // else the ground has spots
+sun.shadow.mapSize.set(256, 256);  // as soft as of 512 with twice the radius, at a quarter of its time
 sun.castShadow = true;
 viewer.scene.traverse(part => {{part.receiveShadow = false;}});  // on a body it would darken every light
 viewer.scene_tree.find(["meshcat", "floor"]).object.traverse(line => {{line.castShadow = false;}});

@@ -29,7 +29,6 @@ __all__ = ["save_picture", "save_video"]
 _ARGUMENTS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--no-sandbox"]
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 _DRAWN = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
-_LOADED = 1500  # [ms] until meshes are on the page
 _LARGEST = 16384  # pixels along an edge
 _COLORS = 128  # of a GIF
 
@@ -156,11 +155,10 @@ def _frames(m: Motion, times: Any, size: tuple[int, int]) -> Iterator[Pixels]:
         file = Path(folder) / "motion.html"
         file.write_text(html_of(m, moving=moving, shown={"ghost": True}), encoding="utf-8")
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-        page.goto(file.as_uri())
-        page.add_style_tag(content="#bar {display: none !important}")
-        page.wait_for_timeout(_LOADED)
+        page.goto(file.as_uri())  # the whole scene is on the page then: it is in the file, and read in one go
         if moving:
             page.evaluate("animator.pause()")
+        page.add_style_tag(content="#bar {display: none !important}")
         for time in times:
             if moving:
                 page.evaluate(f"animator.seek({time})")

@@ -28,7 +28,8 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore:zmq.eventloop.ioloop:DeprecationWarning"),  # which MeshCat loads with its server
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
-DRAWN = 500  # pixels of 480 x 360 that a robot covers at least
+WIDTH, HEIGHT = 480, 180  # pixels, few of them, as each takes time without a graphics card
+DRAWN = 125  # of them, which a robot covers at least
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +44,7 @@ def window():
             browser = session.chromium.launch(executable_path=path, args=arguments)
         except playwright.Error as error:
             pytest.skip(f"no Chromium: {error}")
-        yield browser.new_page(viewport={"width": 480, "height": 360})
+        yield browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
         browser.close()
 
 
@@ -51,6 +52,7 @@ def window():
 def page(window):
     """The page, empty again after the test: a scene is drawn on and on, which takes a core without a graphics card."""
     yield window
+    window.evaluate("typeof animator === 'undefined' || animator.pause()")
     window.goto("about:blank")
 
 
@@ -64,7 +66,7 @@ def quadruped():
 
 
 def shot(page):
-    """The screen as (360, 480, 3) numbers, without the menu at its top right."""
+    """The screen as (HEIGHT, WIDTH, 3) numbers, without the menu at its top right."""
     from matplotlib.image import imread
 
     image = imread(BytesIO(page.screenshot()))[..., :3]
@@ -128,8 +130,9 @@ def test_sloping_ground_is_drawn(page, tmp_path):
         plant = dojo.Plant(sim, slope=slope)
         loop = dojo.closed_loop(lambda t, x: np.array([0.0, 0.0, 41.0]), plant, 0.05)
         shown(page, dojo.viewer.save_html(loop, tmp_path / f"{name}.html"))
+        page.evaluate("go(0)")
         images.append(settled(page))
-    assert changed(*images) > 20_000
+    assert changed(*images) > 10_000
 
 
 @pytest.mark.slow
@@ -145,7 +148,7 @@ def test_a_robot_of_meshes_fills_a_third_of_the_picture_in_its_colors(page, tmp_
     r, g, b = np.moveaxis(settled(page), 2, 0)
     green, red = (g > 2 * r) & (g > 2 * b) & (g > 0.2), (r > 2 * g) & (r > 2 * b) & (r > 0.2)
     rows = np.flatnonzero((green | red).any(axis=1))
-    assert 0.25 < np.ptp(rows) / 360 < 0.55 and red.sum() > 300 and green.sum() > 1000
+    assert 0.25 < np.ptp(rows) / HEIGHT < 0.55 and red.sum() > 75 and green.sum() > 250
     assert np.flatnonzero(red.any(axis=1)).mean() < np.flatnonzero(green.any(axis=1)).mean()  # the lid is on top
     assert page.evaluate("getComputedStyle(document.querySelector('.dg')).display") == "none"
 
@@ -472,4 +475,4 @@ def test_a_page_steps_from_knot_to_knot_and_shows_its_overlays(page, quadruped, 
     before = settled(page)
     page.uncheck("input[data-part=forces]")
     r, g, b = np.moveaxis(before, 2, 0)
-    assert changed(settled(page), before) > 50 and ((r > 2 * g) & (r > 2 * b) & (r > 0.3)).sum() > 50
+    assert changed(settled(page), before) > 12 and ((r > 2 * g) & (r > 2 * b) & (r > 0.3)).sum() > 12

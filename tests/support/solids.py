@@ -100,20 +100,25 @@ def support(case: PairCase, side: int, n: Floats) -> Floats:
 
 
 def widest(separation: Callable[[Floats], Floats], rng: np.random.Generator) -> float:
-    """Largest value of a function of directions (m, 3): 4000 of them, then ever closer around the best."""
+    """Largest value of a function of directions (m, 3): 4000 of them, then ever closer around the best.
+
+    Around many while maxima may still be apart. Down to steps of 1e-6: the value is then within 3e-7 m at edges, too.
+    """
     n = rng.normal(size=(4000, 3))
     n /= np.linalg.norm(n, axis=1, keepdims=True)
-    n = np.vstack([n, np.eye(3), -np.eye(3)])
-    value = separation(n)
-    best = n[np.argsort(value)[-20:]]
-    width = 0.1
-    while width > 1e-9:
-        n = np.repeat(best, 30, axis=0)
+    best, width = _best(np.vstack([n, np.eye(3), -np.eye(3)]), separation, 60), 0.05
+    while width > 1e-6:
+        n = np.repeat(best, 15, axis=0)
         n += width * rng.normal(size=n.shape)
-        n = np.vstack([best, n / np.linalg.norm(n, axis=1, keepdims=True)])
-        best = n[np.argsort(separation(n))[-10:]]
+        n /= np.sqrt((n * n).sum(axis=1, keepdims=True))
+        best = _best(np.concatenate([best, n]), separation, 60 if width > 0.02 else 10)
         width *= 0.7
     return float(separation(best).max())
+
+
+def _best(n: Floats, separation: Callable[[Floats], Floats], count: int) -> Floats:
+    """The directions with the largest values."""
+    return n[np.argpartition(separation(n), -count)[-count:]]
 
 
 def distance(case: PairCase, R: Floats, r: Floats, rng: np.random.Generator) -> float:
