@@ -7,7 +7,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.static_motions import StaticMotions
@@ -37,6 +37,9 @@ _BALANCED = 1e-7  # share of the weight that is as good as none
 _TIPS = 1e-4  # singular values below this share are the noise of differences of the tipping
 _STRIDE, _HALVINGS = 0.1, 20  # [m, rad] largest step of a settling robot, and halvings of it
 _ALOFT = 1e-4  # [m] above the ground, where settling begins
+_EXACT = 1e-2  # of the largest imbalance: below it no other search is tried
+_SUM = 1e3  # [m] weight of the sum of factors, much more than the size of a robot
+_BESIDE = 1e-4  # [m] a distance that a weight beside its contacts has at least
 _ABOUND = (
     1e-3  # of the largest load, and of the range of a joint: torque of a stop, and distance from it, that are small
 )
@@ -156,6 +159,15 @@ class _Rest(NamedTuple):
         gap, cosine = self.feet.gaps(state), self.feet.normals(state)[:, 2]
         return np.asarray(kappa / (self.sim.time_step * cosine * np.maximum(gap, 1e-12)))
 
+    def touching(self, gap: Floats, near: float) -> NDArray[np.bool_]:
+        """(k,) whether contacts may carry: those that are nearly as low as any, and within `near` [m] of their body's.
+
+        gap: (k,) their distances from the ground [m].
+        """
+        bodies = np.array([contact.body for contact in self.feet.contacts])
+        lowest = np.where(bodies[:, None] == bodies, gap, np.inf).min(axis=1)
+        return (gap < gap.min() + _NEAR) & (gap < lowest + near)
+
     def standing(self, state: Floats, near: float, iterations: int) -> Floats:
         """The state near `state` in which contacts carry the load as evenly as they can.
 
@@ -163,13 +175,10 @@ class _Rest(NamedTuple):
         """
         sim, feet, (_, allowed, loose) = self.sim, self.feet, self.motions
         weight = float(np.abs(potential_gradient(sim, state)).max())
-        bodies = np.array([contact.body for contact in sim.mechanism.contacts])
-        same = bodies[:, None] == bodies
         for _ in range(iterations):
             down, up, cosine = _under(feet, state)
             gap = feet.gaps(state)
-            lowest = np.where(same, gap, np.inf).min(axis=1)
-            touching = (gap < gap.min() + _NEAR) & (gap < lowest + near)
+            touching = self.touching(gap, near)
             afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * cosine * np.maximum(gap, near)))
             load = self.load(state, sim.kappa) - up.T @ afar
             force = least_pushes((up @ loose) * touching[:, None], loose.T @ load, _EVEN)
@@ -222,11 +231,25 @@ class _Rest(NamedTuple):
             left = self.balance(state, allowed, sim.kappa).left
             if self.feet.gaps(state).min() <= 0.0 or np.abs(left).max(initial=0.0) < _BALANCED * weight:
                 break
-            loaded = self.forces(state, sim.kappa) > 1e-3 * weight
-            _, sizes, rows = np.linalg.svd(_under(self.feet, state)[0][loaded] @ allowed)
+            # those without a load, too: a motion that tips the robot may not push them into the ground
+            gap = self.feet.gaps(state)
+            touching = self.touching(gap, _LOWEST[-1])
+            _, sizes, rows = np.linalg.svd(_under(self.feet, state)[0][touching] @ allowed)
             fixed = rows[int((sizes > _RANK * sizes.max(initial=0.0)).sum()) :].T  # motions that leave the gaps
             by = allowed @ fixed @ np.linalg.lstsq(self.tipping(state) @ fixed, -left, rcond=_TIPS)[0]
             state = self.motions.move(sim, state, by * min(1.0, _STRIDE / np.abs(by).max(initial=1e-300)))
+            state = self.lifted(state, touching, gap[touching])
+        return state
+
+    def lifted(self, state: Floats, touching: NDArray[np.bool_], gap: Floats) -> Floats:
+        """The state with contacts at given gaps (k,) again, which a finite motion along them leaves to second order."""
+        for _ in range(_ROUNDS):
+            error = gap - self.feet.gaps(state)[touching]
+            if (np.abs(error) < 0.5 * gap).all():
+                break
+            down = _under(self.feet, state)[0][touching] @ self.motions.allowed
+            by = self.motions.allowed @ np.linalg.lstsq(down, error, rcond=_RANK)[0]
+            state = self.motions.move(self.sim, state, by)
         return state
 
     def tipping(self, state: Floats) -> Floats:
@@ -298,16 +321,40 @@ class _Rest(NamedTuple):
         return float(self.sim.energy(rest) - self.sim.kinetic_energy(rest) - barrier)
 
 
-def _held(sim: Simulator, motions: StaticMotions, load: Floats, most: float, by: str) -> Floats:
-    """(nu,) inputs that balance a load (nv,).  ValueError: more than `most` of it remains."""
+def _held(
+    sim: Simulator, motions: StaticMotions, load: Floats, most: float, by: str, why: Callable[[], str] = str
+) -> Floats:
+    """(nu,) inputs that balance a load (nv,).  ValueError: more than `most` of it remains, and why."""
     left = motions.left(load)
     if np.abs(left).max(initial=0.0) > most:
         k = int(np.abs(left).argmax())
         raise ValueError(
             f"equilibrium({sim.mechanism.name}): the {by} cannot balance the weight: {left[k]:.3g} N (or N m) is left "
-            f"at {sim.mechanism.dof_names[int(np.abs(motions.loose[:, k]).argmax())]!r}"
+            f"at {sim.mechanism.dof_names[int(np.abs(motions.loose[:, k]).argmax())]!r}{why()}"
         )
     return motions.holding(load)
+
+
+def _beside(rest: _Rest, state: Floats) -> str:
+    """How far the centre of mass is beside the contacts at the ground, in words; "" where it is above them.
+
+    The nearest point of their convex hull has factors >= 0 of their places, whose sum is 1.
+    """
+    sim, feet = rest.sim, rest.feet
+    base, *others = sim.mechanism.joints
+    if base.kind != "floating" or any(joint.kind == "floating" for joint in others):
+        return ""
+    com = Kinematics(sim).center_of_mass(state[: sim.nq])[:2]
+    places = feet.positions(state)[rest.touching(feet.gaps(state), _NEAR), :2]
+    factors = least_pushes(np.column_stack([places - com, np.full(len(places), _SUM)]), np.array([0.0, 0.0, _SUM]), 0.0)
+    away = com - factors @ places
+    far = float(np.linalg.norm(away))
+    if far < _BESIDE:
+        return ""
+    return (
+        f"; the centre of mass is {far:.2g} m beside the contacts at the ground, towards ({away[0]:.2g}, {away[1]:.2g})"
+        "; move the feet below it, by x=... or by neutral=... of the file"
+    )
 
 
 def _named(names: tuple[str, ...]) -> str:
@@ -324,9 +371,10 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     path a contact with the normal impulse g floats kappa / g above the ground: the state is moved to those heights. On
     slopes friction carries a share of the weight, and creeps by an amount proportional to kappa. Contacts that carry
     load have to be within 1 cm of the same distance from the ground: `dojo_opt.gaits.feet.Feet.place` puts a robot with
-    legs there on terrain. A robot whose weight is beside its feet leans over them, or sinks onto the ground with its
-    joints as they are, by a twentieth of its size, or 1 cm if that is more. A joint at its stop is moved off it, so
-    little that the torque of the stop is a small part of the load. Contacts of bodies with one another carry nothing.
+    legs there on terrain. A robot whose weight is beside its feet bends its joints to lean over them, or sinks onto the
+    ground with its joints as they are, by a twentieth of its size, or 1 cm if that is more. A joint at its stop is
+    moved off it, so little that the torque of the stop is a small part of the load. Contacts of bodies with one another
+    carry nothing.
 
     The state need not be stable: under constant torques a robot on legs falls within some tenths of a second.
 
@@ -358,11 +406,11 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         return state, _held(sim, motions, potential_gradient(sim, state) - stop_torques(sim, state), most, "inputs")
     rest = _Rest(sim, Feet(sim, names), motions)
     found, load, force = _on_contacts(rest, state, most, iterations)
-    gap = rest.feet.gaps(found)
-    if gap.min() <= 0.0:
+    if rest.feet.gaps(found).min() <= 0.0:
+        gap = min((rest.feet.gaps(y) for y in (state, found)), key=np.min)
         name = names[int(gap.argmin())]
         raise ValueError(f"equilibrium({mech.name}): {name!r} is {-gap.min():.3g} m deep in the ground near x")
-    u = _held(sim, motions, load, most, f"vertical forces at {_named(names)}")
+    u = _held(sim, motions, load, most, f"vertical forces at {_named(names)}", partial(_beside, rest, state))
     _check_friction(mech.name, rest.feet, rest.feet.normals(found)[:, 2], np.where(force > 1e-3 * weight, force, 0.0))
     return found, u
 
@@ -371,18 +419,24 @@ def _on_contacts(rest: _Rest, state: Floats, most: float, iterations: int) -> tu
     """The state of rest near `state`, or the last one tried; the load (nv,) there, and the forces of the contacts."""
     searches: list[Callable[[], Floats]] = [partial(rest.standing, state, near, iterations) for near in _LOWEST]
     searches += [partial(rest.leaned, state, iterations), partial(rest.settled, state)]
-    first = None
+    first = best = None
+    least = np.inf
     for k, search in enumerate(searches):
+        if best is not None and k == len(searches) - 1:  # only a robot that stands nowhere else sinks
+            return best
         found = search()
         force = rest.forces(found, rest.sim.kappa)
         load = rest.load(found, rest.sim.kappa) - _under(rest.feet, found)[1].T @ force
         ended = found, load, force
-        balanced = rest.feet.gaps(found).min() > 0.0 and np.abs(rest.motions.left(load)).max(initial=0.0) <= most
-        if balanced and (k < len(_LOWEST) or _near(rest, found, state)):
-            return ended
+        left = float(np.abs(rest.motions.left(load)).max(initial=0.0))
+        balanced = rest.feet.gaps(found).min() > 0.0 and left <= most
+        if balanced and left < least and (k < len(_LOWEST) or _near(rest, found, state)):
+            best, least = ended, left
+            if left <= _EXACT * most:
+                return best
         first = first or ended
     assert first is not None
-    return first
+    return best or first
 
 
 def _near(rest: _Rest, found: Floats, state: Floats) -> bool:
