@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -29,8 +30,21 @@ ADAPT = ("mass:trunk", "friction:*")
 NOISE = (2e-4, 2e-3)  # [m, rad], [m/s, rad/s]
 SECONDS, KNOWN, CHECKED = 4.0, 0.1, 1.0  # [s], [1], [s]
 CLOSE = 0.05  # share of the mass
+TRUNK = 6.0  # [kg] without a payload
 SHEAR = 1.3  # [1/s]
 SURE = 0.9  # share of the runs whose bounds hold, two standard deviations wide
+HEADER = (
+    "payload [kg]",
+    "friction",
+    "fixed lasts [s]",
+    "adaptive lasts [s]",
+    "payload after 1 s",
+    "friction",
+    "known",
+    "lower bound / friction",
+    "with shear lasts [s]",
+    "known from [s]",
+)
 
 
 def perturbation(run: int) -> dict[str, Any]:
@@ -98,92 +112,124 @@ def trial(run: int, adapt: dojo.Adaptation | None) -> tuple[dojo.ClosedLoop, Wat
     return loop, watched, (time.process_time() - begin) / loop.duration
 
 
-def run(args: argparse.Namespace) -> Report:
-    """All runs, with the three controllers."""
-    report = Report("Adaptive control", "")
-    lines: list[list[Cell]] = []
-    payload, friction, costs, survivors = [], [], [], np.zeros(3, dtype=int)
-    sheared: list[tuple[float, float, bool]] = []  # time until the friction is known, its error then, bounds hold
-    times: list[tuple[float, float]] = []
-    bounds: list[list[tuple[bool, float]]] = []
-    count = 2 if args.quick else args.runs
-    for k in progress()([(f"run {k}", partial(int, k)) for k in range(count)], "runs"):
-        number_of_run = k()
-        drawn = perturbation(number_of_run)
-        noise = NOISE if number_of_run % 2 else (1e-5, 1e-4)
-        fixed, _, cost = trial(number_of_run, None)
-        loop, watched, adaptive = trial(number_of_run, dojo.Adaptation(ADAPT, noise=noise))
-        probed, prober, _ = trial(number_of_run, dojo.Adaptation(ADAPT, noise=noise, shear=SHEAR))
-        sheared.append((prober.knows(), prober.error(drawn["friction"]), prober.bounded(drawn["friction"], CHECKED)[0]))
-        survivors += (fixed.survived, loop.survived, probed.survived)
-        costs.append(adaptive / cost)
-        times.append((watched.found(drawn["payload"] + 6.0), watched.knows()))
-        bounds.append([watched.bounded(drawn["friction"], time) for time in (CHECKED, SECONDS)])
-        line: list[Cell] = [drawn["payload"], drawn["friction"], fixed.duration, loop.duration]
-        if watched.values:
-            total = drawn["payload"] + 6.0
-            payload.append(abs(watched.values["mass:trunk"] - total) / total)
-            known = watched.deviations["friction:*"] < KNOWN
-            friction += [abs(watched.values["friction:*"] - drawn["friction"])] if known else []
-            line += [watched.values["mass:trunk"] - 6.0, watched.values["friction:*"], "yes" if known else "no"]
-        lines.append([*line, *([""] * (7 - len(line))), bounds[-1][0][1], probed.duration, prober.knows()])
-    sure = None if args.quick else SURE * count
-    soon, off, safe = np.array(sheared).T
-    hold, low = np.array(bounds).transpose(2, 1, 0)  # (2, runs) each
-    report.rows = [
-        number("runs", float(count)),
-        Row("runs that the fixed model survives", float(survivors[0]), "", None),
-        Row("runs that the adaptive model survives", float(survivors[1]), "", None),
-        number("error of the loaded trunk's mass after 1 s, median", 100.0 * float(np.median(payload)), 5.0, unit="%"),
-        number("error of the loaded trunk's mass after 1 s, largest", 100.0 * max(payload), unit="%"),
-        number(
-            "time until the loaded trunk's mass stays within 5 %, median", float(np.median(times, axis=0)[0]), unit="s"
-        ),
+@dataclass(frozen=True)
+class Outcome:
+    """One run with each of the controllers: fixed, adaptive, and adaptive with shear."""
+
+    drawn: dict[str, Any]
+    fixed: dojo.ClosedLoop
+    loop: dojo.ClosedLoop
+    watched: Watched
+    sheared: dojo.ClosedLoop
+    prober: Watched
+    slowdown: float  # processor time of the adaptive controller over that of the fixed model
+
+    @property
+    def total(self) -> float:
+        """Mass of the loaded trunk [kg]."""
+        return self.drawn["payload"] + TRUNK
+
+    @property
+    def known(self) -> bool:
+        """Whether the adaptive controller knows the friction after `CHECKED` s."""
+        return self.watched.deviations.get("friction:*", np.inf) < KNOWN
+
+    @property
+    def mass_error(self) -> float:
+        """Relative error of the loaded trunk's mass after `CHECKED` s; NaN where the robot fell before."""
+        return abs(self.watched.values.get("mass:trunk", np.nan) - self.total) / self.total
+
+    def line(self) -> list[Cell]:
+        """Its row in the table of runs, in the order of `HEADER`."""
+        values, found = self.watched.values, ("", "", "")
+        if values:
+            found = (values["mass:trunk"] - TRUNK, values["friction:*"], "yes" if self.known else "no")
+        low = self.watched.bounded(self.drawn["friction"], CHECKED)[1]
+        lasts = self.fixed.duration, self.loop.duration
+        cells = self.drawn["payload"], self.drawn["friction"], *lasts, *found, low
+        return [*cells, self.sheared.duration, self.prober.knows()]
+
+
+def outcome(run: int) -> Outcome:
+    """A run with the three controllers."""
+    noise = NOISE if run % 2 else (1e-5, 1e-4)
+    fixed, _, cost = trial(run, None)
+    loop, watched, adaptive = trial(run, dojo.Adaptation(ADAPT, noise=noise))
+    sheared, prober, _ = trial(run, dojo.Adaptation(ADAPT, noise=noise, shear=SHEAR))
+    return Outcome(perturbation(run), fixed, loop, watched, sheared, prober, adaptive / cost)
+
+
+def adaptive_rows(outcomes: list[Outcome], whole: bool) -> list[Row]:
+    """Figures of the adaptive controller; those that two runs tell nothing of have a bar in a whole study only."""
+    mass = 100.0 * np.array([o.mass_error for o in outcomes])
+    found = np.array([o.watched.found(o.total) for o in outcomes])
+    after = [
+        np.array([o.watched.bounded(o.drawn["friction"], time) for o in outcomes]).T for time in (CHECKED, SECONDS)
+    ]
+    (hold, low), (hold_last, low_last) = after
+    errors = np.array([o.watched.error(o.drawn["friction"]) for o in outcomes if o.known])
+    sure = SURE * len(outcomes) if whole else None
+    last, typical = (errors.max(), float(np.median(errors))) if len(errors) else (float("nan"), float("nan"))
+    knows = np.isfinite([o.watched.knows() for o in outcomes])
+    return [
+        number("error of the loaded trunk's mass after 1 s, median", float(np.nanmedian(mass)), 5.0, unit="%"),
+        number("error of the loaded trunk's mass after 1 s, largest", float(np.nanmax(mass)), unit="%"),
+        number("time until the loaded trunk's mass stays within 5 %, median", float(np.median(found)), unit="s"),
         number(
             "time until the loaded trunk's mass stays within 5 %, longest",
-            float(np.max(times, axis=0)[0]),
-            None if args.quick else 1.0,  # two runs tell nothing of the longest
+            float(found.max()),
+            1.0 if whole else None,
             unit="s",
         ),
-        number("runs in which friction is known after 4 s", float(np.sum(np.isfinite(times), axis=0)[1])),
-        number("runs in which friction is known after 1 s", float(len(friction))),
-        Row("runs whose bounds of the friction hold after 1 s", float(hold[0].sum()), "", sure, True),
-        Row("runs whose bounds of the friction hold after 4 s", float(hold[1].sum()), "", sure, True),
-        number("lower bound over the friction after 1 s, median", float(np.median(low[0]))),
-        number("lower bound over the friction after 4 s, median", float(np.median(low[1]))),
-        number("error of a known friction, largest", max(friction, default=float("nan"))),
-        number(
-            "error of a known friction, median",
-            float(np.median(friction)) if friction else float("nan"),
-            0.1 if friction else None,  # in two runs, no foot may have slid
-        ),
-        Row("runs that the model with shear survives", float(survivors[2]), "", None),
+        number("runs in which friction is known after 4 s", float(knows.sum())),
+        number("runs in which friction is known after 1 s", float(len(errors))),
+        Row("runs whose bounds of the friction hold after 1 s", float(hold.sum()), "", sure, True),
+        Row("runs whose bounds of the friction hold after 4 s", float(hold_last.sum()), "", sure, True),
+        number("lower bound over the friction after 1 s, median", float(np.median(low))),
+        number("lower bound over the friction after 4 s, median", float(np.median(low_last))),
+        number("error of a known friction, largest", float(last)),
+        # in two runs, no foot may have slid
+        number("error of a known friction, median", typical, 0.1 if len(errors) else None),
+    ]
+
+
+def shear_rows(outcomes: list[Outcome], whole: bool) -> list[Row]:
+    """Figures of the adaptive controller that presses its feet apart."""
+    soon = np.array([o.prober.knows() for o in outcomes])
+    off = np.array([o.prober.error(o.drawn["friction"]) for o in outcomes])
+    safe = sum(o.prober.bounded(o.drawn["friction"], CHECKED)[0] for o in outcomes)
+    sure = SURE * len(outcomes) if whole else None
+    return [
+        Row("runs that the model with shear survives", float(sum(o.sheared.survived for o in outcomes)), "", None),
         number("runs in which friction is known after 1 s, with shear", float(np.isfinite(off).sum())),
         number(
             "time until friction is known with shear, median",
             float(np.median(soon)),
-            None if args.quick else CHECKED,
+            CHECKED if whole else None,
             unit="s",
         ),
         number("time until friction is known with shear, longest", float(soon.max()), unit="s"),
         number("error of a friction known after 1 s with shear, median", float(np.nanmedian(off)), 0.1),
         number("error of a friction known after 1 s with shear, largest", float(np.nanmax(off))),
-        Row("runs whose bounds of the friction hold after 1 s, with shear", float(safe.sum()), "", sure, True),
-        number("processor time over that of the fixed model, median", float(np.median(costs))),
+        Row("runs whose bounds of the friction hold after 1 s, with shear", float(safe), "", sure, True),
     ]
-    header = (
-        "payload [kg]",
-        "friction",
-        "fixed lasts [s]",
-        "adaptive lasts [s]",
-        "payload after 1 s",
-        "friction",
-        "known",
-        "lower bound / friction",
-        "with shear lasts [s]",
-        "known from [s]",
-    )
-    report.tables = [Table("Runs", header, lines)]
+
+
+def run(args: argparse.Namespace) -> Report:
+    """All runs, with the three controllers."""
+    count = 2 if args.quick else args.runs
+    jobs = [(f"run {k}", partial(outcome, k)) for k in range(count)]
+    outcomes = [job() for job in progress()(jobs, "runs")]
+    report = Report("Adaptive control", "")
+    report.rows = [
+        number("runs", float(count)),
+        Row("runs that the fixed model survives", float(sum(o.fixed.survived for o in outcomes)), "", None),
+        Row("runs that the adaptive model survives", float(sum(o.loop.survived for o in outcomes)), "", None),
+        *adaptive_rows(outcomes, not args.quick),
+        *shear_rows(outcomes, not args.quick),
+        number("processor time over that of the fixed model, median", float(np.median([o.slowdown for o in outcomes]))),
+    ]
+    report.tables = [Table("Runs", HEADER, [o.line() for o in outcomes])]
     return report
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from dojo_opt.planning.manifold import cross
 from sim.mechanism import checks
 from sim.mechanism.contact import Contact
+from sim.mechanism.joint import require_floating_base
 from sim.model.interruptible_loops import rows
 from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
@@ -121,11 +122,7 @@ class Feet:
         Raises:
             ValueError: the robot has no floating base, or no height is found at which it touches the ground.
         """
-        first = self.sim.mechanism.joints[0]
-        if first.kind != "floating":
-            raise ValueError(
-                f"Feet.put_down(x): expected a robot on a floating base, but joint {first.name!r} is {first.kind}"
-            )
+        require_floating_base("Feet.put_down(x)", self.sim.mechanism.joints[0])
         out = x.copy()
         for _ in range(_ITERATIONS):
             least = float((self.gaps(out) / self.normals(out)[:, 2]).min())

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.input import Input
+from sim.mechanism.joint import require_floating_base
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.short_repr import short_repr
 from sim.mechanism.terrain import Terrain
@@ -214,12 +215,8 @@ class Perturbation:
             ValueError: the ground is moved, and the robot has no floating base.
         """
         changed = [name for name in ("slope", "ground_height", "terrain") if getattr(self, name)]
-        first = mechanism.joints[0]
-        if changed and first.kind != "floating":
-            raise ValueError(
-                f"Perturbation({changed[0]}=...): expected a robot on a floating base, but joint "
-                f"{first.name!r} is {first.kind}"
-            )
+        if changed:
+            require_floating_base(f"Perturbation({changed[0]}=...)", mechanism.joints[0])
         if not (self.slope or self.ground_height):
             return x
         turn = _rotation(self.slope, self.slope_heading)

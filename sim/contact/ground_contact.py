@@ -124,7 +124,7 @@ def add_contact_law(model: Model, data: Data, c: int, out: Matrix) -> None:
     x1, y1, z1 = transposed_times(F, W[1], W[4], W[7])
     x2, y2, z2 = transposed_times(F, W[2], W[5], W[8])
     for j in range(6):
-        q = 18 + j if j < 3 else 6 + j
+        q = Kin.BY_TRANSLATION + j if j < 3 else Kin.BY_ROTATION + j - 3
         c0, c1, c2 = k[q], k[q + 3], k[q + 6]
         x = x0 * c0 + x1 * c1 + x2 * c2
         y = y0 * c0 + y1 * c1 + y2 * c2

@@ -10,6 +10,8 @@ A contact that carries has w p far above the change of its gap, one that opens b
 
 from __future__ import annotations
 
+from math import inf
+
 from sim.dynamics.elimination import project, solve, subtree_sums
 from sim.dynamics.energy import factor_mass_matrix
 from sim.integrators.substeps import SubstepState
@@ -18,10 +20,10 @@ from sim.model.model import Model
 from sim.model.record_columns import Bound, ContactRow
 from solvers.compiler import kernel
 from solvers.dense import clear
-from solvers.rotation import cross
+from solvers.rotation import cross, three
 from solvers.types import Vector
 
-_LITTLE = 0.01  # speed of opening over the accuracy: slower pushes are left out
+_LITTLE = 0.01  # speed of opening over the accuracy: slower pushes are omitted
 
 
 @kernel
@@ -29,10 +31,11 @@ def _add_impulse(data: Data, i: int, sign: float, row: Vector) -> float:
     """data.wrench[i] += sign times the normal impulse of a contact's row (11,), about O; the size of the impulse."""
     if i < 0:
         return 0.0
-    n, r, o, w = row[ContactRow.NORMAL :], row[ContactRow.POINT :], data.origin, data.wrench[i]
-    p = row[0] * n[0] + row[1] * n[1] + row[2] * n[2]
-    x, y, z = sign * p * n[0], sign * p * n[1], sign * p * n[2]
-    a, b, c = cross(r[0] - o[0], r[1] - o[1], r[2] - o[2], x, y, z)
+    (px, py, pz), (nx, ny, nz) = three(row, ContactRow.IMPULSE), three(row, ContactRow.NORMAL)
+    rx, ry, rz = three(row, ContactRow.POINT)
+    p, o, w = px * nx + py * ny + pz * nz, data.origin, data.wrench[i]
+    x, y, z = sign * p * nx, sign * p * ny, sign * p * nz
+    a, b, c = cross(rx - o[0], ry - o[1], rz - o[2], x, y, z)
     w[0], w[1], w[2], w[3], w[4], w[5] = w[0] + x, w[1] + y, w[2] + z, w[3] + a, w[4] + b, w[5] + c
     return p
 
@@ -67,16 +70,16 @@ def _by_limits(model: Model, data: Data, line: SubstepState, h: float, least: fl
 @kernel
 def opening_push(model: Model, data: Data, line: SubstepState, h: float, accuracy: float) -> float:
     """Sum of the pushes in the second half, of length h, after which the node is in line.mean and in the Data; of each
-    the largest velocity that it gives to a coordinate [m/s, rad/s].
+    the largest velocity that it gives to a coordinate [m/s, rad/s]; infinite where no mass matrix tells it.
     """
     least, ground = _LITTLE * accuracy, model.contact_height.shape[0]
     if not factor_mass_matrix(model, data, h):
-        return 0.0
+        return inf
     total = _by_limits(model, data, line, h, least)
     for c in range(line.parts.shape[1]):
         row = line.parts[1, c]
         opened = (row[ContactRow.GAP] - line.parts[0, c, ContactRow.GAP]) / h
-        if opened <= least or row[0] * row[0] + row[1] * row[1] + row[2] * row[2] == 0.0:
+        if opened <= least or three(row, ContactRow.IMPULSE) == (0.0, 0.0, 0.0):
             continue
         clear(data.wrench)
         p = _add_impulse(data, model.contact_body[c], 1.0, row)

@@ -229,3 +229,17 @@ def pitch_of(call: str, joint: Joint) -> float:
     if joint.kind != "screw" and pitch != 0.0:
         raise ValueError(f"{call}: a {joint.kind} joint has none, got {pitch:g}")
     return pitch
+
+
+def require_floating_base(call: str, first: Joint) -> None:
+    """Refuse a robot whose first joint is not floating, for what moves a whole robot.
+
+    Args:
+        call: place of the robot in the message.
+        first: first joint of the robot.
+
+    Raises:
+        ValueError: the joint is of another kind.
+    """
+    if first.kind != "floating":
+        raise ValueError(f"{call}: expected a robot on a floating base, but joint {first.name!r} is {first.kind}")

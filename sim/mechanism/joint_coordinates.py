@@ -11,21 +11,20 @@ from sim.mechanism import checks
 from sim.mechanism.joint import Joint
 from solvers.types import Floats
 
-__all__ = ["coordinate_limits", "coordinates"]
+__all__ = ["coordinate_limits", "coordinates", "joint_places"]
 
 
-def _places(joints: Sequence[Joint]) -> Iterator[tuple[Joint, slice]]:
-    """Each joint, and the place of its coordinates."""
-    start = 0
+def joint_places(joints: Sequence[Joint]) -> Iterator[tuple[Joint, slice, slice]]:
+    """Each joint, and its places in q (nq,) and v (nv,)."""
+    q = v = 0
     for joint in joints:
-        yield joint, slice(start, start + joint.nq)
-        start += joint.nq
+        yield joint, slice(q, q := q + joint.nq), slice(v, v := v + joint.nv)
 
 
 def coordinate_limits(joints: Sequence[Joint]) -> tuple[Floats, Floats]:
     """(lower, upper) limits, (nq,) each, read-only; infinite where there are none, as for quaternions [m, rad]."""
     out = np.tile([[-np.inf], [np.inf]], sum(joint.nq for joint in joints))
-    for joint, at in _places(joints):
+    for joint, at, _ in joint_places(joints):
         count = joint.scalar_count
         if joint.limits and count:
             out[:, at.start : at.start + count] = np.transpose(joint.limits[:count])
@@ -49,8 +48,8 @@ def coordinates(call: str, joints: Sequence[Joint], given: Any) -> tuple[float, 
             checks.one_of(f"{call}: joint", name, names)
     else:
         values = checks.array(call, table, (len(q),))
-        table = {joint.name: values[at] for joint, at in _places(joints)}
-    for joint, at in _places(joints):
+        table = {joint.name: values[at] for joint, at, _ in joint_places(joints)}
+    for joint, at, _ in joint_places(joints):
         if joint.nrot == 3:
             q[at.stop - 4] = 1.0
         if joint.name in table:

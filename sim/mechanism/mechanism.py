@@ -22,7 +22,7 @@ from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.gear import Gear, check_gears
 from sim.mechanism.input import Input
 from sim.mechanism.joint import WORLD, Joint
-from sim.mechanism.joint_coordinates import coordinate_limits, coordinates
+from sim.mechanism.joint_coordinates import coordinate_limits, coordinates, joint_places
 from sim.mechanism.loop_joints import carried
 from sim.mechanism.naming import name_contacts, name_inputs
 from sim.mechanism.renamed import renamed
@@ -238,10 +238,7 @@ class Mechanism:
     @cached_property
     def _slices(self) -> dict[str, tuple[slice, slice]]:
         """By joint, its slices of q and v."""
-        out, q, v = {}, 0, 0
-        for joint in self.joints:
-            out[joint.name] = slice(q, q := q + joint.nq), slice(v, v := v + joint.nv)
-        return out
+        return {joint.name: (q, v) for joint, q, v in joint_places(self.joints)}
 
     def add(self, other: Mechanism, pose: ArrayLike = (0.0, 0.0, 0.0), prefix: str = "", name: str = "") -> Mechanism:
         """The union of this mechanism and another one, whose bodies, joints, contacts, inputs and collisions come last.

@@ -20,7 +20,8 @@ from sim.io.mjcf.equalities import find_gears, find_loops
 from sim.io.mjcf.joints import BALL, FREE, carry
 from sim.io.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
 from sim.io.mjcf.welded_bodies import GeomGroup, body_shapes, find_groups
-from sim.io.urdf.report import OVERLAPPING, LinkFrame, Notes
+from sim.io.self_collisions import with_self_collisions
+from sim.io.urdf.report import LinkFrame, Notes
 from sim.mechanism import checks
 from sim.mechanism.body import Body
 from sim.mechanism.joint import Joint
@@ -88,11 +89,10 @@ def load_mjcf(
         if not joints:
             raise ValueError(f"load_mjcf: {file}: no joint is free to move")
         inputs, gear, low, high = find_inputs(model, homes, where, notes)
-        joints = with_friction(model, joints, homes, choices.joint_friction, notes)
         note_omitted(model, bool(collisions), notes)
         mech = MjcfMechanism(
             bodies,
-            [*joints, *find_loops(model, where, notes)],
+            [*with_friction(model, joints, homes, choices.joint_friction, notes), *find_loops(model, where, notes)],
             find_contacts(model, where, choices, collisions is True, notes) if choices.ground else [],
             inputs,
             gravity=choices.gravity,
@@ -106,11 +106,7 @@ def load_mjcf(
         )
         mech = _without_constant_gaps(mech, notes)
         mech = _clear(mech) if keyframe is None else mech
-        if choices.itself:
-            pairs, overlapping = mech.self_collisions()
-            mech = replace(mech, collisions=[*mech.collisions, *pairs])
-            if overlapping:
-                notes.add(OVERLAPPING, overlapping)
+        mech = with_self_collisions(mech, notes) if choices.itself else mech
         known = {model.joint(j).name or f"joint_{j}": home for j, home in homes.items()}
         report = MjcfReport(file, notes.close(), _frames(model, where), known, gear, low, high)
         _warn(report)

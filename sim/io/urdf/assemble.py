@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.io.loader_choices import LoaderChoices
+from sim.io.self_collisions import with_self_collisions
 from sim.io.urdf.contacts import find_contacts
 from sim.io.urdf.inertia import RigidInertia, combined, fault, repaired
 from sim.io.urdf.loops import UrdfLoop, closing_joint, zero_poses
 from sim.io.urdf.mimic import follower_value, leader_of, mimic_gears
-from sim.io.urdf.report import OVERLAPPING, LinkFrame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
+from sim.io.urdf.report import LinkFrame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
 from sim.io.urdf.robot import Robot, UrdfJoint
 from sim.io.urdf.solids import body_shapes, body_visuals, collision_shapes
 from sim.io.urdf.tree import MergedLinks, Place, group, held_pose, ordered
@@ -59,40 +60,24 @@ class Choices:
 
 def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, notes: Notes) -> UrdfMechanism:
     """The mechanism, with its report."""
-    root, order = ordered(robot, choices.file)
-    if WORLD in robot.links and root != WORLD:
-        raise robot.links[WORLD].element.error("a link of this name must be the root")
     locked = {name: _neutral(robot, choices, name) for name in choices.locked}
     if locked:
         notes.add("joints that are held where they are", locked)
-    if root == WORLD and not choices.fixed_base and all(held_pose(joint, locked) is not None for joint in order):
-        robot, root, order = _let_go(robot, order, notes)
+    robot, root, order = _rooted(robot, choices, locked, notes)
     groups, places = group(robot, root, order, choices.fixed_base, choices.merge, locked)
-    if root == WORLD and not choices.fixed_base:
-        notes.add("the root is called 'world', so it is fixed there although floating=True", [root])
     inertias = _inertias(groups, choices, notes)
     coms = {name: part.com for name, part in inertias.items()}
-    taken = {body.joint.name for body in groups if body.joint}
-    base = ROOT_JOINT[choices.fixed_base]
-    base = base if base not in taken else f"{root}_{base}"
-    joints = [_joint(body, places, coms, choices, base) for body in groups]
+    joints = _joints(groups, places, coms, choices, root)
     closing = _closing(loops, places, coms, zero_poses(root, order), choices, notes)
-    known = dict.fromkeys([*robot.joints, *(j.name for j in joints)])
-    for name in choices.neutral:
-        checks.one_of("load_urdf(neutral=...): joint", name, known)
-    if not any(joint.nv for joint in joints):
-        raise UrdfError(f"load_urdf: {choices.file}: no joint is free to move")
-    found = find_contacts(places, coms, choices.contacts, choices.shared, notes)
-    neutral: dict[str, ArrayLike] = {j.name: _neutral(robot, choices, j.name) for j in joints if j.nv == 1}
-    neutral |= {j.name: choices.neutral[j.name] for j in joints if j.nv > 1 and j.name in choices.neutral}
+    given = {**robot.joints, **{name: loop.joint for name, loop in loops.items()}}
     mech = UrdfMechanism(
         [_body(body, inertias[body.name]) for body in groups],
         [*joints, *closing],
-        found,
-        _inputs(joints, closing, {**robot.joints, **{n: loop.joint for n, loop in loops.items()}}, choices),
+        find_contacts(places, coms, choices.contacts, choices.shared, notes),
+        _inputs(joints, closing, given, choices),
         gravity=choices.shared.gravity,
         name=robot.name,
-        neutral=neutral,
+        neutral=_neutral_state(robot, joints, choices),
         scenery=_scenery(places, coms, choices),
         gears=mimic_gears(robot, choices.geared, {j.name: j.nv for j in joints}),
     )
@@ -100,25 +85,29 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
     if len(bases) == 1 and bases[0] not in choices.neutral:
         mech = replace(mech, neutral=lifted(mech, bases[0]))
     _ground_notes(mech, choices, bool(bases), notes)
-    rough = [
-        body.joint.name
-        for body in groups
-        if body.joint and body.joint.friction and not (choices.shared.joint_friction and _may_rub(body, body.joint))
-    ]
-    if rough:
-        notes.add("joints move without the dry friction of the file, which joint_friction=True adds to hinges", rough)
-    if choices.shared.itself:
-        pairs, overlapping = mech.self_collisions()
-        mech = replace(mech, collisions=pairs)
-        if overlapping:
-            notes.add(OVERLAPPING, overlapping)
-    report = _report(
-        {**robot.joints, **{n: loop.joint for n, loop in loops.items()}}, mech, places, coms, choices.file, notes
-    )
+    _friction_notes(groups, choices, notes)
+    mech = with_self_collisions(mech, notes) if choices.shared.itself else mech
+    report = _report(given, mech, places, coms, choices.file, notes)
     for note in report.notes:
         if note.warn:
             warnings.warn(f"load_urdf: {choices.file}: {note}", UrdfWarning, stacklevel=3)
     return replace(mech, report=report)
+
+
+def _rooted(
+    robot: Robot, choices: Choices, locked: Mapping[str, float], notes: Notes
+) -> tuple[Robot, str, list[UrdfJoint]]:
+    """The robot, its root, and its joints from there on; a base that is to float is let go if nothing could move."""
+    root, order = ordered(robot, choices.file)
+    if WORLD in robot.links and root != WORLD:
+        raise robot.links[WORLD].element.error("a link of this name must be the root")
+    if root != WORLD or choices.fixed_base:
+        return robot, root, order
+    if all(held_pose(joint, locked) is not None for joint in order):
+        robot, root, order = _let_go(robot, order, notes)
+    if root == WORLD:
+        notes.add("the root is called 'world', so it is fixed there although floating=True", [root])
+    return robot, root, order
 
 
 def _let_go(robot: Robot, order: list[UrdfJoint], notes: Notes) -> tuple[Robot, str, list[UrdfJoint]]:
@@ -145,6 +134,15 @@ def _neutral(robot: Robot, choices: Choices, name: str, depth: int = 0) -> float
     if robot.joints[name].kind not in ("revolute", "prismatic"):
         raise ValueError(f"load_urdf(neutral=...): joint {name!r} is fixed, or locked at zero")
     return checks.number(f"load_urdf(neutral=...): joint {name!r}", choices.neutral[name])
+
+
+def _neutral_state(robot: Robot, joints: list[Joint], choices: Choices) -> dict[str, ArrayLike]:
+    """Neutral coordinates by joint."""
+    known = dict.fromkeys([*robot.joints, *(j.name for j in joints)])
+    for name in choices.neutral:
+        checks.one_of("load_urdf(neutral=...): joint", name, known)
+    out: dict[str, ArrayLike] = {j.name: _neutral(robot, choices, j.name) for j in joints if j.nv == 1}
+    return out | {j.name: choices.neutral[j.name] for j in joints if j.nv > 1 and j.name in choices.neutral}
 
 
 def _inertias(groups: list[MergedLinks], choices: Choices, notes: Notes) -> dict[str, RigidInertia]:
@@ -190,6 +188,19 @@ def _repaired(body: MergedLinks, part: RigidInertia) -> tuple[RigidInertia, str]
     whole = RigidInertia(mass, part.com if part.mass else part.com + center, inertia)
     whole = repaired(whole) if fault(whole) else whole
     return whole, f", from the collision shapes, with {DENSITY:g} kg/m^3 where there is no mass"
+
+
+def _joints(
+    groups: list[MergedLinks], places: Mapping[str, Place], coms: Mapping[str, Floats], choices: Choices, root: str
+) -> list[Joint]:
+    """The Joints that the bodies hang on."""
+    base = ROOT_JOINT[choices.fixed_base]
+    if base in {body.joint.name for body in groups if body.joint}:
+        base = f"{root}_{base}"
+    joints = [_joint(body, places, coms, choices, base) for body in groups]
+    if not any(joint.nv for joint in joints):
+        raise UrdfError(f"load_urdf: {choices.file}: no joint is free to move")
+    return joints
 
 
 def _joint(
@@ -286,6 +297,17 @@ def _ground_notes(mech: UrdfMechanism, choices: Choices, floating: bool, notes: 
         low = [f"{name} ({-gap:.3g} m)" for name, gap in zip(mech.contact_names, sunk, strict=True) if gap < -_SUNK]
         if low:
             notes.add("contacts that are below the ground in the neutral state; see position, neutral", low, warn=True)
+
+
+def _friction_notes(groups: list[MergedLinks], choices: Choices, notes: Notes) -> None:
+    """A note on the dry friction of the file that the joints do not have."""
+    rough = [
+        body.joint.name
+        for body in groups
+        if body.joint and body.joint.friction and not (choices.shared.joint_friction and _may_rub(body, body.joint))
+    ]
+    if rough:
+        notes.add("joints move without the dry friction of the file, which joint_friction=True adds to hinges", rough)
 
 
 def _report(

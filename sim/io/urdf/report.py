@@ -9,8 +9,6 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.short_repr import short_repr
 from solvers.types import Floats
 
-OVERLAPPING = "shapes that overlap in the neutral state, and do not collide"
-
 
 class UrdfWarning(UserWarning):
     """The motion of the mechanism differs from that of the robot in the file."""
