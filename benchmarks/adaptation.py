@@ -113,7 +113,7 @@ def trial(run: int, adapt: dojo.Adaptation | None) -> tuple[dojo.ClosedLoop, Wat
 
 
 @dataclass(frozen=True)
-class Outcome:
+class AdaptationRun:
     """One run with each of the controllers: fixed, adaptive, and adaptive with shear."""
 
     drawn: dict[str, Any]
@@ -150,16 +150,16 @@ class Outcome:
         return [*cells, self.sheared.duration, self.prober.knows()]
 
 
-def outcome(run: int) -> Outcome:
+def outcome(run: int) -> AdaptationRun:
     """A run with the three controllers."""
     noise = NOISE if run % 2 else (1e-5, 1e-4)
     fixed, _, cost = trial(run, None)
     loop, watched, adaptive = trial(run, dojo.Adaptation(ADAPT, noise=noise))
     sheared, prober, _ = trial(run, dojo.Adaptation(ADAPT, noise=noise, shear=SHEAR))
-    return Outcome(perturbation(run), fixed, loop, watched, sheared, prober, adaptive / cost)
+    return AdaptationRun(perturbation(run), fixed, loop, watched, sheared, prober, adaptive / cost)
 
 
-def adaptive_rows(outcomes: list[Outcome], whole: bool) -> list[Row]:
+def adaptive_rows(outcomes: list[AdaptationRun], whole: bool) -> list[Row]:
     """Figures of the adaptive controller; those that two runs tell nothing of have a bar in a whole study only."""
     mass = 100.0 * np.array([o.mass_error for o in outcomes])
     found = np.array([o.watched.found(o.total) for o in outcomes])
@@ -193,7 +193,7 @@ def adaptive_rows(outcomes: list[Outcome], whole: bool) -> list[Row]:
     ]
 
 
-def shear_rows(outcomes: list[Outcome], whole: bool) -> list[Row]:
+def shear_rows(outcomes: list[AdaptationRun], whole: bool) -> list[Row]:
     """Figures of the adaptive controller that presses its feet apart."""
     soon = np.array([o.prober.knows() for o in outcomes])
     off = np.array([o.prober.error(o.drawn["friction"]) for o in outcomes])
