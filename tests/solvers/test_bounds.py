@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from support.programs import python
+from support.fork_server import forked
 
 PROGRAM = """
 import numpy as np
@@ -68,7 +68,7 @@ print(_last(A), _entry(part, 3), _row(A, 2, 3), _pair(A, 2, 3), _lanes(wide, 1, 
 @pytest.mark.slow
 @pytest.mark.parametrize("plain", ["0", "1"])
 def test_a_negative_index_that_is_not_written_as_a_number_is_refused(plain):
-    *errors, last = python(PROGRAM, NUMBA_BOUNDSCHECK="1", DOJO_OPT_PLAIN_NUMBA=plain).splitlines()
+    *errors, last = forked(PROGRAM, NUMBA_BOUNDSCHECK="1", DOJO_OPT_PLAIN_NUMBA=plain).splitlines()
     errors, lanes = errors[:-3], errors[-3:]
     assert lanes == 3 * ["lanes that begin outside their matrix"]
     assert last == "21.0 7.0 11.0 11.0 92.0"

@@ -16,7 +16,7 @@ import pytest
 
 from solvers.compiler import fingerprint, users_cache, users_kernel
 from solvers.compiler.function_digest import function_digest
-from support.programs import python
+from support.fork_server import forked
 
 GAIN = 1.0
 
@@ -137,7 +137,7 @@ def test_a_value_that_changes_is_not_kept_under_the_old_one() -> None:
         "gain = 2.0\nprint([users_loop(f)(1.0), users_loop(f)(1)])",
     )
     head = "from solvers.compiler import users_loop\ndef f(x):\n    return gain * x\n"
-    assert [json.loads(python(head + text)) for text in programs] == [[2.0, 3.0], [2.0, 2.0]]
+    assert [json.loads(forked(head + text)) for text in programs] == [[2.0, 3.0], [2.0, 2.0]]
 
 
 LOOPS = """
@@ -176,7 +176,7 @@ print(json.dumps([found, len(Count.names)]))
 
 
 def run(gains: list[float], folder: Path) -> Any:
-    return json.loads(python(LOOPS.replace("GAINS", str(gains)), NUMBA_CACHE_DIR=str(folder)))
+    return json.loads(forked(LOOPS.replace("GAINS", str(gains)), NUMBA_CACHE_DIR=str(folder)))
 
 
 @pytest.mark.slow
@@ -203,7 +203,7 @@ def pad(x):
     return lambda x: FACTOR * x
 print(users_loop(lambda x: np.pad(x))(3.0))
 """
-    found = [float(python(program.replace("FACTOR", factor), NUMBA_CACHE_DIR=str(tmp_path))) for factor in "23"]
+    found = [float(forked(program.replace("FACTOR", factor), NUMBA_CACHE_DIR=str(tmp_path))) for factor in "23"]
     assert found == [6.0, 9.0] and not list(tmp_path.rglob("users-*"))
 
 

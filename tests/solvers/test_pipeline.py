@@ -64,7 +64,7 @@ def test_debug_information_is_for_numbas_own_pipeline(setting: str):
 @pytest.mark.slow
 def test_the_cache_keeps_the_pipelines_apart(tmp_path: Path):
     program = "from solvers.compiler import cache_folder; print(cache_folder().name)"
-    names = [python(program, NUMBA_CACHE_DIR=str(tmp_path), DOJO_OPT_PLAIN_NUMBA=plain) for plain in "01"]
+    names = [forked(program, NUMBA_CACHE_DIR=str(tmp_path), DOJO_OPT_PLAIN_NUMBA=plain) for plain in "01"]
     assert names[0] != names[1]
 
 
@@ -150,7 +150,7 @@ print(*a.ravel())
 def test_names_of_columns_are_indices_for_old_numbas_too():
     """Numba 0.66 and 0.67 refuse members of an IntEnum; this one takes them, and has to with our signatures, too."""
     for plain in "01":
-        assert python(INDEXED, DOJO_OPT_PLAIN_NUMBA=plain).split() == ["0.0", "1.0", "2.0", "5.0", "4.0", "10.0"]
+        assert forked(INDEXED, DOJO_OPT_PLAIN_NUMBA=plain).split() == ["0.0", "1.0", "2.0", "5.0", "4.0", "10.0"]
 
 
 PRUNED = """
@@ -179,6 +179,6 @@ print(*sorted(d.name.lstrip("0") for d in root.iterdir() if d != cache_folder())
 def test_folders_are_dropped_when_a_new_one_is_filled_and_only_after_weeks(tmp_path: Path):
     os.chmod(tmp_path, 0o700)
     own = {"NUMBA_CACHE_DIR": str(tmp_path), "DOJO_OPT_CACHE": "1", "DOJO_OPT_SHIPPED": "0"}
-    imported, left = python(PRUNED, **own).splitlines()
+    imported, left = forked(PRUNED, **own).splitlines()
     assert imported == "9"  # seven, the notes, and the new one
     assert left.split() == ["1", "2", "notes"]
