@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.learn.network_rows import BLOCK, backward_rows, forward_rows, pack, parts, unpack
+from dojo_opt.learn.network_rows import BLOCK, backward_rows, forward_rows, pack, parts, shape_of, unpack
 from sim.mechanism import checks
 from sim.mechanism.memory_limit import check_room
 from solvers.compiler import kernel
 from solvers.lanes import whole
-from solvers.types import Integers, Vector
+from solvers.types import IntegerMatrix, Integers, Vector
 
 Floats = NDArray[np.float64]
 
@@ -99,7 +99,7 @@ class Network:
             return self._by_row(weights, x), np.zeros((0, 0))
         layers = self._rows(len(x))
         layers[: len(x), : self.sizes[0]] = x
-        forward_rows(self._sizes, pack(self.layers(weights)), number_of(self.activation), layers)
+        forward_rows(self._shape, pack(self.layers(weights)), number_of(self.activation), layers)
         return self._outputs(layers, len(x)), layers
 
     def backward(self, weights: Floats, kept: Floats, g: Floats, out: Floats | None = None) -> Floats:
@@ -111,14 +111,14 @@ class Network:
         self._outputs(slopes, len(g))[:] = g
         count = sum((n + 1) * whole(m) for n, m in zip(self.sizes[:-1], self.sizes[1:], strict=True))
         sums = np.empty((0 if out is None else parts(len(slopes)), count))
-        backward_rows(self._sizes, turned, number_of(self.activation), kept, slopes, sums)
+        backward_rows(self._shape, turned, number_of(self.activation), kept, slopes, sums)
         if out is not None:
             unpack(sums.sum(axis=0), self.layers(out))
         return slopes[: len(g), : self.sizes[0]]
 
     @cached_property
-    def _sizes(self) -> Integers:
-        return np.array(self.sizes, dtype=np.int64)
+    def _shape(self) -> IntegerMatrix:
+        return shape_of(self.sizes)
 
     def _rows(self, count: int) -> Floats:
         """Zeros for the layers of so many rows; see network_rows.py."""

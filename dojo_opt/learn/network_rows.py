@@ -5,7 +5,8 @@ parts are added in their order, so that results are the same to the last bit on 
 
 Rows of matrices are filled up with zeros to a multiple of LANES, rows of observations to one of BLOCK. `layers`
 (n, sum of whole(size)) has the inputs, then the outputs of each layer, side by side. Packed weights (1, count) are
-those of a layer after the other: the rows of W (inputs, outputs), then b.
+those of a layer after the other: the rows of W (inputs, outputs), then b. `shape` has a row for the inputs and for
+each layer: its size, and its width, which is whole(size).
 """
 
 from __future__ import annotations
@@ -16,15 +17,21 @@ import numpy as np
 
 from solvers.compiler import kernel, parallel_kernel, prange
 from solvers.lanes import LANES, load, spread, store, whole
-from solvers.types import Floats, Integers, Matrix
+from solvers.types import Floats, IntegerMatrix, Matrix
 
-__all__ = ["BLOCK", "backward_rows", "forward_rows", "pack", "parts", "unpack"]
+__all__ = ["BLOCK", "backward_rows", "forward_rows", "pack", "parts", "shape_of", "unpack"]
 
 Span = tuple[int, int]
 
 PART = 16
 BLOCK = 4  # rows at a time: while one product is under way, others begin
+SIZE, WIDTH = 0, 1  # columns of `shape`
 _TANH = 0
+
+
+def shape_of(sizes: tuple[int, ...]) -> IntegerMatrix:
+    """The shape of a network of these sizes."""
+    return np.array([(size, whole(size)) for size in sizes], dtype=np.int64)
 
 
 def parts(rows: int) -> int:
@@ -49,12 +56,6 @@ def unpack(packed: Floats, layers: list[tuple[Floats, Floats]]) -> None:
         W += block[:-1, : len(b)]
         b += block[-1, : len(b)]
         first += block.size
-
-
-@kernel
-def _wide(size: int) -> int:
-    """The least multiple of LANES that is not below the size."""
-    return (size + LANES - 1) // LANES * LANES
 
 
 @kernel
@@ -89,16 +90,16 @@ def _activate(activation: int, layers: Matrix, columns: Span, rows: Span) -> Non
 
 
 @kernel
-def _forward(sizes: Integers, w: Matrix, activation: int, layers: Matrix, rows: Span) -> None:
+def _forward(shape: IntegerMatrix, w: Matrix, activation: int, layers: Matrix, rows: Span) -> None:
     """The outputs of all layers, of rows."""
     first, x = 0, 0
-    for k in range(sizes.shape[0] - 1):
-        n, m = sizes[k], sizes[k + 1]
-        y = x + _wide(n)
-        _affine(w, first, n, layers, (x, y, y + _wide(m)), rows)
-        if k < sizes.shape[0] - 2:
-            _activate(activation, layers, (y, y + m), rows)
-        first += (n + 1) * _wide(m)
+    for k in range(shape.shape[0] - 1):
+        n, width = shape[k, SIZE], shape[k + 1, WIDTH]
+        y = x + shape[k, WIDTH]
+        _affine(w, first, n, layers, (x, y, y + width), rows)
+        if k < shape.shape[0] - 2:
+            _activate(activation, layers, (y, y + shape[k + 1, SIZE]), rows)
+        first += (n + 1) * width
         x = y
 
 
@@ -140,33 +141,33 @@ def _slope(activation: int, layers: Matrix, g: Matrix, columns: Span, rows: Span
 
 @kernel
 def _backward(
-    sizes: Integers, w: Matrix, activation: int, layers: Matrix, g: Matrix, sums: Matrix, p: int, rows: Span
+    shape: IntegerMatrix, w: Matrix, activation: int, layers: Matrix, g: Matrix, sums: Matrix, p: int, rows: Span
 ) -> None:
     """Gradients by all layers and by x, from that by the outputs; sums[p] where there are sums.   w: transposed."""
     here, first = w.shape[1], sums.shape[1]
-    x = g.shape[1] - _wide(sizes[sizes.shape[0] - 1])
-    for k in range(sizes.shape[0] - 2, -1, -1):
-        n, m = sizes[k], sizes[k + 1]
-        y, x = x, x - _wide(n)
-        here -= (m + 1) * _wide(n)
-        first -= (n + 1) * _wide(m)
+    x = g.shape[1] - shape[shape.shape[0] - 1, WIDTH]
+    for k in range(shape.shape[0] - 2, -1, -1):
+        n, m, width = shape[k, SIZE], shape[k + 1, SIZE], shape[k + 1, WIDTH]
+        y, x = x, x - shape[k, WIDTH]
+        here -= (m + 1) * shape[k, WIDTH]
+        first -= (n + 1) * width
         if sums.shape[0] > 0:
-            _by_weights(sums, (p, first), n, layers, g, (x, y, y + _wide(m)), rows)
+            _by_weights(sums, (p, first), n, layers, g, (x, y, y + width), rows)
         _affine(w, here, m, g, (y, x, y), rows)
         if k > 0:
             _slope(activation, layers, g, (x, x + n), rows)
 
 
 @parallel_kernel
-def forward_rows(sizes: Integers, w: Matrix, activation: int, layers: Matrix) -> None:
+def forward_rows(shape: IntegerMatrix, w: Matrix, activation: int, layers: Matrix) -> None:
     """The outputs of all layers, from the inputs in `layers`.   w: packed weights."""
     n = layers.shape[0]
     for p in prange((n + PART - 1) // PART):
-        _forward(sizes, w, activation, layers, (p * PART, min(p * PART + PART, n)))
+        _forward(shape, w, activation, layers, (p * PART, min(p * PART + PART, n)))
 
 
 @parallel_kernel
-def backward_rows(sizes: Integers, w: Matrix, activation: int, layers: Matrix, g: Matrix, sums: Matrix) -> None:
+def backward_rows(shape: IntegerMatrix, w: Matrix, activation: int, layers: Matrix, g: Matrix, sums: Matrix) -> None:
     """Gradients by all columns of `layers` in g, from those by the outputs in it.
 
     w: packed layers (W^T, 0).
@@ -174,4 +175,4 @@ def backward_rows(sizes: Integers, w: Matrix, activation: int, layers: Matrix, g
     """
     n = layers.shape[0]
     for p in prange((n + PART - 1) // PART):
-        _backward(sizes, w, activation, layers, g, sums, p, (p * PART, min(p * PART + PART, n)))
+        _backward(shape, w, activation, layers, g, sums, p, (p * PART, min(p * PART + PART, n)))
