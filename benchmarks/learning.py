@@ -229,25 +229,29 @@ def summary(name: str, algorithm: str, lines: list[list[Any]]) -> list[Row]:
     return rows
 
 
+def kept_cells(table: dict[str, Any], algorithm: str) -> list[list[Any]]:
+    """The rows of an algorithm in a saved table, as in _HEADER."""
+    rows = [dict(zip(table["header"], row, strict=True)) for row in table["rows"] if row[0] == algorithm]
+    return [[row.get(column) for column in _HEADER] for row in rows]
+
+
 def table(folder: Path, names: list[str]) -> Report:
-    """Returns of all saved runs: here, and in MuJoCo where Gymnasium has the task. Tasks without runs in the folder
-    keep the numbers that its learning.json has.
+    """Returns of all saved runs: here, and in MuJoCo where Gymnasium has the task. Algorithms without runs in the
+    folder keep the numbers that its learning.json has.
     """
     report, path = Report("Policies of Gymnasium's tasks, one core"), folder / "learning.json"
-    before = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"tables": [], "rows": []}
+    before = json.loads(path.read_text(encoding="utf-8"))["tables"] if path.exists() else []
+    known = {found["title"]: found for found in before}
     for name in names:
-        lines = [line for algorithm in (*SETTINGS[name], *PEERS) for line in cells(folder, name, algorithm)]
+        lines = []
+        for algorithm in (*SETTINGS[name], *PEERS):
+            lines += cells(folder, name, algorithm) or kept_cells(
+                known.get(name, {"header": (), "rows": ()}), algorithm
+            )
         if lines:
             report.tables.append(Table(name, _HEADER, lines))
             for algorithm in dict.fromkeys(("shac", *(line[0] for line in lines))):
                 report.rows += summary(name, algorithm, lines)
-            continue
-        for kept in before["tables"]:
-            if kept["title"] == name:
-                report.tables.append(Table(name, kept["header"], kept["rows"], kept["note"]))
-        for row in before["rows"]:
-            if row["name"].startswith(f"{name}, "):
-                report.rows.append(Row(*(row[key] for key in ("name", "value", "unit", "bar", "at_least", "note"))))
     return report
 
 
