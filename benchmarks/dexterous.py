@@ -1,6 +1,7 @@
 """Dexterous manipulation by contact-implicit MPC: the given trials of Jin (arXiv 2408.07855), beside its figures.
 
     NUMBA_NUM_THREADS=1 python benchmarks/dexterous.py [CASE ...] [--trials N] [--plant ours|mujoco] [--keep DIR]
+        [--hulls FILE]
 
 Objects, starts, goals, success and budgets are those of the publication, which has 20 trials per case; on two plants:
 ours, at 2 ms with kappa 1e-8, and MuJoCo's, where it is installed, with its default contacts, but for the Allegro hand
@@ -10,13 +11,18 @@ at its end, and their means those over successful runs, as a failed run can end 
 success, 11 degrees and 7.8 mm as means over all hands and objects, and 50 to 100 Hz on an Apple M2 Pro. Ticks are timed
 by the processor, on one core. Where the place does not count, as with the Allegro hand, an object may lie on the palm
 below its goal: "sideways" is the distance without the height.
+With --hulls, objects of the Allegro hand are the convex hulls of points of their meshes: FILE is JSON, and has under
+"allegro/OBJECT" the "hull_points". Without, those that are neither cube, can, foam brick, stick nor torus are boxes and
+cylinders of their sizes.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +31,7 @@ from kept import Kept, KeptRun, add_keep, tick_times
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Cell, Report, Row, Table
+from dojo_opt.tasks.jin.palm_objects import OBJECTS
 
 CASES = {
     f"fingertips_{item}_{motion}".replace(" ", "_").replace("-", "_"): ("fingertips", (item, motion))
@@ -38,10 +45,8 @@ CASES = {
         ("stick", "flip"),
     )
 } | {"trifinger_cube": ("trifinger", ("cube",))}
-CASES |= {
-    f"allegro_{item}".replace(" ", "_"): ("allegro", (item,))
-    for item in ("cube", "can", "foam brick", "stick", "torus")
-}
+CASES |= {f"allegro_{item}".replace(" ", "_"): ("allegro", (item,)) for item in OBJECTS}
+LUMPS = tuple(item for item in OBJECTS if item not in ("cube", "can", "foam brick", "stick", "torus"))
 TRIALS = 20
 SUCCESS, ANGLE, DISTANCE, RATE = 96.5, 11.0, 7.8, 50.0  # [%], [deg], [mm], [Hz] of the publication
 OURS, MUJOCO = "ours, 2 ms, kappa 1e-8", "MuJoCo, default contacts"
@@ -68,12 +73,24 @@ def plants(case: str) -> tuple[str, str]:
     return OURS, FIRM if CASES[case][0] == "allegro" else MUJOCO
 
 
-def line(case: str, kind: str, trials: int, seconds: float | None, kept: Kept) -> tuple[list[Cell], list[KeptRun]]:
+def hulls(file: Path | None) -> dict[str, Any]:
+    """Corners of convex hulls by case."""
+    if file is None:
+        return {}
+    rows = json.loads(file.read_text(encoding="utf-8"))
+    own = {f"allegro_{item}".replace(" ", "_"): rows.get(f"allegro/{item}".replace(" ", "_")) for item in LUMPS}
+    return {case: row["hull_points"] for case, row in own.items() if row is not None}
+
+
+def line(
+    case: str, kind: str, trials: int, seconds: float | None, kept: Kept, hull: Any = None
+) -> tuple[list[Cell], list[KeptRun]]:
     """One line of a table, and the runs behind it."""
     family, arguments = CASES[case]
+    given = {} if hull is None else {"hull": hull}
     runs = []
     for trial in range(trials):
-        task = getattr(dojo.tasks.jin, family)(*arguments, trial=trial)
+        task = getattr(dojo.tasks.jin, family)(*arguments, trial=trial, **given)
         runs.append(
             kept.run(f"{case} {kind} {trial}", task, lambda t=task: t.run(plant=plant_of(t, kind), seconds=seconds))
         )
@@ -97,11 +114,11 @@ def run(args: argparse.Namespace) -> Report:
     kinds = [OURS] + ([MUJOCO, FIRM] if find_spec("mujoco") is not None else [])
     kinds = {"ours": kinds[:1], "mujoco": kinds[1:]}.get(args.plant, kinds)
     trials, seconds = (1, QUICK) if args.quick else (args.trials, None)
-    kept = Kept(None if args.quick else args.keep)
+    kept, corners = Kept(None if args.quick else args.keep), hulls(args.hulls)
     for kind in kinds:
         lines, names = [], [case for case in args.cases or CASES if kind in plants(case)]
         for case in progress()([(case, case) for case in names], kind) if names else ():
-            cells, runs = line(case, kind, trials, seconds, kept)
+            cells, runs = line(case, kind, trials, seconds, kept, corners.get(case))
             lines.append(cells)
             report.rows += rows(f"{case}, {kind}", cells, bars=not args.quick)
             report.details[f"{case}, {kind}"] = [run.outcome for run in runs]
@@ -129,6 +146,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments.add_argument("cases", nargs="*", metavar="CASE", help="; ".join(CASES))
     arguments.add_argument("--trials", type=int, default=TRIALS, help="the first of them per case")
     arguments.add_argument("--plant", choices=("ours", "mujoco"), help="one of the plants (default: both)")
+    arguments.add_argument("--hulls", type=Path, metavar="FILE", help="corners of the convex hulls of objects")
     add_keep(arguments)
     return deliver("dexterous", run, arguments, argv)
 

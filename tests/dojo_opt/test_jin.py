@@ -10,10 +10,12 @@ from dojo_opt.tasks.jin import allegro, palm_up, trifinger
 from dojo_opt.tasks.jin.allegro import trial_of as allegro_trial
 from dojo_opt.tasks.jin.fingertips import mechanism, trial_of
 from dojo_opt.tasks.jin.grasp import grasp, place_of_ball
+from dojo_opt.tasks.jin.palm_objects import OBJECTS
 from dojo_opt.tasks.jin.placing import Placing
 from dojo_opt.tasks.jin.trifinger import mechanism as trifinger_mechanism
 from dojo_opt.tasks.jin.trifinger import place_of_tip
 from dojo_opt.tasks.jin.trifinger import trial_of as trifinger_trial
+from sim.mechanism.shapes import rotation_matrix
 
 # starts (x, y, yaw) and goals of the publication, drawn by its own code
 GIVEN = [
@@ -158,13 +160,26 @@ def test_trials_of_the_hand_are_those_of_the_publication(item, start, goal):
 
 def test_tips_of_the_hand_are_where_its_links_end():
     """The formula in the cost against the simulator's kinematics; its derivatives are those of the grasp, below."""
-    sim = dojo.Simulator(palm_up.mechanism("cube"), time_step=2e-3)
+    sim = dojo.Simulator(palm_up.mechanism("cube", OBJECTS["cube"]), time_step=2e-3)
     kin, x = dojo.Kinematics(sim), sim.neutral()
     x[7:23] = np.random.default_rng(3).uniform(-0.4, 1.2, 16)
     for k, name in enumerate(("first", "middle", "ring", "thumb")):
         end = from_com(palm_up.links(), f"{name}_3", (0.0, 0.0, 0.054 if name == "thumb" else 0.0384))
         place, turn = kin.pose(f"{name}_3", x[: sim.nq])[:2]
         np.testing.assert_allclose(palm_up.place_of_tip(x, k)[:3], place + turn @ end, atol=1e-12)
+
+
+def test_a_hull_takes_the_place_of_an_object_in_the_plant():
+    """Its points are in the frame of the mesh, whose centre of mass is the origin of the body; plans keep theirs."""
+    points = [[x, y, z] for x in (-0.02, 0.03) for y in (-0.02, 0.02) for z in (0.0, 0.05)]
+    task, com = allegro("cup", trial=0, hull=points), np.asarray(OBJECTS["cup"].com)
+    shape = task.model.mechanism.collisions[0].shape_a
+    np.testing.assert_allclose(sorted(shape.vertices), sorted((np.asarray(points) - com).tolist()), atol=1e-12)
+    given = allegro_trial("cup", 0).start
+    np.testing.assert_allclose(task.start[:3], given[:3] + rotation_matrix(given[3:]) @ com, atol=1e-9)
+    assert task.mpc.nominal.mechanism.collisions[0].shape_a == OBJECTS["cup"].shape
+    with pytest.raises(ValueError, match="hull"):
+        allegro("cup", hull=[[0.0, 0.0]])
 
 
 @pytest.mark.slow
@@ -182,7 +197,7 @@ def test_a_hand_turns_a_cube():
     [
         (mechanism, 3, 3, place_of_ball),
         (trifinger_mechanism, 3, 3, place_of_tip),
-        (palm_up.mechanism, 4, 4, palm_up.place_of_tip),
+        (lambda item: palm_up.mechanism(item, OBJECTS[item]), 4, 4, palm_up.place_of_tip),
     ],
 )
 def test_the_slope_of_a_grasp_is_that_of_its_residual(made, tips, joints, place):

@@ -16,6 +16,7 @@ from dojo_opt.tasks.free_gait import Lead
 from dojo_opt.tasks.idto.allegro_ball import squeezing
 from dojo_opt.tasks.idto.mini_cheetah import with_cylinders
 from dojo_opt.tasks.jin import palm_up
+from dojo_opt.tasks.jin.palm_objects import OBJECTS
 from dojo_opt.tasks.suite import servo_effort
 from sim.mechanism.overlaps import overlaps
 from solvers.status import Status
@@ -420,8 +421,8 @@ def test_mujoco_has_the_hull_of_a_polytope():
     pytest.importorskip("mujoco")
     from benchmarks.engines.mujoco_plant import MujocoPlant
 
-    sim = dojo.Simulator(palm_up.mechanism("torus"), time_step=2e-3)
-    corners = np.asarray(palm_up.SHAPES["torus"].vertices)
+    sim = dojo.Simulator(palm_up.mechanism("torus", OBJECTS["torus"]), time_step=2e-3)
+    corners = np.asarray(OBJECTS["torus"].shape.vertices)
     for turn in ((1.0, 0.0, 0.0, 0.0), (0.8, 0.6, 0.0, 0.0)):
         start = np.zeros(sim.nx)
         start[3:7] = turn

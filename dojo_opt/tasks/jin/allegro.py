@@ -7,37 +7,25 @@ from math import pi
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dojo_opt.cost import Effort
 from dojo_opt.tasks.jin.grasp import grasp
-from dojo_opt.tasks.jin.palm_up import FINGERS, JOINTS, NAMES, SHAPES, mechanism, place_of_tip
+from dojo_opt.tasks.jin.palm_objects import OBJECTS
+from dojo_opt.tasks.jin.palm_up import FINGERS, JOINTS, NAMES, mechanism, place_of_tip
 from dojo_opt.tasks.jin.reposing import HORIZON, Aim, reposing
 from dojo_opt.tasks.jin.trial import Trial, draws, pose, turn
 from dojo_opt.tasks.suite import SuiteTask
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.overlaps import overlaps
+from sim.mechanism.shapes import rotation_matrix
 from sim.model.state_columns import BaseState
 from solvers.types import Vector
 
 __all__ = ["allegro"]
 
 _CALL = "tasks.jin.allegro"
-_CENTER = {
-    "cube": (-0.03, -0.01),
-    "can": (-0.02, 0.0),
-    "foam brick": (-0.01, 0.0),
-    "stick": (-0.01, 0.0),
-    "torus": (-0.02, 0.0),
-}  # [m] of starts
-_HEIGHT = {"stick": 0.03} | dict.fromkeys(("cube", "can", "foam brick", "torus"), 0.04)  # [m]
-_GOAL = {
-    "cube": (-0.01, 0.05),
-    "can": (-0.01, 0.06),
-    "foam brick": (-0.01, 0.04),
-    "stick": (-0.01, 0.03),
-    "torus": (0.0, 0.04),
-}  # [m] x and z of goals
 _SPREAD = 0.005  # [m] standard deviation of places
 _QUARTER = 0.5 * pi
 # until nothing overlaps at the start: lift [m], share of the bends of fingers that is kept, largest number of steps
@@ -61,29 +49,36 @@ def trial_of(item: str, number: int) -> Trial:
     Raises:
         ValueError: there is no such object or trial.
     """
-    checks.one_of(f"{_CALL}(item)", item, SHAPES)
+    thing = OBJECTS[checks.one_of(f"{_CALL}(item)", item, OBJECTS)]
     random, up = draws(_CALL, number), (0.0, 0.0, 1.0)
-    xy = np.asarray(_CENTER[item]) + _SPREAD * random.randn(2)
+    xy = np.asarray(thing.center) + _SPREAD * random.randn(2)
     yaw = 0.25 * pi + _QUARTER * random.rand() if item == "stick" else pi * random.rand() - _QUARTER
-    sides = (-_QUARTER, _QUARTER) if item in ("cube", "stick") else (_QUARTER, -_QUARTER)
-    start = pose(xy, _HEIGHT[item], turn(up, yaw))
-    x, z = _GOAL[item]
-    return Trial(start, pose((x, 0.0), z, turn(up, yaw + random.choice(sides))))
+    sides = (-_QUARTER, _QUARTER) if thing.right_first else (_QUARTER, -_QUARTER)
+    start = pose(xy, thing.height, turn(up, yaw))
+    return Trial(start, pose(thing.goal[:2], thing.goal[2], turn(up, yaw + random.choice(sides))))
+
+
+def _of_mass_center(place: Vector, com: ArrayLike) -> Vector:
+    """The pose (7,) of a body by its centre of mass, from that of its frame, in which this is at com."""
+    out = place.copy()
+    out[:3] += rotation_matrix(place[3:]) @ np.asarray(com)
+    return out
 
 
 def _apart(start: Vector, hand: Mechanism) -> Vector:
     """Coordinates (23,) of the start, parted: hard contact would throw objects that overlap off the hand.
 
-    Fingers that overlap the object are unbent step by step; an object that overlaps the palm or a base link is lifted.
+    Fingers that overlap the object are unbent step by step; an object that overlaps the palm or a base link is lifted,
+    and so is one that overlaps fingers that are nearly straight.
     """
     q = np.array(hand.neutral)
     q[BaseState.POSE] = start
-    for _ in range(_STEPS):
+    for step in range(_STEPS):
         found = overlaps(hand, q)
         if not found:
             break
         stiff = {name for name in found if name.startswith("palm") or name.endswith(":0")}
-        q[2] += _LIFT if stiff else 0.0
+        q[2] += _LIFT if stiff or step >= _STEPS // 2 else 0.0  # a wide object lies on fingers that are straight
         bent = {name.partition(":")[0] for name in found if name not in stiff}
         for k, finger in enumerate(NAMES):
             end = BaseState.JOINTS + JOINTS * (k + 1)
@@ -91,7 +86,7 @@ def _apart(start: Vector, hand: Mechanism) -> Vector:
     return q
 
 
-def allegro(item: str = "cube", trial: int = 0, **settings: Any) -> SuiteTask:
+def allegro(item: str = "cube", trial: int = 0, hull: ArrayLike | None = None, **settings: Any) -> SuiteTask:
     """Turn an object on the palm of the Allegro hand by a quarter turn: 10 knots of 40 ms at 50 Hz.
 
     Costs are those of the publication: 50 sin^2(angle / 2) at the end, squared distances of the tips from the object,
@@ -103,13 +98,17 @@ def allegro(item: str = "cube", trial: int = 0, **settings: Any) -> SuiteTask:
     A run is a success, and ends, when the object is within 23 degrees of its goal for 2 s, wherever it is; it may take
     50 s. Links are balls, and capsules at their tips, where those of the publication are boxes with the same tips; they
     meet the object alone, and the palm is its box. Can, foam brick and stick are a cylinder, a box and a capsule of
-    their sizes, and the torus, of which MuJoCo sees the convex hull, is a polytope of 60 corners, and in plans a
-    cylinder. Contacts have no torsional friction. At the start, fingers that overlap the object are unbent, or it is
-    lifted.
+    their sizes, and the torus, of which MuJoCo sees the convex hull, is a polytope of 60 corners. The others have mass,
+    centre of mass, inertia and size of the publication's meshes, and are boxes or cylinders, unless the corners of
+    their convex hulls are given. Plans see torus and others as ellipsoids. Contacts have no torsional friction. At the
+    start, fingers that overlap the object are unbent, or it is lifted.
 
     Args:
-        item: "cube", "can", "foam brick", "stick" or "torus".
+        item: "cube", "can", "foam brick", "stick", "torus", "bowl", "airplane", "binoculars", "cup", "mug",
+            "piggy bank", "rubber duck", "teapot", "water bottle", "elephant" or "camera".
         trial: number of the trial, 0 to 19 (default 0).
+        hull: (n, 3) points whose convex hull is the object in the plant, in the frame of its mesh [m] (default None:
+            the shape of its size).
         **settings: settings of `dojo.MPC`, instead of the ones of the task.
 
     Returns:
@@ -121,9 +120,11 @@ def allegro(item: str = "cube", trial: int = 0, **settings: Any) -> SuiteTask:
     """
     given, aim = trial_of(item, trial), Aim(near=np.inf, turned=0.04, period=0.1, budget=50.0)
     terms = [Effort(0.1), grasp(FINGERS, JOINTS, place_of_tip, 1.0, 0.0, HORIZON)]
-    name, hand = f"jin.allegro {item} {trial}", mechanism(item)
+    thing = OBJECTS[item] if hull is None else OBJECTS[item].hulled(hull)
+    given = Trial(*(_of_mass_center(place, thing.com) for place in given))
+    name, hand = f"jin.allegro {item} {trial}", mechanism(item, thing)
     start = _apart(given.start, hand)
     given = given._replace(start=start[BaseState.POSE])
-    hand, planned = (replace(mech, neutral=start) for mech in (hand, mechanism(item, planned=True)))
+    hand, planned = (replace(mech, neutral=start) for mech in (hand, mechanism(item, thing, planned=True)))
     usual = {"servo": None, "iterations": 1, "kappa": _KAPPA}
     return reposing(name, given, planned, hand, terms, aim, {**usual, **settings})

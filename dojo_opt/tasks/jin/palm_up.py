@@ -10,17 +10,16 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.planning.residual import jit
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
-from sim.mechanism.body import Body
+from dojo_opt.tasks.jin.palm_objects import PalmObject
 from sim.mechanism.collision import Collision
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.polytope import Polytope
-from sim.mechanism.shapes import Box, Capsule, Cylinder, Solid, Sphere, rotation_matrix
+from sim.mechanism.shapes import Box, Capsule, Solid, Sphere, rotation_matrix
 from solvers.rotation import quat_mul
 from solvers.types import Vector
 
-__all__ = ["FINGERS", "JOINTS", "MASSES", "NAMES", "SHAPES", "TORQUE", "links", "mechanism", "place_of_tip"]
+__all__ = ["FINGERS", "JOINTS", "NAMES", "TORQUE", "links", "mechanism", "place_of_tip"]
 
 FINGERS, JOINTS = 4, 4  # of the hand; of a finger
 TORQUE = 0.2  # [N m] a servo of 1 N m/rad, whose target is up to .2 rad ahead
@@ -38,29 +37,6 @@ _START = (
     *((0.125, 1.13, 1.45, 1.24), (-0.02, 0.445, 1.17, 1.5)),
     *((-0.459, 1.54, 1.11, 1.23), (0.638, 1.85, 1.5, 1.26)),
 )
-_ALONG_X = (0.5**0.5, 0.0, 0.5**0.5, 0.0)  # turns the axis of a capsule
-_TUBE, _RING, _CORNERS = 0.015, 0.0305, 12  # of a torus: radius of its tube and of its middle [m]; points of a circle
-
-
-def _torus() -> Polytope:
-    """The convex hull of a torus about z, by five circles of points on it."""
-    around = 2.0 * np.pi / _CORNERS * np.arange(_CORNERS)
-    circles = []
-    for angle in 0.25 * np.pi * np.arange(-2, 3):
-        r, z = _RING + _TUBE * cos(angle), _TUBE * sin(angle)
-        circles.append(np.stack([r * np.cos(around), r * np.sin(around), np.full(_CORNERS, z)], axis=1))
-    return Polytope(np.concatenate(circles))
-
-
-SHAPES: dict[str, Solid] = {
-    "cube": Box(0.05, 0.05, 0.05),
-    "can": Cylinder(0.0325, 0.065),
-    "foam brick": Box(0.0516, 0.0753, 0.0466),
-    "stick": Capsule(0.015, 0.1, orientation=_ALONG_X),
-    "torus": _torus(),
-}
-_PLANNED: dict[str, Solid] = {"torus": Cylinder(_RING + _TUBE, 2.0 * _TUBE)}  # simpler shapes, of plans
-MASSES = {"cube": 0.1, "can": 0.01, "foam brick": 0.01, "stick": 0.1, "torus": 0.01}  # [kg]
 # of a link: number, place in its frame, radius; and capsules at the tips: middle and length
 _SPHERES: dict[str, tuple[tuple[int, tuple[float, float, float], float], ...]] = {
     "finger": (
@@ -132,21 +108,22 @@ def links() -> list[FileLink]:
     return out
 
 
-def mechanism(item: str, planned: bool = False) -> Mechanism:
+def mechanism(item: str, thing: PalmObject, planned: bool = False) -> Mechanism:
     """An object, and the hand below it: their pairs, and no others.
 
         q  (23,) pose of the object, four joints of first, middle and ring finger and of the thumb [rad]
 
     Args:
         item: name of the object.
+        thing: the object.
         planned: whether it is the model of the controller, whose inputs are bounded, whose contacts reach 1 cm, and
-            whose torus is a cylinder (default False).
+            whose object has a simpler shape, if there is one (default False).
 
     Returns:
         The mechanism.
     """
     own = links()
-    shape = _PLANNED.get(item, SHAPES[item]) if planned else SHAPES[item]
+    shape = thing.simple or thing.shape if planned else thing.shape
     bodies, joints = assembled(own)
     reach, limit = (_REACH, TORQUE) if planned else (None, np.inf)
     parts: list[tuple[str | None, Solid, float, str]] = []
@@ -159,7 +136,7 @@ def mechanism(item: str, planned: bool = False) -> Mechanism:
         center = from_com(own, f"{name}_3", (0.0, 0.0, middle))
         parts.append((f"{name}_3", Capsule(_TIP_RADIUS, length, center=center), _FINGER, f"{name}:tip"))
     at = rotation_matrix(_UP) @ np.array([-0.0093, 0.0, -0.0475])
-    parts.append((None, Box(0.0408, 0.113, 0.095, center=at, orientation=_UP), _PALM, "palm"))
+    parts.append((None, Box(0.0408, 0.113, 0.095, center=at, orientation=_UP), max(_PALM, thing.friction), "palm"))
     collisions = [
         Collision(item, link, shape, other, friction=grip, name=name, reach=reach) for link, other, grip, name in parts
     ]
@@ -168,7 +145,7 @@ def mechanism(item: str, planned: bool = False) -> Mechanism:
     }
     neutral[item] = (0.0, 0.0, 0.05, 1.0, 0.0, 0.0, 0.0)
     return Mechanism(
-        [Body(item, MASSES[item], shape=SHAPES[item]), *bodies],
+        [thing.body(item), *bodies],
         [Joint("floating", None, item), *joints],
         [],
         [Input(link.name, limits=(-limit, limit)) for link in own],
