@@ -126,6 +126,7 @@ def part_of(goal: Vector, settings: Vector, h: float, parts: int) -> StepOptions
         settings[StepSetting.GAIN],
         settings[StepSetting.LOSS],
         settings[StepSetting.CUTOFF],
+        settings[StepSetting.LEFT],
     )
 
 
@@ -133,7 +134,8 @@ def part_of(goal: Vector, settings: Vector, h: float, parts: int) -> StepOptions
 def within(options: StepOptions, most: int, share: float) -> StepOptions:
     """The options with at most so many iterations, and a share of the tolerance."""
     iterations, tolerance = min(options.max_iterations, most), share * options.tolerance
-    return StepOptions(options.h, options.kappa, tolerance, iterations, options.gain, options.loss, options.cutoff)
+    o = options
+    return StepOptions(o.h, o.kappa, tolerance, iterations, o.gain, o.loss, o.cutoff, o.left)
 
 
 @kernel

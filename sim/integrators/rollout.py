@@ -91,6 +91,7 @@ def options_of(data: Data, settings: Vector, begins: bool) -> StepOptions:
         settings[StepSetting.GAIN],
         settings[StepSetting.LOSS],
         settings[StepSetting.CUTOFF],
+        settings[StepSetting.LEFT],
     )
 
 

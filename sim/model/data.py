@@ -133,7 +133,7 @@ class Data(NamedTuple):
     shape_rot: Matrix  # (2 npair, 9)
     pair_relative: Matrix  # (npair, 12) pose of shape a in the frame of shape b
     pair_out: Matrix  # (npair, 43) result of `collide`: Witness
-    pair_before: Matrix  # (npair, 13) pair_relative at configuration 2, and the gap that elements had at least there
+    pair_before: Matrix  # (npair, 14) pair_relative at configuration 2, least gap of elements there, and LEFT
     pair_activation: Vector  # (npair,) at its first pair: 0 if active, half the gap ahead if inactive, or FAR
     pair_travel: Vector  # (1,) displacement of a body after which inactive collisions are evaluated again [m]
     pair_evaluated: Vector  # (1,) whether they have been in this step

@@ -97,7 +97,7 @@ DATA_FLOATS = _shapes(
     bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
     shape_pos 2npair 3, shape_rot 2npair 9, pair_relative npair 12, pair_out npair 43,
     pair_frame npair 12, pair_trial 1 43,
-    pair_before npair 13, pair_activation npair, pair_travel 1, pair_evaluated 1, pair_change 1,
+    pair_before npair 14, pair_activation npair, pair_travel 1, pair_evaluated 1, pair_change 1,
     inactive_pose nbody 7, inactive_wrench nbody 6, pair_fade npair 2, pair_clear npair, pair_margin 1,
     body_travel nbody 9, pair_apart npair 2,
     pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,

@@ -19,6 +19,7 @@ class StepOptions(NamedTuple):
     gain: float  # largest energy that a solution may gain, of those that change in the step (energy_balance.py)
     loss: float  # largest that it may lose where nothing dissipates, likewise
     cutoff: float  # stiffness over mass of far contacts (far_contacts.py), 0: none is far
+    left: float  # part of the overlaps of shapes where it begins that a step may leave
 
 
 class Guess(NamedTuple):

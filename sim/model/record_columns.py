@@ -234,6 +234,7 @@ class RelativePose(Code):
 
     CENTER = 9  # (3,)
     GAP = 12  # least gap of the features there
+    LEFT = 13  # overlap that the step may leave [m]
 
 
 class PairBound(Code):
@@ -343,6 +344,7 @@ class StepSetting(Code):
     LOSS = 6
     IMPULSES = 7  # 1 where the first step may start from the impulses in its Data, those of a step before it
     CUTOFF = 8  # stiffness over mass of far contacts (contact/far_contacts.py), 0: none is far
+    LEFT = 9  # part of the overlaps of shapes where a step begins that it may leave
 
 
 class StepReport(Code):

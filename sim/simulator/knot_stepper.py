@@ -11,7 +11,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.model.record_columns import StepReport
 from sim.simulator.engines.division import Division
 from sim.simulator.engines.engine import REPORT, Engine
-from sim.simulator.results import STATUSES, Contacts, StepResult, contacts_of, reservation, status_message
+from sim.simulator.results import STATUSES, Contacts, StepResult, contacts_of, overlap, reservation, status_message
 from sim.simulator.step_batch import StepBatch
 from solvers.status import Status
 from solvers.types import Floats
@@ -70,7 +70,10 @@ class KnotStepper:
         if parts[-1] == 1:
             return StepResult(*solved)
         division = int(parts[-1]), float(fractions[-1]), float(errors[-1])
-        return StepResult(*solved, *division, reservation(fractions[-1:], errors[-1:]))
+        detail = reservation(fractions[-1:], errors[-1:])
+        if not detail and self._contacts.ndim == 2:
+            detail = overlap(self._mechanism, parts[-1:], self._contacts[None])
+        return StepResult(*solved, *division, detail)
 
     @property
     def solved_steps(self) -> int:

@@ -34,6 +34,7 @@ STATUSES = tuple(Status(number) for number in range(len(Status)))  # by number: 
 # columns of a contact; NumPy takes three times as long with the members of an enum
 IMPULSE, POINT, NORMAL = (slice(int(k), k + 3) for k in (ContactRow.IMPULSE, ContactRow.POINT, ContactRow.NORMAL))
 _GAP, _SLIP = int(ContactRow.GAP), int(ContactRow.SLIP)
+_OVERLAP = 1e-3  # [m] from which a message names it
 
 
 class SimulationError(RuntimeError):
@@ -473,6 +474,25 @@ def reservation(fractions: Floats, errors: Floats) -> str:
     return (
         f"Solved, but the estimated error of step {worst} is {errors[worst]:.2g} times the one that the accuracy "
         "allows: sub-steps in contact have a shortest length. Ask for less of it, or compare two accuracies."
+    )
+
+
+def overlap(mech: Mechanism, parts: Integers, rows: Floats) -> str:
+    """A sentence about the deepest overlap of shapes that divided steps left, or empty.
+
+    parts: (T,) of each step.   rows: (T, ncontact, 11) of contacts.
+    """
+    divided = np.flatnonzero(parts > 1)
+    first = len(mech.contacts)
+    if not len(divided) or rows.shape[1] == first:
+        return ""
+    gaps = rows[divided, first:, _GAP]
+    k, c = divmod(int(np.argmin(gaps)), gaps.shape[1])
+    if not gaps[k, c] < -_OVERLAP:
+        return ""
+    return (
+        f"Solved, but shapes overlap by up to {-gaps[k, c]:.2g} m at {mech.contact_names[first + c]!r} after step "
+        f"{divided[k]}: no solution was found that takes them apart at once. Begin without overlap."
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from sim.mechanism.mechanism import Mechanism
 from sim.model.record_columns import StepReport
 from sim.simulator.engines.engine import REPORT, Rolled
-from sim.simulator.results import STATUSES, StepResult, Trajectory, contacts_of, reservation
+from sim.simulator.results import STATUSES, StepResult, Trajectory, contacts_of, overlap, reservation
 from solvers.status import Status
 from solvers.types import Floats, Vector
 
@@ -26,6 +26,8 @@ def step_result(mechanism: Mechanism, time_step: float, rolled: Rolled, explain:
     detail = "" if rolled.solved_steps else explain("Simulator.step", rolled.reports[0], end)
     if fraction < 1.0 or error[0] > 1.0:
         detail = reservation(share, error)
+    if rolled.solved_steps and not detail:
+        detail = overlap(mechanism, parts, rolled.contacts)
     return StepResult(end, *solved, scene, int(parts[0]), fraction, float(error[0]), detail)
 
 
@@ -36,6 +38,7 @@ def trajectory(sim: Any, wrenches: Floats | None, explain: Explain, inputs: Floa
     status, (parts, fractions, errors) = STATUSES[int(last[StepReport.STATUS])], rolled.division
     where, solved = f"Simulator.rollout: step {knot}", status == Status.SOLVED
     detail = reservation(fractions, errors) if solved else explain(where, last, xs[knot])
+    detail = detail or overlap(sim.mechanism, parts[:knot], rolled.contacts[:knot])
     return Trajectory(
         simulator=sim,
         x=xs[: knot + 1],

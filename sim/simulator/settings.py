@@ -45,6 +45,7 @@ class Settings(NamedTuple):
     loss: float = inf  # largest loss where nothing dissipates, likewise
     accuracy: float = 0.0  # error of coordinates that steps may make [m/s, rad/s]; 0: steps are not divided for it
     cutoff: float = 0.0  # stiffness over mass of far contacts (contact/far_contacts.py); 0: none is far
+    left: float = 0.0  # part of the overlaps of shapes where a step begins that it may leave
 
     def shown(self) -> str:
         """Settings by name, as text; those that are 0 by default only where they are not."""
@@ -58,7 +59,7 @@ class Settings(NamedTuple):
         impulses.
         """
         level = self.kappa if kappa is None else kappa
-        limits = self.max_iterations, inf, self.gain, self.loss, 0.0, self.cutoff
+        limits = self.max_iterations, inf, self.gain, self.loss, 0.0, self.cutoff, self.left
         return np.array((self.time_step, level, self.tolerance, *limits), dtype=np.float64)
 
 

@@ -343,3 +343,25 @@ def test_momenta_behind_dampers_have_their_slopes_however_fast_joints_turn(speed
         ends = [intervals.momentum(part, sim.integrate(x, s * 1e-6 * d)) for s in (1.0, -1.0)]
         slope = (ends[0] - ends[1]) / 2e-6
         assert np.abs(by_q @ d[:nv] + by_v @ d[nv:] - slope).max() < 1e-6 * np.abs(slope).max()
+
+
+def test_overlaps_that_no_pose_opens_are_left_and_named() -> None:
+    bodies = [dojo.Body(name, 1.0, (0.01, 0.01, 0.01), shape=dojo.Sphere(0.1)) for name in ("base", "post", "arm")]
+    joints = [
+        dojo.Joint("floating", None, "base"),
+        dojo.Joint("fixed", "base", "post", parent_point=(0.0, 0.0, 0.5)),
+        dojo.Joint("revolute", "post", "arm", parent_point=(0.1, 0.0, -0.5), child_point=(0.03, 0, 0), axis=(0, 0, 1)),
+    ]
+    mech = dojo.Mechanism(bodies, joints, gravity=(0, 0, 0), collisions=[dojo.Collision("base", "arm", name="hit")])
+    sim = dojo.Simulator(mech, time_step=0.01)
+    x = sim.integrate(
+        sim.neutral(), 0.5 * np.eye(sim.ndx)[6] + np.eye(sim.ndx)[-1]
+    )  # centres .07 to .13 m apart, always
+    assert not sim.replace(divide=False).step(x).success
+    motion = sim.rollout(x, np.zeros((3, sim.nu)))
+    assert motion.success and motion.parts.min() > 1
+    gaps = motion.contacts.gap[:, 0]
+    assert np.all(np.diff(gaps) > -1e-6) and gaps.max() < -0.06
+    assert "overlap" in motion.message and "'hit'" in motion.message
+    assert np.ptp(np.hstack(sim.momentum(motion.x)), axis=0).max() < 1e-9
+    assert not sim.linearize(x, np.zeros(sim.nu)).success

@@ -164,6 +164,7 @@ def overlapping(model: Model, data: Data) -> int:
                 return Verdict.TUNNELED.value
             lenient = data.feature_choice[0] == FeatureChoice.EVERY_POSE or data.overlap_allowed[0] == 1
             part = _LAST_RESORT if lenient else _OVERLAP
-            if distance(model, data, j) < -part * least_size(model, j) - rounding_of_rims(model, j):
+            left = data.pair_before[j, RelativePose.LEFT]
+            if distance(model, data, j) < -part * least_size(model, j) - rounding_of_rims(model, j) - left:
                 found = Verdict.OVERLAPPING.value
     return found

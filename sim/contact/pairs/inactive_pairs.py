@@ -38,6 +38,7 @@ from sim.contact.pairs.limited_reach import (
 )
 from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, point_kinematics
 from sim.contact.pairs.pair_pose import balls_apart, place_shapes
+from sim.contact.pairs.previous_features import overlapped
 from sim.dynamics.displacements import third_quaternion
 from sim.model.data import Data
 from sim.model.model import Model
@@ -78,6 +79,7 @@ def begin_pairs(model: Model, data: Data, options: StepOptions) -> None:
         j = data.near_collisions[m]
         a = FAR if is_beyond(model, data, j) else _begin_pair(model, data, options, j)
         data.pair_activation[j] = a
+        data.pair_before[j, RelativePose.LEFT] = options.left * overlapped(model, data, j) if a == 0.0 else 0.0
         if a > 0.0:
             change += _change(model, data, options, j, a)
     leave_beyond(model, data)
@@ -248,6 +250,7 @@ def pairs_activated(model: Model, data: Data) -> bool:
 def _activate(model: Model, data: Data, j: int) -> None:
     """The collision that begins at pair j is active from now on."""
     data.pair_activation[j] = 0.0
+    data.pair_before[j, RelativePose.LEFT] = 0.0
     place_shapes(model, data, j, data.pos2, data.rot2)
     open_pairs(model, data, j)
 

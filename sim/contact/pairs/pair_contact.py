@@ -1,6 +1,7 @@
 """Contacts between two bodies a and b, or of a with fixed obstacles: geometry at configuration 3, and wrench.
 
-    gap    phi, normal n (from b to a) and contact point p of a pair of shapes: sim/contact/collision
+    gap    phi, normal n (from b to a) and contact point p of a pair of shapes: sim/contact/collision; plus the overlap
+           that the step may leave, which is 0 but in rescues (engines/dividing_engine.py)
     slip   v_t = T u,   u = u_a - u_b,   u_i = (x_i3 - x_i2)/h + omega_i x (p - x_i3)
     force  f = n gamma + T^T beta on a, -f on b, both at P = p - w_a (x_a3 - x_a2) - w_b (x_b3 - x_b2)
 
@@ -24,7 +25,7 @@ from sim.contact.pairs.taut_string import is_taut, pull_from_before, string_arm
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice
-from sim.model.record_columns import Kin, PairFade, PairFrame, Witness
+from sim.model.record_columns import Kin, PairFade, PairFrame, RelativePose, Witness
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, rotate, three, transposed_times
@@ -121,7 +122,8 @@ def point_kinematics(model: Model, data: Data, h: float, j: int) -> None:
     x, y, z = ax - bx, ay - by, az - bz
     fit_fade(model, data, j)
     kin = data.contact_kin[model.contact_height.shape[0] + j]
-    kin[Kin.GAP] = 1.0 if is_absent(data, j) else g[Witness.GAP]
+    left = data.pair_before[j - model.pair_feature[j], RelativePose.LEFT]
+    kin[Kin.GAP] = 1.0 if is_absent(data, j) else g[Witness.GAP] + left
     kin[Kin.SLIP1] = F[3] * x + F[4] * y + F[5] * z
     kin[Kin.SLIP2] = F[6] * x + F[7] * y + F[8] * z
     kin[Kin.ARM] = F[PairFrame.POINT] - data.pos3[a, 0]

@@ -18,14 +18,14 @@ from __future__ import annotations
 from sim.contact.contact_law import contact_impulse
 from sim.contact.pairs.limited_reach import end_of
 from sim.contact.pairs.pair_contact import is_absent, pair_arm, pair_force
-from sim.contact.pairs.previous_features import least_size, overlap_before, rounding_of_rims
+from sim.contact.pairs.previous_features import least_size, overlapped, rounding_of_rims
 from sim.contact.pairs.taut_string import is_taut
 from sim.contact.restitution import impulse_work
 from sim.dynamics.energy import twice_kinetic
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import StepOptions
-from sim.model.record_columns import Bounce, Cone, RelativePose
+from sim.model.record_columns import Bounce, Cone
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross
@@ -60,12 +60,6 @@ def power_after(model: Model, data: Data, h: float, j: int) -> float:
     return f[0] * (ux - vx) + f[1] * (uy - vy) + f[2] * (uz - vz)
 
 
-@kernel
-def _overlapped(model: Model, data: Data, j: int) -> float:
-    """Overlap of the shapes of pair j, the first of a collision, where the step began, beyond rounding [m]."""
-    return max(0.0, -(data.pair_before[j, RelativePose.GAP] + overlap_before(model, j)))
-
-
 @optional(Slot.PAIR_SLACK, default=0.0)
 def pair_slack(model: Model, data: Data) -> float:
     """Sum of the normal impulses times the overlaps where the step began, which they may take away [N s m].
@@ -77,7 +71,7 @@ def pair_slack(model: Model, data: Data) -> float:
         first = data.near_collisions[m]
         if data.pair_activation[first] != 0.0:
             continue
-        overlap = _overlapped(model, data, first) + _LEFT * least_size(model, first) + rounding_of_rims(model, first)
+        overlap = overlapped(model, data, first) + _LEFT * least_size(model, first) + rounding_of_rims(model, first)
         for j in range(first, end_of(model, first)):
             if not is_absent(data, j):
                 total += data.cone[model.contact_height.shape[0] + j, Cone.IMPULSE] * overlap
@@ -93,7 +87,7 @@ def pairs_gained(model: Model, data: Data, options: StepOptions, v: Vector) -> b
     for m in range(data.near_collision_count[0]):
         first = data.near_collisions[m]
         size = least_size(model, first)
-        overlap = _overlapped(model, data, first)
+        overlap = overlapped(model, data, first)
         slack = overlap + _LEFT * size + rounding_of_rims(model, first) + options.tolerance
         if data.pair_activation[first] != 0.0 or not overlap < _THROWN * size:
             continue

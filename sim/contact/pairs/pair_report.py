@@ -7,7 +7,7 @@ from sim.contact.pairs.limited_reach import BEYOND, end_of
 from sim.contact.pairs.pair_contact import is_absent
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import ContactRow, PairFade, Witness
+from sim.model.record_columns import ContactRow, PairFade, RelativePose, Witness
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.dense import is_finite
@@ -49,6 +49,7 @@ def _report(model: Model, data: Data, first: int, end: int, out: Matrix) -> None
         w = data.pair_fade[j, PairFade.PART]
         for e in range(3):
             out[c, e] *= w
+        out[c, ContactRow.GAP] -= data.pair_before[first, RelativePose.LEFT]
         if is_absent(data, j):
             out[c, ContactRow.GAP] = data.pair_out[j, Witness.GAP]
             for e in range(3):

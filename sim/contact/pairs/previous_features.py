@@ -60,6 +60,12 @@ def overlap_before(model: Model, j: int) -> float:
     return NEAR * least_size(model, j) + rounding_of_rims(model, j)
 
 
+@kernel
+def overlapped(model: Model, data: Data, j: int) -> float:
+    """Overlap of the shapes of pair j, the first of a collision, where the step began, beyond rounding [m]."""
+    return max(0.0, -(data.pair_before[j, RelativePose.GAP] + overlap_before(model, j)))
+
+
 @inner_kernel
 def has_no_room(kind: int) -> bool:
     """Whether a kind of pair is none of polytopes or cylinders: points of the others have sides that stay open."""

@@ -8,7 +8,9 @@ A divided step depends on its state and input alone, never on the steps before i
 derivatives are the products of those of its parts and of both conversions.
 
 Rescues, where none of 2 to LARGEST_DIVISION parts does: more parts for joints that turn fast (FASTEST_DIVISION), and
-the nearest state where none has the momentum of the last part (nearest_state.py).
+the nearest state where none has the momentum of the last part (nearest_state.py). Shapes that overlap where the step
+begins may be such that joints open them by turns of a radian and more, or by none: then each part leaves a half, nine
+tenths, or all of their overlap (_LEFT), and only resists a deeper one.
 """
 
 from __future__ import annotations
@@ -51,6 +53,8 @@ FASTEST_DIVISION = 262144  # of one in which a joint turns by _TURN in each of t
 
 _TURN = 0.02  # [rad]
 
+_LEFT = (0.5, 0.9, 1.0)  # of the overlaps of shapes where a part begins, tried in this order
+_PARTS_LEFT = (2, 8, 32)  # divisions with each
 _LOSS = 0.1  # largest loss of energy in a whole step where nothing dissipates, of the energies that change
 _PART = 1e-3  # largest gain or loss in a part
 _PIECE, _LARGEST_PIECE = 16, 1024  # steps at once after a divided one: those after the next divided one are discarded
@@ -84,6 +88,7 @@ class DividingEngine(Engine):
         self.intervals = Intervals(self)
         self.states = IntervalStates(self, self.intervals)
         self._engines: dict[int, Engine] = {}  # by the number of parts of a step
+        self._lenient: dict[tuple[int, float], Engine] = {}  # by it and the part of overlaps that they leave
         self._ended = threading.local()  # `parts`: the engine of the last step of this thread, if that was divided
 
     def undivided(self) -> Engine:
@@ -95,14 +100,18 @@ class DividingEngine(Engine):
     def refresh(self) -> None:
         """As LinkedModel.refresh, with the engines of the parts."""
         super().refresh()
-        for engine in self._engines.values():
+        for engine in (*self._engines.values(), *self._lenient.values()):
             engine.refresh()
 
-    def part(self, parts: int) -> Engine:
-        """The engine of the parts of a step."""
+    def part(self, parts: int, left: float = 0.0) -> Engine:
+        """The engine of the parts of a step.   left: part of the overlaps where they begin that they leave."""
+        s = self.settings
+        short = s._replace(time_step=s.time_step / parts, kappa=s.kappa / parts, gain=_PART, loss=_PART, left=left)
+        if left > 0.0:
+            if (parts, left) not in self._lenient:
+                self._lenient[parts, left] = Engine(self.model, short)
+            return self._lenient[parts, left]
         if parts not in self._engines:
-            s = self.settings
-            short = s._replace(time_step=s.time_step / parts, kappa=s.kappa / parts, gain=_PART, loss=_PART)
             self._engines[parts] = Engine(self.model, short)
         return self._engines[parts]
 
@@ -126,6 +135,12 @@ class DividingEngine(Engine):
             found = self.in_parts(parts, x, (u, wrench), kappa, nearest=True)
             if found is not None:
                 return found
+        overlaps = [] if derivatives or len(self.model.pair_kind) == 0 else _LEFT
+        for left in overlaps:
+            for parts in _PARTS_LEFT:
+                found = self.in_parts(parts, x, (u, wrench), kappa, left=left)
+                if found is not None:
+                    return found
         return None
 
     def _divisions(self, x: Vector, derivatives: bool) -> list[int]:
@@ -145,12 +160,14 @@ class DividingEngine(Engine):
         *,
         derivatives: bool = False,
         nearest: bool = False,
+        left: float = 0.0,
     ) -> DividedStep | None:
         """The step in the given number of parts; None if one of them is not solved. given: input, external wrenches.
 
         nearest: where the last part has a momentum that no state has, take the nearest one, nearest_state.py.
+        left: part of the overlaps of shapes that each part leaves.
         """
-        engine = self.part(parts)
+        engine = self.part(parts, left)
         part = engine.settings.time_step
         first = self.intervals.to_part(x, part)
         if first is None:
@@ -213,7 +230,8 @@ class DividingEngine(Engine):
 
     def strategy_solves(self) -> Integers:
         """As Engine.strategy_solves, with the parts of divided steps."""
-        return sum((engine.strategy_solves() for engine in self._engines.values()), super().strategy_solves())
+        engines = (*self._engines.values(), *self._lenient.values())
+        return sum((engine.strategy_solves() for engine in engines), super().strategy_solves())
 
     def last(self) -> Data:
         """Data of the last step of this thread, or of its last part."""
