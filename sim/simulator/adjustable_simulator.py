@@ -58,6 +58,7 @@ class AdjustableSimulator(Simulator):
         for name, own, theirs in zip(Model._fields, self.model, other.model, strict=True):
             if name != "optional":  # addresses of the kernels that each has linked
                 np.copyto(own, theirs)
+        self._by_parameters.follow(other._by_parameters)
         self._engine.refresh()
 
     def set_parameters(self, values: Mapping[str, ArrayLike]) -> None:

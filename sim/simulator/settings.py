@@ -50,7 +50,9 @@ class Settings(NamedTuple):
     def shown(self) -> str:
         """Settings by name, as text; those that are 0 by default only where they are not."""
         given = [name for name in SETTING_NAMES if name not in ("accuracy", "cutoff") or getattr(self, name)]
-        return ", ".join(f"{name}={getattr(self, name):g}" for name in given)
+        given = [name for name in given if name != "order" or not self.accuracy]  # which chooses the orders itself
+        texts = [f"{value:g}" if isinstance(value := getattr(self, name), float) else repr(value) for name in given]
+        return ", ".join(f"{name}={text}" for name, text in zip(given, texts, strict=True))
 
     def array(self, kappa: float | None = None) -> Vector:
         """The settings as an array for kernels, without those that only choose the engine.

@@ -37,6 +37,7 @@ class SimulatorParameters:
         self._engine, self._mechanism, self._time_step = engine, mechanism, time_step
         # those made so far: finding parameters by name takes longer than their derivatives
         self._selections: dict[tuple[str, ...], tuple[Parameters, ParameterPlan]] = {}
+        self._written = mechanism  # that of the values in the model, but for those that `adopt` has written
         self._packed: Model | None = None  # that of the values that `adopt` has written last
 
     @cached_property
@@ -79,7 +80,7 @@ class SimulatorParameters:
         """Write other values of parameters into the model; arrays that they do not change stay as they are."""
         if self._engine.settings.order != 2 or self._engine.settings.accuracy or "time_step" in values:
             raise ValueError(f"{call}: expected steps of order 2, without accuracy, and no time_step")
-        old = pack(self._mechanism) if self._packed is None else self._packed
+        old = pack(self._written) if self._packed is None else self._packed
         new = pack(self.with_values(call, values)[0])
         changes = [
             (own, after)
@@ -94,6 +95,10 @@ class SimulatorParameters:
             np.copyto(own, after)
         self._packed = new
         self._engine.refresh()
+
+    def follow(self, other: SimulatorParameters) -> None:
+        """Know that the model has taken over the values of another simulator."""
+        self._written, self._packed = other._written, other._packed
 
     def roll(
         self,

@@ -48,6 +48,7 @@ class March(NamedTuple):
     contacts: Floats  # (T, ncontact, 11)
     means: Floats  # (T + 1, nx) the states of order 2 where its steps begin
     near: NDArray[np.bool_]  # (T,) which those are
+    division: Division  # of the steps of order 2; others are whole
 
 
 class PhasedEngine(PythonLoopEngine):
@@ -75,22 +76,23 @@ class PhasedEngine(PythonLoopEngine):
         motion = MotionBuffers(means, us, self.external(wrenches), reports, contacts, *self.no_predictions[:2])
         path = Phases(xs, motion, near, not self.second_order_reason, self.settings.divide)
         xs[0], settings, (models, data_tables) = x, self._second.settings.array(kappa), self._lines()
+        division = Division.none(steps)
         self._second.forget_parts()
         try:
             for _ in pieces(settings, steps):
                 t = int(roll_phases(models, data_tables, settings, path, t))
-                while t < steps and near[t] and self._divide(path, t, kappa):
+                while t < steps and near[t] and self._divide(path, t, kappa, division):
                     t += 1
                     if t < steps:
                         t = int(roll_phases(models, data_tables, settings, path, t))
                 if t == steps or reports[t, StepReport.STATUS] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
-            raise Interrupted((t, xs, interrupted(reports, t), contacts)) from None
+            raise Interrupted((t, xs, interrupted(reports, t), contacts, division)) from None
         self._kept.near = bool(t and near[t - 1])
         if t < steps:
             np.nan_to_num(reports[t], copy=False, nan=np.inf, posinf=np.inf)
-        return March(t, xs, reports, contacts, means, near > 0)
+        return March(t, xs, reports, contacts, means, near > 0, division)
 
     def _lines(self) -> tuple[Table, Table]:
         """Tables of the models of both orders, and of this thread's Data of both."""
@@ -100,8 +102,8 @@ class PhasedEngine(PythonLoopEngine):
             self._kept.models = np.stack([self.linked(link_flight), self._second.step_table()])
         return self._kept.models, self._kept.data_tables[1]
 
-    def _divide(self, path: Phases, t: int, kappa: float | None) -> bool:
-        """Take the unsolved step t of order 2 in parts; False where that does not solve it."""
+    def _divide(self, path: Phases, t: int, kappa: float | None, division: Division) -> bool:
+        """Take the unsolved step t of order 2 in parts; False where that does not solve it. division: written."""
         motion, row = path.motion, slice(t, t + 1)
         if int(motion.reports[t, StepReport.STATUS]) not in DIVISIBLE:
             return False
@@ -113,7 +115,7 @@ class PhasedEngine(PythonLoopEngine):
             motion.contacts[row],
             *self.no_predictions[:2],
         )
-        if self._second.take_steps(self._second.step_table(), one, kappa, Division.none(1)) == 0:
+        if self._second.take_steps(self._second.step_table(), one, kappa, Division(*(column[row] for column in division))) == 0:
             return False
         path.xs[t + 1] = motion.xs[t + 1]
         path.xs[t + 1, self.sizes.nq :] = self._second.states.node_velocities(motion.xs[t + 1 : t + 2])[0]
@@ -132,13 +134,18 @@ class PhasedEngine(PythonLoopEngine):
         try:
             m = self.march(x, us, wrenches, kappa)
         except Interrupted as stop:
-            knot, xs, reports, contacts = stop.result
-            none, whole = self.no_predictions[:2], Division.none(len(us))
-            raise Interrupted(Rolled(knot, xs, reports, contacts, none[0], none[1], whole)) from None
+            knot, xs, reports, contacts, division = stop.result
+            raise Interrupted(Rolled(knot, xs, reports, contacts, *self.no_predictions[:2], division)) from None
         A, B = self.no_predictions[:2]
-        if derivatives:
-            A, B, *_ = self.linearize(m.xs[:-1], us, 1, kappa, None, wrenches)
-        return Rolled(m.solved_steps, m.xs, m.reports, m.contacts, A, B, Division.none(len(us)))
+        if not derivatives:
+            return Rolled(m.solved_steps, m.xs, m.reports, m.contacts, A, B, m.division)
+        A, B, _, found = self.linearize(m.xs[:-1], us, 1, kappa, None, wrenches)
+        refused = np.flatnonzero(found[: m.solved_steps, StepReport.STATUS] != Status.SOLVED)
+        end = int(refused[0]) if len(refused) else m.solved_steps
+        m.reports[:end, StepReport.ACCURACY] = found[:end, StepReport.ACCURACY]
+        if len(refused):  # the motion ends where a step has no derivatives
+            m.reports[end] = found[end]
+        return Rolled(end, m.xs, m.reports, m.contacts, A, B, m.division)
 
     def inactive(self) -> NDArray[np.bool_]:
         """As Engine.inactive; all of them where the step was of higher order."""
@@ -151,13 +158,15 @@ class PhasedEngine(PythonLoopEngine):
         us, external = given
         m = self.march(x, us, external, kappa)
         A, B, report = np.eye(self.ndx), np.zeros((self.ndx, self.nu)), m.reports[min(m.solved_steps, len(us) - 1)]
+        accuracy = 0.0
         for s in range(len(us) if m.solved_steps == len(us) else 0):
             dx, du, found = self._step_slopes(m, s, (us[s], external[s : s + 1]), kappa)
-            A, B = dx @ A, dx @ B + du
+            A, B, accuracy = dx @ A, dx @ B + du, max(accuracy, found[StepReport.ACCURACY])
             if found[StepReport.STATUS] != Status.SOLVED:
                 report = found
         if report[StepReport.STATUS] != Status.SOLVED:
             return np.zeros_like(A), np.zeros_like(B), np.zeros(self.nx), report
+        report[StepReport.ACCURACY] = accuracy
         return A, B, m.xs[-1], report
 
     def _step_slopes(
