@@ -10,6 +10,7 @@ from sim.model.record_columns import ContactRow
 from solvers.codes import Code
 from solvers.compiler import kernel
 from solvers.dense import clear, copy_vector
+from solvers.rotation import three
 from solvers.types import Cube, Integers, Matrix, Vector
 
 
@@ -152,8 +153,9 @@ def add_contacts(line: SubstepState) -> None:
 
 @kernel
 def rest_contacts(line: SubstepState) -> None:
-    """Gaps, slips and normals of the end of a flight; impulses stay."""
+    """Gaps, slips and normals of the end of a flight, and points of contacts without an impulse; impulses stay."""
     for c in range(line.contacts.shape[0]):
         line.slips[c] = UNKNOWN
-        for k in range(6, line.contacts.shape[1]):
+        free = three(line.contacts[c], ContactRow.IMPULSE) == (0.0, 0.0, 0.0)
+        for k in range(ContactRow.POINT if free else ContactRow.GAP, line.contacts.shape[1]):
             line.contacts[c, k] = line.parts[0, c, k]

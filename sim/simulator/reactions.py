@@ -120,7 +120,8 @@ def reactions(
     call = "Simulator.reactions"
     checks.one_of(f"{call}(frame=...)", frame, FRAMES)
     if engine.settings.order != 2:
-        raise ValueError(f"{call}: expected a simulator of order 2, got order {engine.settings.order}")
+        s = engine.settings
+        raise ValueError(f"{call}: expected a simulator of order 2, got {s.kind}; use {s.way_to_order_two}")
     states, us, wrenches = steps
     loops = [(m, loop) for m, loop in enumerate(mech.loops) if not is_weld(loop)]
     names = (*mech.joint_names, *(loop.name for _, loop in loops))

@@ -497,6 +497,11 @@ def overlap(mech: Mechanism, parts: Integers, rows: Floats) -> str:
 
 
 def fastest_body(mech: Mechanism, z: Floats) -> str:
-    """Name the fastest-turning body of a maximal state (nbody, 13); its step is short, otherwise turns wrap."""
+    """A sentence that names the fastest-turning body of a maximal state (nbody, 13), empty where that is not finite.
+
+    Its step is short, otherwise turns wrap.
+    """
     w = np.linalg.norm(z[:, BodyState.SPIN], axis=1)
-    return f"The fastest is {mech.body_names[int(w.argmax())]!r}, with {w.max():.3g} rad/s before the step."
+    if not np.isfinite(w).all():
+        return ""
+    return f" The fastest is {mech.body_names[int(w.argmax())]!r}, with {w.max():.3g} rad/s before the step."

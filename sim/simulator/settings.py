@@ -54,6 +54,16 @@ class Settings(NamedTuple):
         texts = [f"{value:g}" if isinstance(value := getattr(self, name), float) else repr(value) for name in given]
         return ", ".join(f"{name}={text}" for name, text in zip(given, texts, strict=True))
 
+    @property
+    def kind(self) -> str:
+        """The kind of steps, for messages about what only those of order 2 can do."""
+        return f"accuracy {self.accuracy:g}" if self.accuracy else f"order {self.order}"
+
+    @property
+    def way_to_order_two(self) -> str:
+        """The call that gives a simulator of order 2, for the same messages."""
+        return "replace(accuracy=None)" if self.accuracy else "replace(order=2)"
+
     def array(self, kappa: float | None = None) -> Vector:
         """The settings as an array for kernels, without those that only choose the engine.
 

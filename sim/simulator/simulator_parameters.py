@@ -59,7 +59,8 @@ class SimulatorParameters:
         asked = _different_names(call, wrt)
         names = tuple(name for name in asked if name not in _VARIABLES)
         if names and self._engine.settings.order != 2:
-            raise ValueError(f"{call}: expected a simulator of order 2, got order {self._engine.settings.order}")
+            s = self._engine.settings
+            raise ValueError(f"{call}: expected a simulator of order 2, got {s.kind}; use {s.way_to_order_two}")
         return asked, *self._selection(call, names)
 
     def values(self, call: str, wrt: Sequence[str]) -> Parameters:

@@ -121,7 +121,7 @@ class StateSpace:
         text = status_message(mech, where, report, self.tolerance, max(gaps, default=None))
         if report[StepReport.STATUS] == Status.TURN_TOO_LARGE and x is not None:  # short steps turn little
             short = StateSpace(mech, self._engine.settings._replace(time_step=1e-6, order=2, accuracy=0.0))
-            text += f" {fastest_body(mech, short.maximal(x))}"
+            text += fastest_body(mech, short._states.maximal(x[None]).reshape(self.nbody, 13))
         return text
 
     @cached_property

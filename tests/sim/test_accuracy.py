@@ -407,6 +407,22 @@ def test_states_at_any_time_agree_with_the_motion(swing: tuple[dojo.Simulator, d
     assert np.array_equal(motion.at([0.05, 0.5]), motion.x[[1, 10]])
     with pytest.raises(ValueError, match="times from 0 to 0.5 s"):
         motion.at([0.6])
+    spun = sim.neutral()
+    spun[sim.nq :] = 1e200
+    ended = sim.rollout(spun, steps=2)
+    assert ended.solved_steps == 0 and not ended.success and ended.message
+    assert np.array_equal(ended.at([0.0])[0], spun)
+    with pytest.raises(ValueError, match=r"use replace\(accuracy=None\)"):
+        sim.maximal_jacobian(sim.neutral())
+
+
+def test_contacts_of_a_flight_are_where_the_body_is() -> None:
+    """Those that carried nothing in the step, as with a fixed one."""
+    mech = models.block()
+    fixed, sim = dojo.Simulator(mech, time_step=0.02), dojo.Simulator(mech, time_step=0.02, accuracy=1e-3)
+    x = sim.neutral()
+    x[0], x[2] = 3.0, 5.0
+    assert np.allclose(sim.step(x).contacts.point, fixed.step(x).contacts.point, atol=1e-2)
 
 
 def test_impossible_accuracies_are_refused() -> None:
@@ -422,7 +438,7 @@ def test_impossible_accuracies_are_refused() -> None:
     with pytest.raises(ValueError, match="expected a simulator with an accuracy"):
         dojo.Simulator(mech).rollout(np.zeros(4), duration=1.0)
     assert dojo.Simulator(mech, accuracy=1e-3).replace(accuracy=None).order == 2
-    assert repr(dojo.Simulator(mech, accuracy=1e-3)).endswith("divide=1, accuracy=0.001)")
+    assert repr(dojo.Simulator(mech, accuracy=1e-3)).endswith("divide=True, accuracy=0.001)")
 
 
 def test_contacts_refuse_an_accuracy_that_they_do_not_have() -> None:

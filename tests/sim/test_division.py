@@ -285,6 +285,18 @@ def test_higher_orders_divide_their_steps_of_order_two(order: int) -> None:
     assert motion.success, motion.message
 
 
+@pytest.mark.parametrize("order", [2, 4])
+def test_every_order_tells_how_its_steps_are_divided(order: int) -> None:
+    """A block that spins on the ground too fast for whole steps."""
+    sim = dojo.Simulator(models.block(), time_step=0.02, order=order)
+    x = sim.neutral()
+    x[-3:] = (0.0, 0.0, 200.0)
+    motion = sim.rollout(x, steps=3)
+    assert motion.success and motion.parts.min() > 1, (motion.message, motion.parts)
+    linear = sim.linearize_rollout(x, np.zeros((3, sim.nu)))[1]
+    assert linear.success and np.all(np.asarray(linear.accuracy) > 0.0)
+
+
 def test_steps_that_division_cannot_solve_keep_their_reason() -> None:
     sim = dojo.Simulator(models.quadruped(), time_step=0.01, max_iterations=1)
     result = sim.step(sim.neutral())

@@ -230,7 +230,8 @@ def test_bad_names(wrt: tuple[str, ...], message: str) -> None:
 
 def test_parameters_of_orders_above_two_are_refused() -> None:
     sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01, order=4)
-    with pytest.raises(ValueError, match=r"linearize\(wrt=...\): expected a simulator of order 2, got order 4"):
+    refusal = r"linearize\(wrt=...\): expected a simulator of order 2, got order 4; use replace\(order=2\)"
+    with pytest.raises(ValueError, match=refusal):
         sim.linearize(sim.neutral(), wrt=("mass",))
     with pytest.raises(ValueError, match=r"vjp\(wrt=...\): expected a simulator of order 2"):
         sim.vjp((np.tile(sim.neutral(), (2, 1)), np.zeros((1, sim.nu))), np.ones((2, sim.ndx)), wrt=("mass",))

@@ -73,8 +73,8 @@ def inside(hull: Matrix, o: int, x: Vec3) -> Vec3:
 @inner_kernel
 def cell(s: float, count: int) -> tuple[int, float]:
     """First coefficient of four, and the fraction of the cell, at the grid coordinate s."""
-    i = min(max(floor(s), 0.0), count - 4.0)
-    return int(i), s - i
+    i = min(max(int(floor(s)), 0), count - 4)  # of whole numbers: one of NaN, too, is within the grid
+    return i, s - i
 
 
 @kernel

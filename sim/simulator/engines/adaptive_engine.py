@@ -408,6 +408,8 @@ class AdaptiveEngine(PythonLoopEngine):
         The sub-step in which a time lies is taken again as far as there, so a node has the accuracy of the motion.
         """
         xs, us, external = motion
+        if len(us) == 0:
+            return np.tile(xs[0], (len(times), 1))
         wrenches = self.external(external)
         h, out, known = self.settings.time_step, np.empty((len(times), self.nx)), -1
         for i, time in enumerate(times):

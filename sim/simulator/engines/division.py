@@ -34,6 +34,10 @@ class Division(NamedTuple):
     momentum_fractions: Floats  # (T,) conserved, of the momentum of bodies relative to each other
     errors: Floats  # (T,) estimated, over those that an accuracy allows; 0 without one
 
+    def rows(self, which: slice) -> Division:
+        """The division of some of the steps: a view, which writes to this one."""
+        return Division(self.parts[which], self.momentum_fractions[which], self.errors[which])
+
     @classmethod
     def none(cls, steps: int) -> Division:
         """The division of a given number of undivided steps."""

@@ -62,8 +62,8 @@ class HighOrderEngine(Engine):
         swings = np.flatnonzero(self.model.joint_nrot == 2)
         if len(swings):
             raise ValueError(
-                f"Simulator of order {self.settings.order}: derivatives through joint {swings[0]}, with two rotations "
-                "(orbital), are those of order 2; use replace(order=2)"
+                f"Simulator of {self.settings.kind}: derivatives through joint {swings[0]}, with two rotations "
+                f"(orbital), are those of order 2; use {self.settings.way_to_order_two}"
             )
         return self.linked(link_stages, link_tangents, *needs)
 

@@ -83,8 +83,8 @@ class NodeStates(MeanStates):
         self._refuse("Jacobians are")
 
     def _refuse(self, feature: str) -> NoReturn:
-        order = self._kernels.settings.order
-        raise ValueError(f"Simulator of order {order}: {feature} those of order 2; use replace(order=2)")
+        s = self._kernels.settings
+        raise ValueError(f"Simulator of {s.kind}: {feature} those of order 2; use {s.way_to_order_two}")
 
 
 class ClosingStates(NodeStates):

@@ -115,7 +115,7 @@ class PhasedEngine(PythonLoopEngine):
             motion.contacts[row],
             *self.no_predictions[:2],
         )
-        if self._second.take_steps(self._second.step_table(), one, kappa, Division(*(column[row] for column in division))) == 0:
+        if self._second.take_steps(self._second.step_table(), one, kappa, division.rows(row)) == 0:
             return False
         path.xs[t + 1] = motion.xs[t + 1]
         path.xs[t + 1, self.sizes.nq :] = self._second.states.node_velocities(motion.xs[t + 1 : t + 2])[0]
@@ -131,12 +131,12 @@ class PhasedEngine(PythonLoopEngine):
         derivatives: bool = False,
     ) -> Rolled:
         """As Engine.roll; derivatives take a second pass."""
+        A, B = self.no_predictions[:2]
         try:
             m = self.march(x, us, wrenches, kappa)
         except Interrupted as stop:
             knot, xs, reports, contacts, division = stop.result
-            raise Interrupted(Rolled(knot, xs, reports, contacts, *self.no_predictions[:2], division)) from None
-        A, B = self.no_predictions[:2]
+            raise Interrupted(Rolled(knot, xs, reports, contacts, A, B, division)) from None
         if not derivatives:
             return Rolled(m.solved_steps, m.xs, m.reports, m.contacts, A, B, m.division)
         A, B, _, found = self.linearize(m.xs[:-1], us, 1, kappa, None, wrenches)
