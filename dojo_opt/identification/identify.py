@@ -49,6 +49,7 @@ _WITHIN = 0.1  # standard deviations: the change of the parameters that it may s
 _AWAY = 0.3  # times a value: standard deviation of the starts of further fits without a prior
 _EXACT = 1e-10  # square of the errors over their noise: data without noise
 _MESSAGES = {**MESSAGES, Status.LINE_SEARCH: "No damped step decreases the cost as the linear model expects."}
+_MISSED = 0.5  # share of outliers above which the model does not explain the data
 COLUMNS = ("iteration", "kappa", "cost", "rms", "damping", "step", "outliers", "unsolved", "seconds")
 _HEADER = "{:>9} {:>8} {:>12} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8}".format(*COLUMNS)
 
@@ -61,7 +62,7 @@ class Identified:
         success: whether the last smoothing converged.
         status: SOLVED, or the reason for an early end: MAX_ITERATIONS, LINE_SEARCH if no damped step decreases the
             cost as the linear model expects, SIMULATION_FAILED if no window can be predicted.
-        message: the same as a sentence.
+        message: the same as a sentence; also whether most states are outliers, which the model does not explain.
         labels: names of the fitted values.
         values: (n,) fitted values, in the units of their parameters.
         start: (n,) values before the fit.
@@ -501,8 +502,19 @@ def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str,
         for axis in axes[:, ~seen].T
     ]
     return Identified(
-        status == Status.SOLVED, status, _MESSAGES[status], space.labels, fit.theta, space.values, covariance,
+        status == Status.SOLVED, status, _message(status, far), space.labels, fit.theta, space.values, covariance,
         space.simulator(fit.theta), float(np.sqrt(cost / max(count, 1))), unseen, far,
         fit.rest(cost, found, usable), fit.starts, space.delayed(fit.windows, fit.theta), fit.predictor.noise, usable,
         history, kappa, time.process_time() - began,
     )  # fmt: skip
+
+
+def _message(status: Status, outliers: float) -> str:
+    """A sentence about the end of a fit, and one about a model that does not explain the data."""
+    if outliers <= _MISSED:
+        return _MESSAGES[status]
+    return (
+        f"{_MESSAGES[status]} But the predictions miss {100 * outliers:.0f} % of the states by far more than the "
+        "noise, so do not trust the values: end kappas=... with that of the motions, give shorter windows, or fit more "
+        "parameters."
+    )

@@ -54,6 +54,15 @@ def test_outliers_are_resisted():
     assert errors[0] < 3.0 * robust.deviation[0] and errors[0] < 0.5 * errors[1] and robust.outliers > 0.01
 
 
+def test_a_model_that_does_not_explain_the_data_is_told():
+    """A lighter arm with any damper moves otherwise than the measured one."""
+    sd = np.array([1e-5, 1e-4])
+    motions = _motions(_arm(mass=3.0), np.random.default_rng(1), sd)
+    wrong, right = (dojo.identify(_arm(0.2, mass), motions, ("damper",), noise=sd) for mass in (1.0, 3.0))
+    assert wrong.outliers > 0.5 and "do not trust the values" in wrong.message and wrong.message in wrong.closing_line()
+    assert right.success and "do not trust" not in right.message
+
+
 def test_parameters_within_a_tenth_of_their_deviation_are_found():
     """As at the end of a fit of friction: only the starts of windows beside changes of contacts want to move."""
     for deviations, status in ((0.03, Status.SOLVED), (0.3, Status.LINE_SEARCH)):
