@@ -58,11 +58,13 @@ def stacked(count: int, rounds: int) -> list[Cell]:
     """
     import mujoco
 
+    from benchmarks.engines import mujoco_scene
+
     sim = dojo.Simulator(tower(dojo.Box(EDGE, EDGE, EDGE), [1.0] * count), 0.01)
     us = np.zeros((STEPS, 0))
     x = sim.rollout(sim.neutral(), us, throw=True).x[-1]
     motion = sim.rollout(x, us, throw=True)
-    model = mujoco.MjModel.from_xml_string(boxes(count, 0.01))
+    model = mujoco_scene.without_reset(mujoco.MjModel.from_xml_string(boxes(count, 0.01)))
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 2 * STEPS)
     ours, theirs = clocked(lambda: sim.rollout(x, us), lambda: mujoco.mj_step(model, data, STEPS), STEPS, rounds)

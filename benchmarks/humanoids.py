@@ -87,21 +87,31 @@ def runs(case: str, name: str, seeds: range, seconds: float) -> list[ClosedLoop]
     return out
 
 
-def speeds(loop: ClosedLoop) -> tuple[float, float]:
-    """Mean speed over ground in the last half of a run, along the path [m/s], and mean rate of the heading [rad/s]."""
+def velocities(loop: ClosedLoop) -> tuple[float, float, float]:
+    """Mean velocity over ground in the last half of a run, forward and to the left [m/s], and rate of turn [rad/s].
+
+    On a circle at a constant rate the direction of the chord is that of the velocity halfway.
+    """
     half = loop.x[len(loop.x) // 2 :]
     seconds = max(len(half) - 1, 1) * loop.simulator.time_step
     heading = np.unwrap(2.0 * np.arctan2(half[:, 6], half[:, 3]), period=2.0 * np.pi)
-    turned = float(heading[-1] - heading[0])
-    chord = float(np.hypot(*(half[-1, :2] - half[0, :2])))
-    arc = chord / max(abs(np.sinc(0.5 * turned / np.pi)), 0.1)  # of a circle
-    return arc / seconds, turned / seconds
+    turned, halfway = float(heading[-1] - heading[0]), 0.5 * float(heading[-1] + heading[0])
+    x, y = (half[-1, :2] - half[0, :2]) / max(abs(np.sinc(0.5 * turned / np.pi)), 0.1) / seconds
+    c, s = np.cos(halfway), np.sin(halfway)
+    return float(c * x + s * y), float(c * y - s * x), turned / seconds
+
+
+def speeds(case: str, loop: ClosedLoop) -> tuple[float, float]:
+    """Mean speed in the direction that was asked for [m/s], or in any where none was, and rate of turn [rad/s]."""
+    asked, (forward, left, turn) = np.array(CASES[case][:2]), velocities(loop)
+    length = float(np.hypot(*asked))
+    return float(asked @ (forward, left)) / length if length else float(np.hypot(forward, left)), turn
 
 
 def succeeds(case: str, loop: ClosedLoop) -> bool:
     """Whether a run stays up, at the speed and rate of turn that were asked for."""
     forward, left, turn = CASES[case]
-    speed, rate = speeds(loop)
+    speed, rate = speeds(case, loop)
     return bool(loop.survived and abs(speed - np.hypot(forward, left)) < OFF and abs(rate - turn) < OFF_TURN)
 
 
@@ -112,7 +122,7 @@ def line(case: str, name: str, loops: list[ClosedLoop], nu: int) -> list[Cell]:
     period = float(np.median(np.diff([tick.time for tick in loops[0].log]))) if len(loops[0].log) > 1 else np.nan
     up = sum(loop.survived for loop in loops)
     fallbacks, ticks = sum(tick.fallback for loop in loops for tick in loop.log), sum(len(loop.log) for loop in loops)
-    moved = np.array([speeds(loop) for loop in loops if loop.survived]).reshape(-1, 2)
+    moved = np.array([speeds(case, loop) for loop in loops if loop.survived]).reshape(-1, 2)
     speed, rate = moved.mean(axis=0) if len(moved) else (np.nan, np.nan)
     torque = max(float(np.abs(loop.u[:, :nu]).max(initial=0.0)) for loop in loops)
     ends = "; ".join(sorted({loop.message for loop in loops if not loop.survived})[:3])

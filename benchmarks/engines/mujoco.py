@@ -60,7 +60,6 @@ class MuJoCo:
         u = held(mechanism, inputs, int(marks[-1]))
         sim = Simulator(mechanism, time_step=time_step)
         model = mujoco_scene.load(sim.model, time_step, integrator=self.integrator, **self.options)
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a lost scene is not restarted
         for name, values in self.contacts.items():
             getattr(model, f"pair_{name}")[:] = values
         start = np.concatenate([np.asarray(q, dtype=np.float64), np.asarray(v, dtype=np.float64)])

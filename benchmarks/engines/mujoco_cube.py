@@ -10,6 +10,7 @@ from mujoco import minimize, rollout
 
 import dojo_opt as dojo
 from benchmarks.engines.cube_motion import CubeMotion
+from benchmarks.engines.mujoco_scene import without_reset
 from solvers.types import Floats
 
 __all__ = ["MujocoCube", "default_cube", "fit"]
@@ -41,7 +42,7 @@ class MujocoCube:
     def __init__(self, values: Floats, frame: float, sim: dojo.Simulator) -> None:
         names = ("friction", "half", "time", "ratio", "inertia")
         numbers = {name: float(value) for name, value in zip(names, values, strict=True)}
-        self._model = mujoco.MjModel.from_xml_string(_MODEL.format(step=frame / _SUBSTEPS, **numbers))
+        self._model = without_reset(mujoco.MjModel.from_xml_string(_MODEL.format(step=frame / _SUBSTEPS, **numbers)))
         self._data, self.values, self._sim = mujoco.MjData(self._model), values, sim
 
     def paths(self, starts: Floats, steps: int) -> Floats:

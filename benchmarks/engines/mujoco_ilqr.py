@@ -67,7 +67,6 @@ class MujocoIlqr:
         self.substeps = int(np.ceil(problem.knot_time / settings.step - 1e-9))
         self.time_step = problem.knot_time / self.substeps
         self._model = mujoco_scene.load(problem.sim.model, self.time_step, integrator="Euler")
-        self._model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # keep diverged trials
         if settings.smooth:
             self._model.pair_solimp[:, 0] = 0.0
         self._data = mujoco.MjData(self._model)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.engines.mujoco_scene import mjcf
+from benchmarks.engines.mujoco_scene import mjcf, without_reset
 from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
 from sim.mechanism.collision import Collision
@@ -116,7 +116,7 @@ def _scene(sim: Simulator, options: dict[str, str]) -> tuple[Any, dict[frozenset
         spec.add_pair(geomname1=geoms[0], geomname2=geoms[1], condim=3 if mu else 1, friction=friction)
         pairs[k] = geoms
     hills = _height_fields(spec, sim.mechanism)
-    model = spec.compile()
+    model = without_reset(spec.compile())
     number = {name: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name) for name in _geom_names(mujoco, model)}
     index: dict[frozenset[int], int] = {}
     for name, geom in number.items():

@@ -27,7 +27,15 @@ def load(model: Model, time_step: float, *, hinges: bool = False, **options: str
     """`mujoco.MjModel` of the mechanism; options are attributes of MJCF's <option>, such as integrator="Euler"."""
     import mujoco
 
-    return mujoco.MjModel.from_xml_string(mjcf(model, time_step, hinges=hinges, **options))
+    return without_reset(mujoco.MjModel.from_xml_string(mjcf(model, time_step, hinges=hinges, **options)))
+
+
+def without_reset(model: Any) -> Any:
+    """The `mujoco.MjModel`, whose motions stay lost where they diverge: MuJoCo would begin them again."""
+    import mujoco
+
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return model
 
 
 def state(mj_model: Any, x: Vector) -> Any:

@@ -78,11 +78,14 @@ def test_the_benchmark_measures_speed_along_the_path(bench):
     x[:, 0], x[:, 1] = 1.5 * np.sin(0.2 * time), 1.5 * (1.0 - np.cos(0.2 * time))
     x[:, 3], x[:, 6] = np.cos(0.1 * time), np.sin(0.1 * time)
     loop = SimpleNamespace(x=x, simulator=SimpleNamespace(time_step=1e-3), survived=True)
-    assert bench.speeds(loop) == (pytest.approx(0.3, rel=1e-3), pytest.approx(0.2, rel=1e-3))
+    assert bench.speeds("turn", loop) == (pytest.approx(0.3, rel=1e-3), pytest.approx(0.2, rel=1e-3))
     assert not bench.succeeds("walk_4", loop) and not bench.succeeds("turn", loop)  # no turn, and .4 rad/s
     x[:, 3], x[:, 6] = 1.0, 0.0
     x[:, 0], x[:, 1] = 0.45 * time, 0.0
     assert bench.succeeds("walk_4", loop) and not bench.succeeds("walk_2", loop)
+    x[:, 0] *= -1.0
+    assert not bench.succeeds("walk_4", loop)  # backward
+    x[:, 0] *= -1.0
     loop.survived = False
     assert not bench.succeeds("walk_4", loop)
 

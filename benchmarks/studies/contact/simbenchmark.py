@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.engines.mujoco_scene import without_reset
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.report.result import Cell, Row, Table
 from sim.mechanism.body import Body
@@ -99,7 +100,7 @@ def rolling_mujoco(time_step: float, direction: tuple[float, float], duration: f
       <geom type="plane" size="0 0 1" friction="{GROUND}"/>
       <body pos="0 0 {0.5 * HEIGHT}"><freejoint/><geom type="box" size="{0.5 * SIZE} {0.5 * SIZE} {0.5 * HEIGHT}"
         mass="{BOX}" friction="{GROUND}" contype="2"/></body>{balls}</worldbody></mujoco>"""
-    model: Any = mujoco.MjModel.from_xml_string(text)
+    model: Any = without_reset(mujoco.MjModel.from_xml_string(text))
     data = mujoco.MjData(model)
     data.xfrc_applied[1, :2] = FORCE * np.asarray(direction)
     position = np.empty((round(duration / time_step) + 1, COUNT + 1, 3))

@@ -25,7 +25,8 @@ sim.rollout_feedback(scene.state, us)
 sim.linearize_trajectory(path.x, us)
 seconds = time.process_time() - start
 from solvers.compiler import compiled_signatures
-print(json.dumps({"seconds": seconds, "success": path.success, "kernels": sorted(compiled_signatures()),
+assert path.success, path.message
+print(json.dumps({"seconds": seconds, "kernels": sorted(compiled_signatures()),
                   "modules": [name for name in sys.argv[2:] if name in sys.modules]}))
 """
 

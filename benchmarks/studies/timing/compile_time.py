@@ -34,9 +34,10 @@ first = time.perf_counter() - wall, spent() - cpu
 wall, cpu = time.perf_counter(), spent()
 again = dojo.ilqr(dojo.problems.PROBLEM())
 second = time.perf_counter() - wall, spent() - cpu
+assert plan.success and again.success, plan.message + again.message
 from solvers.compiler import compiled, compiled_signatures, shipped
 kernels = compiled_signatures()
-print(json.dumps({"import": imported, "first": first, "again": second, "success": bool(plan.success),
+print(json.dumps({"import": imported, "first": first, "again": second,
                   "compiled": len(compiled()), "why_not": shipped().why_not,
                   "kernels": len(kernels), "signatures": sum(kernels.values()),
                   "several": {k: n for k, n in kernels.items() if n > 1}}))
