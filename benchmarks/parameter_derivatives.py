@@ -17,7 +17,6 @@ from command import deliver, number, parser
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Report
-from sim.derivatives.parameters.damper_inertia_effects import with_damper_inertia
 from sim.derivatives.parameters.parameters import KINDS, all_parameters
 from sim.derivatives.parameters.selection import by_names, select
 from sim.simulator.engines.engine_choice import engine_of
@@ -43,8 +42,8 @@ def run(args: argparse.Namespace) -> Report:
     sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.02)
     x, u = sim.neutral(), np.zeros(sim.nu)
     calls = engine_of(sim.model, sim.mechanism, Settings(sim.time_step, sim.kappa, sim.tolerance, sim.max_iterations))
-    known = with_damper_inertia(sim.model, all_parameters(sim.mechanism, sim.time_step))
-    every, plan = select("benchmark", by_names(known), sim.parameters().names)
+    known = by_names(all_parameters(sim.mechanism, sim.time_step))
+    every, plan = select("benchmark", known, sim.parameters().names, sim.model)
     T = 5 if args.quick else 50
     us = np.zeros((T, sim.nu))
     t = sim.rollout(x, us, throw=True)

@@ -26,10 +26,8 @@ def step(
     """out = state after one step from x = (q, v) under the input u; returns the Status.
 
     guess: of the next velocity, x[nq:] when nothing better is known.
-    report: (6,), with a feedback law (7,): Status, iterations, residual, violation, contact with the largest violation
-    (-1: none), the accuracy of derivatives, which is written by those that compute them, and the iterations of earlier
-    steps, which the loop of the feedback law adds up (StepReport). `out` holds the last iterate if the status is not
-    SOLVED; do not use it.
+    report: columns of StepReport, of which the first five are written. `out` holds the last iterate if the status is
+    not SOLVED; do not use it.
     """
     nq = data.theta1.shape[0]
     q = x[:nq]

@@ -125,22 +125,26 @@ def test_no_column_with_a_name_is_a_number() -> None:
 
 
 def loop_numbers_of(subscripts: Iterable[ast.Subscript]) -> list[str]:
-    """Subscripts by a number of the arrays of loops over time: settings, goals, and columns of reports."""
+    """Subscripts by a number of settings and goals, and of columns of reports and of terms of parameters."""
     found = []
     for node in subscripts:
         name, last = last_name(node.value), node.slice
         in_row = isinstance(last, ast.Tuple)
         last = last.elts[-1] if isinstance(last, ast.Tuple) else last
-        if name in ("settings", "goal") or (name in ("report", "reports") and in_row):
+        if name in ("settings", "goal") or (name in ("report", "reports", "terms") and in_row):
             found += [ast.unparse(node)] * isinstance(getattr(last, "value", None), int)
     return found
 
 
 def test_no_setting_and_no_column_of_a_report_is_a_number() -> None:
-    """Their names: StepSetting, AccuracyGoal, StepReport."""
-    source = "settings[1] + line.reports[t, 0] + reports[0] + goal[Goal.END]"
-    assert loop_numbers_of(_nodes(source, ast.Subscript)) == ["settings[1]", "line.reports[t, 0]"]
-    rooms = ("integrators", "simulator", "solve", "model")
+    """Their names: StepSetting, AccuracyGoal, StepReport, ParameterTerm."""
+    source = "settings[1] + line.reports[t, 0] + reports[0] + goal[Goal.END] + terms[t, 3]"
+    assert sorted(loop_numbers_of(_nodes(source, ast.Subscript))) == [
+        "line.reports[t, 0]",
+        "settings[1]",
+        "terms[t, 3]",
+    ]
+    rooms = ("integrators", "simulator", "solve", "model", "derivatives")
     files = [SIM / "step.py", *files_of(*(f"sim/{room}" for room in rooms))]
     assert [found for file in files for found in loop_numbers_of(nodes_of(file, ast.Subscript))] == []
 

@@ -216,12 +216,17 @@ def _closed_loop(run: _LoopRecord, controller: Controller, plant: Plant, referen
             np.array(run.contacts[:count]).reshape(count, plant.simulator.ncontact, CONTACT),
         ),
         survived=run.survived,
-        message=run.message,
+        message=" ".join([run.message, *_first(run.reservations)]),
         softened=plant.softened,
         log=tuple(run.log),
         reference=reference,
         tracked=tracked,
     )
+
+
+def _first(reservations: list[str]) -> list[str]:
+    """Their number, and the first one."""
+    return [f"Steps with a reservation: {len(reservations)}.", reservations[0]] if reservations else []
 
 
 class OnPlanes:
@@ -253,6 +258,7 @@ class _LoopRecord:
     planes: list[GroundPlane] = field(default_factory=list)  # that the reference was carried onto
     survived: bool = True
     message: str = "Ran to the end."
+    reservations: list[str] = field(default_factory=list)  # about solved steps
 
 
 def _drive(
@@ -278,6 +284,8 @@ def _drive(
         if result.status != _SOLVED:
             run.message, run.survived = f"Plant, step {k}: {MESSAGES[result.status]}", False
             break
+        if result.detail:
+            run.reservations.append(f"Plant, step {k}: {result.detail}")
         run.contacts.append(result.scene[2])
         run.x.append(plant.x)
         run.u.append(u)  # last: Ctrl-C may come between two of them, and counts the steps by this one

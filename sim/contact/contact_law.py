@@ -199,8 +199,8 @@ def condense_contact(model: Model, data: Data, h: float, c: int, kappa: float, i
     """W = d(impulse)/d(gap, slip) by the law linearised at kappa, W_nn = -gamma/s; fills contact_W, contact_scale.
 
     indefinite: factor of the growth of the friction with the normal impulse, 1 for the derivative of the exact cone.
-    form: in the LINEAR one a contact that sticks takes the form of its law that is linear in the slip; the SOFT one is
-    that of derivatives (softening.py).
+    form: in the STICKING one a contact that sticks takes the form of its law that is linear in the slip; SOFT: of
+    derivatives (softening.py).
     """
     W = data.contact_W[c]
     for e in range(9):

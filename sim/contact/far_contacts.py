@@ -79,7 +79,7 @@ def choose_far(model: Model, data: Data, options: StepOptions, c: int) -> None:
 
 @optional(Slot.ADD_FAR_WRENCHES)
 def add_far_wrenches(model: Model, data: Data) -> None:
-    """wrench -= impulses of the far contacts, about O."""
+    """wrench += far_wrench, which has the impulses of the far contacts about O, with a minus sign."""
     for i in range(data.wrench.shape[0]):
         for k in range(6):
             data.wrench[i, k] += data.far_wrench[i, k]

@@ -20,7 +20,7 @@ from math import sqrt
 
 from sim.model.data import Data
 from sim.model.model import Law, Model
-from sim.model.record_columns import Bounce, Cone, ConeScale, Kin, PairFrame
+from sim.model.record_columns import Bounce, Cone, ConeScale, Kin, PairFrame, PyramidScale
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, three
 from solvers.types import Vector
@@ -96,7 +96,7 @@ def soften(model: Model, data: Data, h: float, c: int) -> None:
     if part * M * hard > 1.0 - 1e-12:
         d = part * sqrt(M * loaded_response(model, data, h, c, M))
         q = (
-            data.contact_scale[c, ConeScale.RESIDUAL + 2 : ConeScale.RESIDUAL + 4]
+            data.contact_scale[c, PyramidScale.SUM : PyramidScale.INVERSE]
             if model.contact_law[c] == Law.LINEAR
             else data.contact_scale[c, ConeScale.GROWTH : ConeScale.RESIDUAL]
         )

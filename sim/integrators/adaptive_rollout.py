@@ -27,7 +27,7 @@ class SubstepMotion(NamedTuple):
     us: Matrix  # (T, nu) in
     wrenches: Cube  # (T, nbody, 6) in, or (0, nbody, 6)
     xs: Matrix  # (T + 1, nx) nodes, of which xs[0] is given
-    reports: Matrix  # (T, 6)
+    reports: Matrix  # (T, 9)
     contacts: Cube  # (T, ncontact, 11)
     substeps: Integers  # (T,)
     errors: Vector  # (T,) estimated, over those allowed

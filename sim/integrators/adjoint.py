@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.derivatives.parameters.directions import At, Effect
+from sim.derivatives.parameters.directions import At, Effect, ParameterTerm
 from sim.derivatives.parameters.height_columns import add_height_gradient
 from sim.derivatives.parameters.residual_columns import clear_columns, fill_columns
 from sim.dynamics.elimination_panel import column_count, solve_panel
@@ -40,7 +40,7 @@ class Sweep(NamedTuple):
     A: Cube  # (1, ndx, ndx) of one step
     B: Cube  # (1, ndx, nu)
     x_next: Matrix  # (1, nx)
-    report: Matrix  # (1, 6) of the last step that was tried; zeros at first
+    report: Matrix  # (1, 9) of the last step that was tried; zeros at first
     costate: Matrix  # (2, ndx) in and out, the first row: dL/dx_T at first, dL/dx_0 in the end
     inputs: Matrix  # (T, nu) out
     parameters: Vector  # (nparameter,) out
@@ -164,8 +164,9 @@ def _add_parameters(model: Model, data: Data, at: At, line: Sweep, terms: Intege
                 s += y[nv + row] * data.couple_panel[row, m]
             line.parameters[first + m] += s
         for t in range(start, end):
-            if terms[t, 0] == _TIME_STEP:
-                line.parameters[terms[t, 3]] += weights[t] * _time_gradient(data, at, line.A[0], costate, w)
+            if terms[t, ParameterTerm.EFFECT] == _TIME_STEP:
+                column = terms[t, ParameterTerm.COLUMN]
+                line.parameters[column] += weights[t] * _time_gradient(data, at, line.A[0], costate, w)
         first += width
         start = end
 

@@ -54,7 +54,7 @@ class Path(NamedTuple):
     us: Matrix  # (T, nu)
     cones: Cube  # (T, ncontact, 12) or empty
     bounds: Cube
-    report: Vector  # (7,) of the last step, and the iterations of all, which are those of the report in the end; zeros
+    report: Vector  # (10,) of the last step, and the iterations of all, which are those of the report in the end; zeros
 
 
 @kernel

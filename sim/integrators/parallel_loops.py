@@ -44,7 +44,7 @@ class BatchBuffers(NamedTuple):
 
     xs: Cube  # (n, T + 1, nx), of which the first rows are given
     us: Cube  # (n, T, nu)
-    reports: Cube  # (n, 1, 6) of the last step of each, zeros
+    reports: Cube  # (n, 1, 9) of the last step of each, zeros
     knots: Integers  # (n,) number of solved steps, zeros
     wrenches: Cube  # without rows, as A and B: they are not kept
     contacts: Cube  # (n T, ncontact, 11) of all steps, in `roll_rows` only, or (0, ncontact, 11)
@@ -84,7 +84,7 @@ class RowTables(NamedTuple):
 
     models: Table  # (n, ...) tables of their Models
     scratch: Table  # (n, ...) tables of their Data; rows of one chunk may share one
-    settings: Matrix  # (n, 8), with one deadline
+    settings: Matrix  # (n, 10) of StepSetting, with one deadline
     cones: Cube  # (n, ncontact, 12) cone variables that the last steps ended with, in and out; or empty
     bounds: Cube  # (n, nlimit, 2) of limits
     dry: Cube  # (n, ndry, 4) of dry friction

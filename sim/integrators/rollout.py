@@ -1,8 +1,7 @@
 """Whole horizons, where Python enters compiled code: rollouts, linearizations, batches.
 
-    settings   (9,) the columns of StepSetting
-    report     (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
-               accuracy of derivatives, 0 where there are none
+    settings   (10,) the columns of StepSetting
+    report     (9,) the columns of StepReport; kernels write those up to ACCURACY, which is 0 without derivatives
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
 
 Every function takes the tables of a Model and a Data (solvers/compiler); every loop stops at the first step that is
@@ -52,7 +51,7 @@ class Linearized(NamedTuple):
     A: Cube  # (T, ndx, ndx)
     B: Cube  # (T, ndx, nu)
     x_next: Matrix  # (T, nx), in: where the steps of one-step knots start to look for their velocities
-    reports: Matrix  # (T, 6)
+    reports: Matrix  # (T, 9)
 
 
 class MotionBuffers(NamedTuple):
@@ -61,7 +60,7 @@ class MotionBuffers(NamedTuple):
     xs: Matrix  # (T + 1, nx), of which the first row is given
     us: Matrix  # (T, nu) inputs, in
     wrenches: Cube  # (T, nbody, 6) external ones, in, or (0, nbody, 6)
-    reports: Matrix  # (T, 6), or (1, 6) for that of the last step
+    reports: Matrix  # (T, 9), or (1, 9) for that of the last step
     contacts: Cube  # (T, ncontact, 11), or (0, ncontact, 11)
     A: Cube  # (T, ndx, ndx) derivatives of the steps, or (0, ndx, ndx)
     B: Cube  # (T, ndx, nu)
@@ -156,7 +155,7 @@ def roll(
     """xs[t + 1] = step(xs[t], us[t]) from the step `first` on; returns how many are solved, those before included.
 
     A step is solved once, and differentiated where it ends; by parameters, too, if there are columns of them. Inputs
-    are written if the motion follows a law, with several steps per knot if it says so, and reports (1, 7) whose last
+    are written if the motion follows a law, with several steps per knot if it says so, and reports (1, 10) whose last
     number adds up the iterations. Without columns or a law, their code is not compiled. An invalid state is REFUSED.
     """
     model, data, n = model_view(model_at), data_view(data_at), 1

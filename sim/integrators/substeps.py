@@ -73,7 +73,7 @@ class SubstepState(NamedTuple):
     node: Vector  # (nx,) scratch: the node after the undivided step
     ahead: Vector  # (nx,) scratch: mean state of a step from there
     clock: Vector  # (28,) in place
-    report: Vector  # (6,)
+    report: Vector  # (9,)
     parts: Cube  # (3, ncontact, 11) scratch: contacts of both halves, and of the whole step
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the step
     contacts: Matrix  # (ncontact, 11) in place: impulses so far, the rest of the last step

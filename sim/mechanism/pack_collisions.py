@@ -28,6 +28,7 @@ def pack_collisions(mech: Mechanism, model: Model) -> None:
         model.pair_coupling[j] = bodies.index(candidate.bodies)
         model.pair_kind[j], model.pair_feature[j] = candidate.kind, candidate.feature
         model.pair_sizes[j] = candidate.sizes
+        model.pair_least[j] = candidate.sizes[candidate.sizes > 0.0].min(initial=1e300)
         model.pair_place[2 * j : 2 * j + 2] = candidate.places
     _pack_far(found, model)
     _pack_hulls(found, model)

@@ -221,7 +221,7 @@ class Data(NamedTuple):
     chain: Matrix  # (2 nv, ncolumn) the product of those of the steps before
     chain_columns: Matrix  # (2 nv, 24) SIDE columns of their product with it
     step_x: Matrix  # (2, nq + nv) states inside a knot
-    report: Vector  # (6,) report of an internal step
+    report: Vector  # (9,) report of an internal step
     loop_clock: Vector  # (2,) LoopClock: sim/model/interruptible_loops.py
     # steps of higher order (integrators/runge_kutta.py, runge_kutta_gradient.py): high_nv is nv, high_state nq + nv,
     # high_nu nu and high_n 2 nv + nu, all of them 0 where steps have order 2

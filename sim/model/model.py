@@ -105,6 +105,7 @@ class Model(NamedTuple):
     terrain_rates: Vector  # (nheight,) their derivatives by the radius of the contacts
     cluster: Matrix  # (nground, 10) in the row of the first contact of a cluster: Cluster
     pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
+    pair_least: Vector  # (npair,) the smallest of the sizes of both shapes [m]; 1e300 for corners on a half-space
     pair_bound: Matrix  # (npair, 8) at the first pair of a collision, whether it is active: PairBound
     hull: Matrix  # (nhull, 4) tables of the polytopes that collide (collision/polytope_table.py)
     body_reach: Vector  # (nbody,) largest distance of the shapes that collide from the centre of mass [m]

@@ -356,7 +356,10 @@ class StepReport(Code):
     VIOLATION = 3  # largest |product - kappa| of complementary pairs
     WORST = 4  # contact with the largest error, -1 for none
     ACCURACY = 5  # estimated error of the derivatives
-    EARLIER = 6  # iterations of the steps before, in closed loops
+    PARTS = 6  # of a divided step; with an accuracy, of sub-steps; 0 for a whole one
+    LOST = 7  # fraction of the relative momentum of bodies that a divided step lost; of several steps, the largest
+    ERROR = 8  # estimated, over the one that an accuracy allows; 0 without one; of several steps, the largest
+    EARLIER = 9  # iterations of the steps before, in closed loops; the other reports end before it
 
 
 class ContactRow(Code):

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
-from sim.simulator.engines.division import Division
 from sim.simulator.engines.engine import REPORT, Engine, Floats, Rolled, interrupted
 from sim.simulator.results import Interrupted
 
@@ -22,8 +21,7 @@ def roll_policy(
     us = np.zeros((count, engine.nu))
     xs, reports = np.zeros((count + 1, engine.nx)), np.zeros((count, REPORT))
     contacts: list[Floats] = []
-    division, (A, B) = Division.none(count), engine.no_predictions[:2]
-    xs[0], knot = x, 0
+    (A, B), xs[0], knot = engine.no_predictions[:2], x, 0
     try:
         for k in range(count):
             name = f"Simulator.rollout: u of the policy at step {k}"
@@ -31,15 +29,11 @@ def roll_policy(
             one = engine.roll(xs[k], us[k : k + 1], None if wrenches is None else wrenches[k : k + 1])
             reports[k], xs[k + 1] = one.reports[0], one.xs[1]
             contacts.append(one.contacts[0])
-            division.parts[k], division.momentum_fractions[k] = (
-                one.division.parts[0],
-                one.division.momentum_fractions[0],
-            )
             if one.solved_steps == 0:
                 break
             knot = k + 1
     except KeyboardInterrupt:
         reports = interrupted(reports, knot)
-        done = Rolled(knot, xs, reports, np.array(contacts), A, B, division)
+        done = Rolled(knot, xs, reports, np.array(contacts), A, B)
         raise Interrupted((us, done) if knot else None) from None
-    return us, Rolled(knot, xs, reports, np.array(contacts), A, B, division)
+    return us, Rolled(knot, xs, reports, np.array(contacts), A, B)

@@ -9,7 +9,6 @@ import numpy as np
 from sim.integrators.rollout import REFUSED, MotionBuffers
 from sim.mechanism.mechanism import Mechanism
 from sim.model.record_columns import StepReport
-from sim.simulator.engines.division import Division
 from sim.simulator.engines.engine import REPORT, Engine
 from sim.simulator.results import STATUSES, Contacts, StepResult, contacts_of, overlap, reservation, status_message
 from sim.simulator.step_batch import StepBatch
@@ -35,7 +34,6 @@ class KnotStepper:
         xs, us, reports = np.empty((steps + 1, engine.nx)), np.empty((steps, engine.nu)), np.zeros((steps, REPORT))
         rows = np.zeros((steps if contacts else 0, *engine.no_outputs[0].shape[1:]))
         self._motion = MotionBuffers(xs, us, engine.external(None), reports, rows, *engine.no_outputs[1:])
-        self._division = Division.none(steps)
         self._none = np.zeros((0, engine.ndx, engine.ndx)), np.zeros((0, engine.ndx, engine.nu))
         self._start, self.end, self._knot = xs[0], xs[-1], 0
         # views, which take as long to make as to copy
@@ -52,28 +50,25 @@ class KnotStepper:
         Returns:
             Whether all steps were solved; `result` says why not.
         """
-        motion, division = self._motion, self._division
+        motion = self._motion
         self._start[:], self._inputs[:] = x, u
-        if self._steps > 1 or division.parts[0] > 1:  # of the knot before
-            division.parts.fill(1)
-            division.momentum_fractions.fill(1.0)
+        if self._steps > 1 or motion.reports[0, StepReport.PARTS] > 0.0:  # of the knot before
+            motion.reports[:, StepReport.PARTS :] = 0.0
         motion.contacts.fill(0.0)  # the report leaves out collisions beyond their reach
-        self._knot = self._engine.take_steps(self._engine.step_table(), motion, None, division)
+        self._knot = self._engine.take_steps(self._engine.step_table(), motion, None)
         return self._knot == self._steps
 
     def last_step(self) -> StepResult:
         """The last step of a knot that was solved, with the contacts that are kept."""
-        _, iterations, residual, violation, _, _ = self._report.tolist()
+        _, iterations, residual, violation, _, _, parts, lost, error = self._report.tolist()
         scene = self._mechanism, self._time_step, self._contacts.copy()
         solved = self.end.copy(), _SOLVED, int(iterations), residual, violation, scene
-        parts, fractions, errors = self._division
-        if parts[-1] == 1:
+        if parts == 0.0:
             return StepResult(*solved)
-        division = int(parts[-1]), float(fractions[-1]), float(errors[-1])
-        detail = reservation(fractions[-1:], errors[-1:])
+        detail = reservation(self._report[None])
         if not detail and self._contacts.ndim == 2:
-            detail = overlap(self._mechanism, parts[-1:], self._contacts[None])
-        return StepResult(*solved, *division, detail)
+            detail = overlap(self._mechanism, np.array([int(parts)]), self._contacts[None])
+        return StepResult(*solved, int(parts), 1.0 - lost, error, detail)
 
     @property
     def solved_steps(self) -> int:
@@ -96,7 +91,7 @@ class KnotStepper:
         """The step of a knot that was not solved, with the state before it; explain: sentence of a report and state."""
         x, report = self._motion.xs[self._knot].copy(), self._motion.reports[self._knot]
         np.nan_to_num(report, copy=False, nan=np.inf, posinf=np.inf)
-        status, iterations, residual, violation, _, _ = report.tolist()
+        status, iterations, residual, violation = report[:4].tolist()
         scene = self._mechanism, self._time_step, self._contacts.copy()
         detail = explain(report, x)
         return StepResult(x, STATUSES[int(status)], int(iterations), residual, violation, scene, detail=detail)
@@ -121,7 +116,8 @@ class KnotStepper:
         last = self._motion.reports[-1 if solved else self._knot]
         status, iterations = last[:2].astype(np.int64)[:, None]
         if solved:
-            return StepBatch(self.end[None].copy(), status, iterations, *self._none, contacts=self.contacts)
+            detail = reservation(self._motion.reports)
+            return StepBatch(self.end[None].copy(), status, iterations, *self._none, detail, self.contacts)
         detail = status_message(self._mechanism, "Simulator.step_batch: row 0", last, self._engine.settings.tolerance)
         return StepBatch(states, status, iterations, *self._none, detail, self.contacts)
 

@@ -134,7 +134,7 @@ def reactions(
                 report = rolled.reports[0]
                 status, detail = Status(int(report[StepReport.STATUS])), explain(call, report, state)
             continue
-        if rolled.division.parts[0] == 1:
+        if rolled.parts[0] == 1:
             out[:, k] = _rows(mech, engine, loops, frame)
         else:
             external = engine.external(wrenches)[k : k + 1]

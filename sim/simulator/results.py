@@ -370,7 +370,8 @@ class FeedbackRollout(Result):
         """
         knot, path = found
         status, residual = Status(int(path.report[StepReport.STATUS])), float(path.report[StepReport.RESIDUAL])
-        return cls(path.xs[: knot + 1], path.us[:knot], status, knot, residual)
+        detail = reservation(path.report[None], "") if status == Status.SOLVED else ""
+        return cls(path.xs[: knot + 1], path.us[:knot], status, knot, residual, detail)
 
 
 @dataclass(frozen=True)
@@ -393,19 +394,20 @@ class RolloutBatch(Result):
     __repr__ = short_repr
 
     @classmethod
-    def of(cls, rows: tuple[Floats, Integers, Integers]) -> RolloutBatch:
+    def of(cls, rows: tuple[Floats, Floats, Integers]) -> RolloutBatch:
         """The result of a batch.
 
         Args:
-            rows: (states, status, number of solved steps), the rows after the last solved step still to be filled in.
+            rows: (states, report, number of solved steps), the rows after the last solved step still to be filled in.
 
         Returns:
             The result.
         """
-        xs, _, knots = rows
+        xs, reports, knots = rows
         for x, knot in zip(xs, knots, strict=True):
             x[knot + 1 :] = x[knot]
-        return cls(*rows)
+        status = reports[:, StepReport.STATUS].astype(np.int64)
+        return cls(xs, status, knots, "" if status.any() else reservation(reports, "rollout"))
 
 
 def converted(call: Callable[[], Any], made: Callable[[Any], Any]) -> Any:
@@ -456,24 +458,27 @@ def status_message(
     return text
 
 
-def reservation(fractions: Floats, errors: Floats) -> str:
+def reservation(reports: Floats, noun: str = "step") -> str:
     """A sentence about solved steps that lost momentum, or whose estimated error is beyond the accuracy; or empty.
 
-    fractions: (T,) of the momentum, 1 where all was conserved.   errors: (T,) over those that the accuracy allows.
+    reports: (n, 9) of StepReport.   noun: of what each of them is the report; empty for a motion.
     """
-    if fractions.dot(fractions) < len(fractions):  # the product takes a fifth of the time of a minimum
-        lossy = np.flatnonzero(fractions < 1.0)
+    lost, errors = reports[:, StepReport.LOST], reports[:, StepReport.ERROR]
+    if lost.dot(lost) > 0.0:  # the product takes a fifth of the time of a maximum
+        lossy = np.flatnonzero(lost)
+        first, kept = lossy[0], 1.0 - lost[lossy]
+        where = f" in {len(lossy)} {noun}(s): {noun} {first}" if noun else ": a divided step"
         return (
-            f"Solved, but {len(lossy)} of the divided steps lost momentum of bodies relative to one another: step "
-            f"{lossy[0]} conserved {fractions[lossy[0]]:.2g} of it, the worst {fractions.min():.2g}. Shorten the "
-            "time step, or give an accuracy."
+            f"Solved, but momentum of bodies relative to one another was lost{where} conserved {kept[0]:.2g} of it, "
+            f"the worst {kept.min():.2g}. Shorten the time step, or give an accuracy."
         )
     if errors.dot(errors) <= 1.0 or errors.max(initial=0.0) <= 1.0:
         return ""
     worst = int(np.argmax(errors))
+    where = f"{noun} {worst}" if noun else "a step"
     return (
-        f"Solved, but the estimated error of step {worst} is {errors[worst]:.2g} times the one that the accuracy "
-        "allows: sub-steps in contact have a shortest length. Ask for less of it, or compare two accuracies."
+        f"Solved, but the estimated error of {where} is {errors[worst]:.2g} times the one that the accuracy allows: "
+        "sub-steps in contact have a shortest length. Ask for less of it, or compare two accuracies."
     )
 
 

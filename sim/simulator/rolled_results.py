@@ -14,30 +14,29 @@ from sim.simulator.results import STATUSES, StepResult, Trajectory, contacts_of,
 from solvers.status import Status
 from solvers.types import Floats, Vector
 
-Explain = Callable[[str, Vector, Vector], str]  # sentence of (where, report (6,), state (nx,)) of an unsolved step
+Explain = Callable[[str, Vector, Vector], str]  # sentence of (where, report (9,), state (nx,)) of an unsolved step
 
 
 def step_result(mechanism: Mechanism, time_step: float, rolled: Rolled, explain: Explain) -> StepResult:
     """The result of a rollout of a single step."""
-    status, iterations, residual, violation, _, _ = rolled.reports[0].tolist()
+    status, iterations, residual, violation, _, _, _, lost, error = rolled.reports[0].tolist()
     scene, end = (mechanism, time_step, rolled.contacts[0]), rolled.xs[1 if rolled.solved_steps else 0]
-    (parts, share, error), fraction = rolled.division, float(rolled.division.momentum_fractions[0])
-    solved = STATUSES[int(status)], int(iterations), residual, violation
+    solved, parts = (STATUSES[int(status)], int(iterations), residual, violation), rolled.parts
     detail = "" if rolled.solved_steps else explain("Simulator.step", rolled.reports[0], end)
-    if fraction < 1.0 or error[0] > 1.0:
-        detail = reservation(share, error)
+    if rolled.solved_steps and (lost > 0.0 or error > 1.0):
+        detail = reservation(rolled.reports)
     if rolled.solved_steps and not detail:
         detail = overlap(mechanism, parts, rolled.contacts)
-    return StepResult(end, *solved, scene, int(parts[0]), fraction, float(error[0]), detail)
+    return StepResult(end, *solved, scene, int(parts[0]), 1.0 - lost, error, detail)
 
 
 def trajectory(sim: Any, wrenches: Floats | None, explain: Explain, inputs: Floats, rolled: Rolled) -> Trajectory:
     """The result of a rollout of a Simulator under the inputs (T, nu) and external wrenches (T, nbody, 6)."""
     knot, xs, reports = rolled.solved_steps, rolled.xs, rolled.reports
     last = reports[min(knot, len(reports) - 1)] if len(reports) else np.zeros(REPORT)
-    status, (parts, fractions, errors) = STATUSES[int(last[StepReport.STATUS])], rolled.division
+    status, parts = STATUSES[int(last[StepReport.STATUS])], rolled.parts
     where, solved = f"Simulator.rollout: step {knot}", status == Status.SOLVED
-    detail = reservation(fractions, errors) if solved else explain(where, last, xs[knot])
+    detail = reservation(reports[:knot]) if solved else explain(where, last, xs[knot])
     detail = detail or overlap(sim.mechanism, parts[:knot], rolled.contacts[:knot])
     return Trajectory(
         simulator=sim,
@@ -50,8 +49,8 @@ def trajectory(sim: Any, wrenches: Floats | None, explain: Explain, inputs: Floa
         iterations=reports[:knot, StepReport.ITERATIONS].astype(np.int64),
         contacts=contacts_of(sim.mechanism, sim.time_step, rolled.contacts[:knot]),
         parts=parts[:knot],
-        momentum_fractions=fractions[:knot],
-        errors=errors[:knot],
+        momentum_fractions=1.0 - reports[:knot, StepReport.LOST],
+        errors=reports[:knot, StepReport.ERROR],
         detail=detail,
         wrenches=None if wrenches is None else wrenches[:knot],
     )

@@ -18,7 +18,7 @@ from sim.model.record_columns import Dry
 from sim.simulator.arguments import Arguments
 from sim.simulator.engines.engine import BOUND, CONE, REPORT, Engine
 from sim.simulator.knot_stepper import KnotStepper
-from sim.simulator.results import contacts_of, status_message
+from sim.simulator.results import contacts_of, reservation, status_message
 from sim.simulator.row_impulses import RowImpulses
 from sim.simulator.step_batch import RowBatch, RowModels, StepBatch
 from solvers.types import Floats
@@ -91,7 +91,8 @@ class RowSteps:
         if contacts:
             found = replace(found, contacts=contacts_of(self._mechanism, engine.settings.time_step, touched))
         if not len(found.unsolved):
-            return found
+            detail = reservation(reports, "row")
+            return replace(found, detail=detail) if detail else found
         i = int(found.unsolved[0])
         detail = status_message(self._mechanism, f"{_CALL}: row {i}", reports[i], engine.settings.tolerance)
         return replace(found, detail=detail)

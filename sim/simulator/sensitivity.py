@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.derivatives.parameters.directions import At, Effect
+from sim.derivatives.parameters.directions import At, Effect, ParameterTerm
 from sim.derivatives.parameters.height_columns import height_jacobian
 from sim.derivatives.parameters.parameter_jacobian import parameter_jacobian
 from sim.derivatives.parameters.parameters import ParameterPlan
@@ -17,7 +17,7 @@ from sim.integrators.rollout import MotionBuffers, ParameterColumns, roll
 from sim.mechanism.mechanism import Mechanism
 from sim.model.interruptible_loops import pieces
 from sim.model.record_columns import StepReport
-from sim.simulator.engines.division import DIVISIBLE, Division
+from sim.simulator.engines.division import DIVISIBLE
 from sim.simulator.engines.engine import CONTACT, REPORT, DividedStep, Engine, Rolled, refuse
 from sim.simulator.link_kernels import link_heights, link_parameters
 from solvers.status import Status
@@ -78,7 +78,7 @@ class Request(NamedTuple):
     def of_parts(self, parts: int) -> Request:
         """Request for the parts of a step, which last 1/parts of a time step."""
         weights = self.plan.weights.copy()
-        weights[self.plan.terms[:, 0] == Effect.TIME_STEP] /= parts
+        weights[self.plan.terms[:, ParameterTerm.EFFECT] == Effect.TIME_STEP] /= parts
         return self._replace(plan=self.plan._replace(weights=weights))
 
 
@@ -88,7 +88,7 @@ class StepSlopes(NamedTuple):
     A: Floats  # (ndx, ndx)
     B: Floats  # (ndx, nu)
     x_next: Vector  # (nx,)
-    report: Vector  # (6,)
+    report: Vector  # (9,)
     J: Floats  # (ndx, n) by parameters; zeros where the step was not solved
 
 
@@ -111,7 +111,7 @@ def divided_slopes(
     report: Vector,
     kappa: float | None,
 ) -> StepSlopes:
-    """Derivatives of a step that could not be solved as a whole, for the reason in `report` (6,).
+    """Derivatives of a step that could not be solved as a whole, for the reason in `report` (9,).
 
     Where division does not solve it either, the report stays and the derivatives are zero.
     """
@@ -177,7 +177,7 @@ def roll_parameters(
             break
         knot += 1
     contacts = np.zeros((0, engine.sizes.ncontact, CONTACT))
-    return Rolled(knot, xs, reports, contacts, A, B, Division.none(n)), J
+    return Rolled(knot, xs, reports, contacts, A, B), J
 
 
 def _whole_steps(engine: Engine, plan: ParameterPlan, motion: MotionBuffers, J: Floats, kappa: float | None) -> int:

@@ -8,9 +8,8 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.derivatives.parameters.damper_inertia_effects import with_damper_inertia
 from sim.derivatives.parameters.parameters import KINDS, Parameter, ParameterPlan, Parameters, all_parameters
-from sim.derivatives.parameters.selection import Table, by_names, select, with_values
+from sim.derivatives.parameters.selection import Table, by_names, listed, select, with_values
 from sim.integrators.adjoint import Sweep
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
@@ -37,17 +36,21 @@ class SimulatorParameters:
         self._engine, self._mechanism, self._time_step = engine, mechanism, time_step
         # those made so far: finding parameters by name takes longer than their derivatives
         self._selections: dict[tuple[str, ...], tuple[Parameters, ParameterPlan]] = {}
-        self._written = mechanism  # that of the values in the model, but for those that `adopt` has written
-        self._packed: Model | None = None  # that of the values that `adopt` has written last
+        self._written = mechanism  # that of the values in the model, which `adopt` changes
+        self._of_written: Table | None = None
+        self._packed: Model | None = None  # it, as `adopt` has packed it last
 
     @cached_property
     def _known(self) -> list[Parameter]:
         return all_parameters(self._mechanism, self._time_step)
 
-    @cached_property
+    @property
     def _table(self) -> Table:
-        """By names, with all that derivatives need; to find it takes as long as hundreds of steps."""
-        return by_names(with_damper_inertia(self._engine.model, self._known))
+        """By names, at the values in the model."""
+        if self._of_written is None:
+            known = self._known if self._written is self._mechanism else all_parameters(self._written, self._time_step)
+            self._of_written = by_names(known)
+        return self._of_written
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -61,20 +64,21 @@ class SimulatorParameters:
         if names and self._engine.settings.order != 2:
             s = self._engine.settings
             raise ValueError(f"{call}: expected a simulator of order 2, got {s.kind}; use {s.way_to_order_two}")
-        return asked, *self._selection(call, names)
+        if names not in self._selections:
+            self._selections[names] = select(call, self._table, names, self._engine.model)
+        return asked, *self._selections[names]
 
     def values(self, call: str, wrt: Sequence[str]) -> Parameters:
-        """Parameters by name."""
-        return self._selection(call, _different_names(call, wrt))[0]
+        """Parameters by name, with the values that the simulator was made with."""
+        return listed(call, self._own_table, _different_names(call, wrt))[1]
 
-    def _selection(self, call: str, names: tuple[str, ...]) -> tuple[Parameters, ParameterPlan]:
-        if names not in self._selections:
-            self._selections[names] = select(call, self._table, names)
-        return self._selections[names]
+    @cached_property
+    def _own_table(self) -> Table:
+        return by_names(self._known)
 
     def with_values(self, call: str, values: Mapping[str, ArrayLike]) -> tuple[Mechanism, float]:
         """The mechanism and the time step with other values of parameters."""
-        mech, time_step = with_values(call, self._mechanism, by_names(self._known), values)
+        mech, time_step = with_values(call, self._mechanism, self._own_table, values)
         return mech, self._time_step if time_step is None else time_step
 
     def adopt(self, call: str, values: Mapping[str, ArrayLike]) -> None:
@@ -82,7 +86,8 @@ class SimulatorParameters:
         if self._engine.settings.order != 2 or self._engine.settings.accuracy or "time_step" in values:
             raise ValueError(f"{call}: expected steps of order 2, without accuracy, and no time_step")
         old = pack(self._written) if self._packed is None else self._packed
-        new = pack(self.with_values(call, values)[0])
+        written = self.with_values(call, values)[0]
+        new = pack(written)
         changes = [
             (own, after)
             for name, own, before, after in zip(Model._fields, self._engine.model, old, new, strict=True)
@@ -94,12 +99,17 @@ class SimulatorParameters:
             raise ValueError(f"{call}: expected values that keep the structure of the model, such as no new damper")
         for own, after in changes:
             np.copyto(own, after)
-        self._packed = new
+        self._now(written, new)
         self._engine.refresh()
 
     def follow(self, other: SimulatorParameters) -> None:
         """Know that the model has taken over the values of another simulator."""
-        self._written, self._packed = other._written, other._packed
+        self._now(other._written, other._packed)
+
+    def _now(self, written: Mechanism, packed: Model | None) -> None:
+        """The mechanism of the values in the model has changed, and with it all derivatives."""
+        self._written, self._packed, self._of_written = written, packed, None
+        self._selections.clear()
 
     def roll(
         self,
@@ -125,7 +135,7 @@ class SimulatorParameters:
         return adjoint_sweep(self._engine, self._request(*selection), (*path, wrenches), loss, kappa)
 
     def _request(self, found: Parameters, plan: ParameterPlan) -> Request:
-        return Request(self._mechanism, plan, lambda *conversion: self._conversion_columns(found, *conversion))
+        return Request(self._written, plan, lambda *conversion: self._conversion_columns(found, *conversion))
 
     def _conversion_columns(self, found: Parameters, x: Vector, interval: float, other: float) -> Floats:
         """d(x over another interval)/d(parameters), (ndx, n), by central differences: only divided steps need them.
@@ -148,8 +158,8 @@ class SimulatorParameters:
 
     def _converted(self, name: str, intervals: tuple[float, float], x: Vector, value: float) -> Vector:
         """x over another interval with another value of a parameter; NaN where it has no velocity there."""
-        mech, h = self.with_values("derivatives of a divided step", {name: value})
-        engine, scale = Engine(pack(mech), self._engine.settings), h / self._time_step
+        mech, h = with_values("derivatives of a divided step", self._written, self._table, {name: value})
+        engine, scale = Engine(pack(mech), self._engine.settings), 1.0 if h is None else h / self._time_step
         interval, other = intervals
         end = Intervals(engine).changed(scale * interval, scale * other, x)
         return np.full_like(x, np.nan) if end is None else end

@@ -87,7 +87,7 @@ class RowEngines:
 
     @cached_property
     def settings(self) -> Floats:
-        """(n, 9) settings of rows, of StepSetting."""
+        """(n, 10) settings of rows, of StepSetting."""
         different = {engine.settings: engine.settings.array() for engine in self.engines}
         return np.array([different[engine.settings] for engine in self.engines])[self.index]
 
@@ -289,6 +289,7 @@ class RowBatch:
         us = np.repeat(self.us[row : row + 1], self.substeps, axis=0)
         rolled = engine.roll(self.xs[row], us, kappa=self._kappa(row), derivatives=derivatives)
         reports[row] = rolled.reports[min(rolled.solved_steps, self.substeps - 1)]
+        reports[row, StepReport.LOST] = rolled.reports[: rolled.solved_steps, StepReport.LOST].max(initial=0.0)
         if rolled.solved_steps < self.substeps:
             return
         x_next[row] = rolled.xs[-1]
@@ -305,6 +306,5 @@ class RowBatch:
             if derivatives:
                 A[rows], B[rows], x_next[rows], reports[rows] = engine.linearize(xs, us, self.substeps, None)
             else:
-                found, status, _ = engine.roll_batch(xs, np.repeat(us[:, None], self.substeps, axis=1))
-                reports[rows, StepReport.STATUS], reports[rows, StepReport.WORST] = status, -1.0  # not reported
+                found, reports[rows], _ = engine.roll_batch(xs, np.repeat(us[:, None], self.substeps, axis=1))
                 x_next[rows] = found[:, -1]

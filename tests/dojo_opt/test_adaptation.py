@@ -175,6 +175,19 @@ def test_what_parameters_do_not_change_stays():
     assert np.array_equal(sim.model.contact_frame, frame)
 
 
+def test_derivatives_are_those_of_the_values_written_last():
+    mech, names = dojo.models.npendulum(3, damper=0.5), ("mass", "com", "child_point")
+    sim = AdjustableSimulator(mech, time_step=0.01)
+    other = dojo.Simulator(mech, time_step=0.01).with_parameters({"mass": (2.0, 0.4, 3.0)})
+    x, u = sim.neutral() + 0.1, np.zeros(sim.nu)
+    sim.linearize(x, u, wrt=names)
+    sim.set_parameters({"mass": (2.0, 0.4, 3.0)})
+    own, theirs = (s.linearize(x, u, wrt=names) for s in (sim, other))
+    for name in names:
+        assert np.array_equal(own[name], theirs[name]), name
+    assert np.array_equal(sim.parameters(("mass",)).values, dojo.Simulator(mech).parameters(("mass",)).values)
+
+
 def test_values_that_change_the_structure_are_refused():
     sim = AdjustableSimulator(dojo.models.npendulum(2), time_step=0.01)
     for values, words in (({"damper": np.ones(2)}, "structure"), ({"time_step": 0.1}, "time_step"), ({"x": 1.0}, "x")):

@@ -314,15 +314,27 @@ def test_a_step_that_loses_momentum_has_no_derivatives_of_another_division(
     before = sim.rollout(x, steps=20)
     knot = int(np.flatnonzero(before.parts > 1)[0])
     x = before.x[knot]
-    intervals, parts = engine(sim).intervals, before.parts[knot]
-    real = intervals.from_part
+    parts, plant = before.parts[knot], dojo.Plant(sim, x)
+    real = engine(sim).intervals.from_part
     fewest = sim.time_step / parts
-    monkeypatch.setattr(intervals, "from_part", lambda y, part: real(y, part) if part < 0.9 * fewest else None)
-    monkeypatch.setattr(intervals, "slowed", lambda y, part: (real(y, part), 0.5))
+    for patched in (engine(sim).intervals, engine(plant.simulator).intervals):
+        monkeypatch.setattr(patched, "from_part", lambda y, part: real(y, part) if part < 0.9 * fewest else None)
+        monkeypatch.setattr(patched, "slowed", lambda y, part: (real(y, part), 0.5))
     ended = sim.step(x)
     assert (ended.parts, ended.momentum_fraction) == (parts, 0.5)
+    lost = "momentum of bodies relative to one another was lost"
     assert ended.success and "step 0 conserved 0.5 of it" in ended.message
-    assert "1 of the divided steps lost momentum" in sim.rollout(x, steps=1).message
+    u = np.zeros((1, sim.nu))
+    for solved in (
+        sim.rollout(x, steps=1),
+        sim.rollout(x, lambda t, x: u[0], steps=1),
+        sim.rollout_batch(x[None], u[None]),
+        sim.rollout_feedback(x, u),
+        sim.step_batch(x[None], u),
+        sim.step_batch(np.stack([x, x]), np.zeros((2, sim.nu))),
+        dojo.closed_loop(lambda t, x: u[0], plant, sim.time_step),
+    ):
+        assert lost in solved.message and "conserved 0.5 of it" in solved.message, solved
     assert not sim.linearize(x, np.zeros(sim.nu)).success
     assert not sim.linearize_rollout(x, np.zeros((1, sim.nu)))[1].success
 

@@ -30,7 +30,7 @@ def test_every_kind_in_every_situation(name: str) -> None:
 
 def test_derivatives_by_the_state_prepare_none_by_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
     """To prepare them takes as long as hundreds of steps."""
-    monkeypatch.setattr(simulator_parameters, "with_damper_inertia", None)
+    monkeypatch.setattr(simulator_parameters, "select", None)
     sim, x, u = case_of("sliding")
     fresh = sim.with_parameters({"friction:*": 0.3})
     assert np.isfinite(fresh.linearize(x, u)[0]).all()

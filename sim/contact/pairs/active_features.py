@@ -16,7 +16,6 @@ from sim.contact.pairs.previous_features import (
     NEAR,
     has_no_room,
     keep,
-    least_size,
     left_behind,
     overlap_before,
     remember,
@@ -121,8 +120,8 @@ def passed_through(model: Model, data: Data, first: int) -> bool:
     kind = model.pair_kind[first]
     before = data.pair_before[first]
     g = data.pair_trial[0]
-    close = NEAR * least_size(model, first)
-    least = before[RelativePose.GAP] - _LAST_RESORT * least_size(model, first)
+    close = NEAR * model.pair_least[first]
+    least = before[RelativePose.GAP] - _LAST_RESORT * model.pair_least[first]
     ground = model.contact_height.shape[0]
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
@@ -165,6 +164,6 @@ def overlapping(model: Model, data: Data) -> int:
             lenient = data.feature_choice[0] == FeatureChoice.EVERY_POSE or data.overlap_allowed[0] == 1
             part = _LAST_RESORT if lenient else _OVERLAP
             left = data.pair_before[j, RelativePose.LEFT]
-            if distance(model, data, j) < -part * least_size(model, j) - rounding_of_rims(model, j) - left:
+            if distance(model, data, j) < -part * model.pair_least[j] - rounding_of_rims(model, j) - left:
                 found = Verdict.OVERLAPPING.value
     return found

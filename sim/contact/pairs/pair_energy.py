@@ -18,7 +18,7 @@ from __future__ import annotations
 from sim.contact.contact_law import contact_impulse
 from sim.contact.pairs.limited_reach import end_of
 from sim.contact.pairs.pair_contact import is_absent, pair_arm, pair_force
-from sim.contact.pairs.previous_features import least_size, overlapped, rounding_of_rims
+from sim.contact.pairs.previous_features import overlapped, rounding_of_rims
 from sim.contact.pairs.taut_string import is_taut
 from sim.contact.restitution import impulse_work
 from sim.dynamics.energy import twice_kinetic
@@ -71,7 +71,7 @@ def pair_slack(model: Model, data: Data) -> float:
         first = data.near_collisions[m]
         if data.pair_activation[first] != 0.0:
             continue
-        overlap = overlapped(model, data, first) + _LEFT * least_size(model, first) + rounding_of_rims(model, first)
+        overlap = overlapped(model, data, first) + _LEFT * model.pair_least[first] + rounding_of_rims(model, first)
         for j in range(first, end_of(model, first)):
             if not is_absent(data, j):
                 total += data.cone[model.contact_height.shape[0] + j, Cone.IMPULSE] * overlap
@@ -86,7 +86,7 @@ def pairs_gained(model: Model, data: Data, options: StepOptions, v: Vector) -> b
     gain, power, allowed = 0.0, 0.0, 0.0
     for m in range(data.near_collision_count[0]):
         first = data.near_collisions[m]
-        size = least_size(model, first)
+        size = model.pair_least[first]
         overlap = overlapped(model, data, first)
         slack = overlap + _LEFT * size + rounding_of_rims(model, first) + options.tolerance
         if data.pair_activation[first] != 0.0 or not overlap < _THROWN * size:

@@ -34,16 +34,6 @@ def last_point(model: Model, first: int) -> int:
 
 
 @kernel
-def least_size(model: Model, j: int) -> float:
-    """The smallest of the sizes of the shapes of pair j."""
-    least = 1e300
-    for k in range(8):
-        if model.pair_sizes[j, k] > 0.0:
-            least = min(least, model.pair_sizes[j, k])
-    return least
-
-
-@kernel
 def rounding_of_rims(model: Model, j: int) -> float:
     """How much deeper than their contact points say the shapes of pair j may overlap: the point of a rim that is
     farthest along a normal is rounded by LEVEL of its radius (sim/contact/collision/rim.py). 0 without cylinders.
@@ -57,7 +47,7 @@ def rounding_of_rims(model: Model, j: int) -> float:
 @kernel
 def overlap_before(model: Model, j: int) -> float:
     """By how much elements of pair j may overlap where a step begins, and still be chosen [m]."""
-    return NEAR * least_size(model, j) + rounding_of_rims(model, j)
+    return NEAR * model.pair_least[j] + rounding_of_rims(model, j)
 
 
 @kernel
@@ -124,7 +114,7 @@ def left_behind(data: Data, kind: int, out: Vector, pose: Vector, before: Vector
 @kernel
 def remember(model: Model, data: Data, first: int) -> None:
     """pair_previous: the features of the points of a collision that press; 0 for the others."""
-    close = NEAR * least_size(model, first)
+    close = NEAR * model.pair_least[first]
     ground = model.contact_height.shape[0]
     for j in range(first, last_point(model, first)):
         pressing = data.pair_code[j] != 0 and data.cone[ground + j, Cone.SLACK] < close

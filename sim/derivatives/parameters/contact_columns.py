@@ -14,7 +14,7 @@ from sim.contact.terrain_contact import center
 from sim.derivatives.parameters.body_columns import add_wrench, moment
 from sim.model.data import Data
 from sim.model.model import Law, Model
-from sim.model.record_columns import Bounce, Cone, ConeScale, Kin
+from sim.model.record_columns import Bounce, Cone, ConeScale, Kin, Pyramid, PyramidScale
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, rotate, three
 from solvers.types import Vector
@@ -49,8 +49,8 @@ def friction_change(model: Model, data: Data, c: int) -> Vec3:
     if law == Law.NONLINEAR:
         return 0.0, gamma * q[ConeScale.GROWTH], gamma * q[ConeScale.GROWTH + 1]
     if law == Law.LINEAR:
-        g = gamma * data.cone[c, Cone.FRICTION1] * q[ConeScale.RESIDUAL + 4]
-        return 0.0, g * q[ConeScale.RESIDUAL + 2], g * q[ConeScale.RESIDUAL + 3]
+        g = gamma * data.cone[c, Pyramid.SPEED] * q[PyramidScale.INVERSE]
+        return 0.0, g * q[PyramidScale.SUM], g * q[PyramidScale.SUM + 1]
     return 0.0, 0.0, 0.0
 
 

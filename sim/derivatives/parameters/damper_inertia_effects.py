@@ -10,7 +10,7 @@ An axis that turns takes along the bodies behind it, which turn back about its j
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,15 +24,19 @@ from solvers.types import Floats
 
 Rates = dict[tuple[int, int, int], Floats]  # by effect, index and component: (number of damped dofs,)
 
+_OF_JOINTS = frozenset((Effect.PARENT_POINT, Effect.CHILD_POINT, Effect.ORIENTATION, Effect.AXIS, Effect.LEAD))
+_FELT = _OF_JOINTS | {Effect.MASS, Effect.INERTIA, Effect.ARMATURE}
 _INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 def with_damper_inertia(model: Model, found: Sequence[Parameter]) -> list[Parameter]:
     """Parameters with their effects on the inertias that dampers see."""
     dofs = np.flatnonzero(model.dof_damper)
-    if not len(dofs):
+    effects = {(effect, i) for p in found for effect, i, _, _ in p.terms if effect in _FELT}
+    if not len(dofs) or not effects:
         return list(found)
-    rates, out = damper_inertia_rates(model, dofs), []
+    joints = {i for effect, i in effects if effect in _OF_JOINTS}
+    rates, out = damper_inertia_rates(model, dofs, joints), []
     for p in found:
         change = np.zeros(len(dofs))
         for effect, i, k, weight in p.terms:
@@ -44,8 +48,8 @@ def with_damper_inertia(model: Model, found: Sequence[Parameter]) -> list[Parame
     return out
 
 
-def damper_inertia_rates(model: Model, dofs: NDArray[np.int64]) -> Rates:
-    """Derivatives of the inertias that the dampers of `dofs` see, by all effects that they depend on."""
+def damper_inertia_rates(model: Model, dofs: NDArray[np.int64], joints: Collection[int]) -> Rates:
+    """Derivatives of the inertias that the dampers of `dofs` see, by bodies, armatures and the geometry of joints."""
     at = bent(model)
     x = damper_motions(model, at)[1][:, dofs]
     n = len(model.body_mass)
@@ -61,7 +65,8 @@ def damper_inertia_rates(model: Model, dofs: NDArray[np.int64]) -> Rates:
         p = int(model.body_parent[i])
         if p >= 0:
             H[p] += H[i]
-        out |= _joint_rates(model, at, i, (V[p] if p >= 0 else np.zeros_like(H[i]), V[i], H[i]), x)
+        if i in joints:
+            out |= _joint_rates(model, at, i, (V[p] if p >= 0 else np.zeros_like(H[i]), V[i], H[i]), x)
     return out
 
 

@@ -43,6 +43,15 @@ class Effect(Code):
     TERRAIN = 28  # a height of the grid of a terrain, by number; it has no list of terms, see terrain_parameters.py
 
 
+class ParameterTerm(Code):
+    """terms of a ParameterPlan: how a parameter changes a target; its weight is in another array."""
+
+    EFFECT = 0  # Effect
+    INDEX = 1
+    COMPONENT = 2
+    COLUMN = 3  # of the parameter
+
+
 SIDE = 16  # stride of the two shapes in the component of a SHAPE_SIZE
 
 

@@ -11,7 +11,7 @@ By the time step h: R depends on it by h v15, h v25, and directly, so with A_vv 
 
 from __future__ import annotations
 
-from sim.derivatives.parameters.directions import At, Effect
+from sim.derivatives.parameters.directions import At, Effect, ParameterTerm
 from sim.derivatives.parameters.residual_columns import fill_columns
 from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
@@ -72,12 +72,12 @@ def parameter_jacobian(
         solve_panel(model, data)
         solve_coupling_panel(model, data)
         for t in range(start, end):
-            if terms[t, 0] == Effect.TIME_STEP:
-                add_time_rates(data, at, A, weights[t], terms[t, 3] - first)
+            if terms[t, ParameterTerm.EFFECT] == Effect.TIME_STEP:
+                add_time_rates(data, at, A, weights[t], terms[t, ParameterTerm.COLUMN] - first)
         coordinate_rows(model, data, at.h, first, min(width, out.shape[1] - first), out)
         for t in range(start, end):
-            if terms[t, 0] == Effect.TIME_STEP:
+            if terms[t, ParameterTerm.EFFECT] == Effect.TIME_STEP:
                 for d in range(nv):
-                    out[d, terms[t, 3]] += weights[t] * data.nu[d]
+                    out[d, terms[t, ParameterTerm.COLUMN]] += weights[t] * data.nu[d]
         first += width
         start = end

@@ -28,7 +28,7 @@ from sim.derivatives.parameters.contact_columns import (
     add_restitution,
     add_slips_time_step,
 )
-from sim.derivatives.parameters.directions import At, Effect
+from sim.derivatives.parameters.directions import At, Effect, ParameterTerm
 from sim.derivatives.parameters.geometry import add_geometry
 from sim.derivatives.parameters.loop_columns import add_gear_offset, add_gear_ratio, add_loop_geometry, add_loop_turn
 from sim.derivatives.parameters.pair_columns import add_pairs_mass, add_shapes_shift
@@ -132,7 +132,12 @@ def fill_columns(
     other_quaternions(data)
     end = first + column_count(model, data)
     t = start
-    while t < weights.shape[0] and terms[t, 3] < end:
-        add_term(model, data, at, terms[t, 0], terms[t, 1], terms[t, 2], weights[t], terms[t, 3] - first)
+    while t < weights.shape[0] and terms[t, ParameterTerm.COLUMN] < end:
+        effect, i, k = (
+            terms[t, ParameterTerm.EFFECT],
+            terms[t, ParameterTerm.INDEX],
+            terms[t, ParameterTerm.COMPONENT],
+        )
+        add_term(model, data, at, effect, i, k, weights[t], terms[t, ParameterTerm.COLUMN] - first)
         t += 1
     return t

@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.derivatives.parameters.directions import Effect
+from sim.derivatives.parameters.damper_inertia_effects import with_damper_inertia
+from sim.derivatives.parameters.directions import Effect, ParameterTerm
 from sim.derivatives.parameters.mechanism_editor import Draft
 from sim.derivatives.parameters.parameters import KINDS, Parameter, ParameterPlan, Parameters
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
+from sim.model.model import Model
 
 Table = Mapping[str, list[Parameter]]  # by every name that stands for some
 COMMON = "*"
@@ -54,23 +56,30 @@ def _common(parameters: Sequence[Parameter]) -> list[Parameter]:
     return found
 
 
-def select(call: str, table: Table, names: Sequence[str]) -> tuple[Parameters, ParameterPlan]:
-    """The parameters of the names, in their order, and the terms of their columns."""
-    found: list[Parameter] = []
-    rows: dict[str, slice] = {}
-    for name in (names,) if isinstance(names, str) else names:
-        some = chosen(call, table, name)
-        rows[name] = slice(len(found), len(found) + len(some))
-        found += some
+def select(call: str, table: Table, names: Sequence[str], model: Model) -> tuple[Parameters, ParameterPlan]:
+    """The parameters of the names, in their order, and the terms of their columns, at the values in the model."""
+    found, parameters = listed(call, table, names)
+    found = with_damper_inertia(model, found)
     rows_of = [(int(e), i, k, column) for column, p in enumerate(found) for e, i, k, _ in p.terms]
     terms = np.array(rows_of, dtype=np.int64).reshape(-1, 4)
     weights = np.array([term[3] for p in found for term in p.terms], dtype=np.float64)
-    of_terrain = terms[:, 0] == Effect.TERRAIN
-    heights = np.ascontiguousarray(terms[of_terrain][:, [1, 3]])
+    of_terrain = terms[:, ParameterTerm.EFFECT] == Effect.TERRAIN
+    heights = np.ascontiguousarray(terms[of_terrain][:, [ParameterTerm.INDEX, ParameterTerm.COLUMN]])
     plan = ParameterPlan(terms[~of_terrain], weights[~of_terrain], len(found), heights, weights[of_terrain])
+    return parameters, plan
+
+
+def listed(call: str, table: Table, names: Sequence[str]) -> tuple[list[Parameter], Parameters]:
+    """The parameters of the names, in their order, also as names and values."""
+    found: list[Parameter] = []
+    rows: dict[str, slice] = {}
+    for name in names:
+        some = chosen(call, table, name)
+        rows[name] = slice(len(found), len(found) + len(some))
+        found += some
     values = np.array([p.value for p in found])
     values.flags.writeable = False  # kept by the simulator
-    return Parameters(tuple(p.name for p in found), values, rows), plan
+    return found, Parameters(tuple(p.name for p in found), values, rows)
 
 
 def with_values(

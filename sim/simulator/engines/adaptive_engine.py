@@ -32,7 +32,6 @@ from sim.model.interruptible_loops import pieces
 from sim.model.model import Model
 from sim.model.record_columns import ContactRow, StepReport, StepSetting
 from sim.simulator.central_differences import central_differences
-from sim.simulator.engines.division import Division
 from sim.simulator.engines.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted, refuse
 from sim.simulator.engines.linear_systems import solved
 from sim.simulator.engines.node_states import ClosingStates
@@ -67,7 +66,7 @@ class Substeps(NamedTuple):
 
     status: int
     x: Vector  # (nx,) its end, or the last node before the sub-step that failed
-    report: Vector  # (6,)
+    report: Vector  # (9,)
     contacts: Floats  # (ncontact, 11)
     starts: Floats  # (n, nx) nodes where the sub-steps begin
     lengths: Vector  # (n,) [s]
@@ -367,19 +366,22 @@ class AdaptiveEngine(PythonLoopEngine):
         )
         goal, (A, B) = self._goal(settings), self.no_predictions[:2]
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
-        contacts, division = np.zeros((steps, self.sizes.ncontact, CONTACT)), Division.none(steps)
+        contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
+        parts, estimates = np.ones(steps, dtype=np.int64), np.zeros(steps)
         xs[0], line.clock[Clock.BEGUN], knot = x, 0.0, 0
         line = line._replace(wrench=np.zeros_like(external[:1]))
-        path = SubstepMotion(us, external, xs, reports, contacts, division.parts, division.errors)
+        path = SubstepMotion(us, external, xs, reports, contacts, parts, estimates)
         try:
             for _ in pieces(settings, steps + 1):
                 knot = int(roll_substeps(models, data_tables, settings, goal, errors, line, path, knot))
                 if knot == steps or reports[knot, StepReport.STATUS] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
-            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, division)) from None
+            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B)) from None
+        finally:
+            reports[:, StepReport.PARTS], reports[:, StepReport.ERROR] = parts, estimates
         self._kept.contacts = line.contacts.copy()
-        return Rolled(knot, xs, reports, contacts, A, B, division)
+        return Rolled(knot, xs, reports, contacts, A, B)
 
     def _roll_slopes(self, x: Vector, us: Floats, wrenches: Cube | None, kappa: float | None) -> Rolled:
         """`roll` with the derivatives of its steps."""
@@ -387,7 +389,7 @@ class AdaptiveEngine(PythonLoopEngine):
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
         contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
         A, B = np.zeros((steps, self.ndx, self.ndx)), np.zeros((steps, self.ndx, self.nu))
-        division, external = Division.none(steps), self.external(wrenches)
+        external = self.external(wrenches)
         xs[0], knot = x, 0
         for t in range(steps):
             held = us[t], external[t : t + 1]
@@ -399,8 +401,8 @@ class AdaptiveEngine(PythonLoopEngine):
             if reports[t, StepReport.STATUS] != Status.SOLVED:
                 break
             xs[t + 1], contacts[t] = path.x, path.contacts
-            division.parts[t], division.errors[t], knot = len(path.lengths), path.error, t + 1
-        return Rolled(knot, xs, reports, contacts, A, B, division)
+            reports[t, StepReport.PARTS], reports[t, StepReport.ERROR], knot = len(path.lengths), path.error, t + 1
+        return Rolled(knot, xs, reports, contacts, A, B)
 
     def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Vector) -> Floats:
         """(n, nx) nodes of a motion (states, inputs, external wrenches) at times since its beginning, in any order [s].

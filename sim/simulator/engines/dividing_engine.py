@@ -25,7 +25,7 @@ from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.record_columns import StepReport
-from sim.simulator.engines.division import DIVISIBLE, Division
+from sim.simulator.engines.division import DIVISIBLE
 from sim.simulator.engines.engine import (
     REPORT,
     DividedStep,
@@ -73,6 +73,13 @@ def _rows(motion: MotionBuffers, first: int, count: int) -> MotionBuffers:
         motion.A[first:last],
         motion.B[first:last],
     )
+
+
+def _write(divided: DividedStep, report: Vector) -> None:
+    """The report of a divided step; where it is that of all steps of a motion, with the largest loss of momentum."""
+    lost = report[StepReport.LOST]
+    report[:REPORT] = divided.report()
+    report[StepReport.LOST] = max(lost, report[StepReport.LOST])
 
 
 def _divisible(status: Floats | Integers) -> list[int]:
@@ -245,37 +252,34 @@ class DividingEngine(Engine):
         model: Table,
         motion: MotionBuffers,
         kappa: float | None,
-        division: Division,
         following: FeedbackRun | None = None,
         first: int = 0,
         max_iterations: int | None = None,
     ) -> int:
         """As Engine.take_steps, with division."""
         self._ended.parts = None
-        done = super().take_steps(model, motion, kappa, division, following, first, max_iterations)
+        done = super().take_steps(model, motion, kappa, following, first, max_iterations)
         if following is None:
-            return done if done == len(motion.us) else self._continue_after(model, motion, kappa, division, done)
+            return done if done == len(motion.us) else self._continue_after(model, motion, kappa, done)
         steps = len(motion.us) * following.substeps
         try:
             while done < steps and self._divide_feedback_step(motion, kappa, following, done):
                 done += 1
                 if done < steps:
-                    done = super().take_steps(model, motion, kappa, division, following, done, max_iterations)
+                    done = super().take_steps(model, motion, kappa, following, done, max_iterations)
         except KeyboardInterrupt as stop:
             raise (stop if isinstance(stop, Interrupted) else Interrupted(done)) from None
         return done
 
-    def _continue_after(
-        self, model: Table, motion: MotionBuffers, kappa: float | None, division: Division, knot: int
-    ) -> int:
+    def _continue_after(self, model: Table, motion: MotionBuffers, kappa: float | None, knot: int) -> int:
         """Go on from the step `knot`, which was not solved."""
         steps, piece = len(motion.us), _PIECE
         try:
-            while knot < steps and self._divide_row(motion, knot, kappa, division):
+            while knot < steps and self._divide_row(motion, knot, kappa):
                 knot, whole = knot + 1, True
                 while knot < steps and whole:
                     rest = _rows(motion, knot, min(piece, steps - knot))
-                    done = super().take_steps(model, rest, kappa, division)
+                    done = super().take_steps(model, rest, kappa)
                     self._ended.parts = None if done else self._ended.parts
                     knot, whole = knot + done, done == len(rest.us)
                     piece = min(2 * piece, _LARGEST_PIECE) if whole else _PIECE
@@ -284,7 +288,7 @@ class DividingEngine(Engine):
             raise Interrupted(knot + (done if isinstance(done, int) else 0)) from None  # not half a divided step
         return knot
 
-    def _divide_row(self, motion: MotionBuffers, knot: int, kappa: float | None, division: Division) -> bool:
+    def _divide_row(self, motion: MotionBuffers, knot: int, kappa: float | None) -> bool:
         """Divide the step `knot` of a motion, which was not solved; False where that does not solve it."""
         report = motion.reports[min(knot, len(motion.reports) - 1)]
         if int(report[StepReport.STATUS]) not in DIVISIBLE:
@@ -296,8 +300,7 @@ class DividingEngine(Engine):
             return False
         motion.xs[knot + 1] = divided.x
         self._ended.parts = divided.engine
-        report[:] = divided.report()
-        division.parts[knot], division.momentum_fractions[knot] = divided.parts, divided.share
+        _write(divided, report)
         if len(motion.contacts):
             motion.contacts[knot] = divided.contacts()
         if derivatives:
@@ -319,7 +322,7 @@ class DividingEngine(Engine):
         if divided is None:
             return False
         motion.xs[t + 1] = divided.x
-        report[:REPORT] = divided.report()
+        _write(divided, report)
         report[StepReport.EARLIER] = total + report[StepReport.ITERATIONS]
         for array in data.carry:  # the next step does not continue the attempt that failed
             array[...] = 0
@@ -334,21 +337,19 @@ class DividingEngine(Engine):
                 )[0]
         return True
 
-    def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
+    def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Floats, Integers]:
         """As Engine.roll_batch; rollouts with divided steps end on one core."""
-        xs, status, knots = super().roll_batch(x0s, us)
+        xs, reports, knots = super().roll_batch(x0s, us)
         model = self.step_table()
-        for i in _divisible(status):
-            report = np.zeros((1, REPORT))
-            report[0, StepReport.STATUS] = status[i]
+        for i in _divisible(reports[:, StepReport.STATUS]):
+            report = reports[i : i + 1]
             motion = MotionBuffers(xs[i], us[i], self.no_wrenches, report, self._no_contacts, *self.no_predictions[:2])
             try:
-                knots[i] = self._continue_after(model, motion, None, Division.none(len(us[i])), int(knots[i]))
+                knots[i] = self._continue_after(model, motion, None, int(knots[i]))
             except Interrupted as stop:
-                knots[i], status[i] = stop.result, Status.INTERRUPTED
-                raise Interrupted((xs, status, knots)) from None
-            status[i] = int(report[0, StepReport.STATUS])
-        return xs, status, knots
+                knots[i], report[0, StepReport.STATUS] = stop.result, Status.INTERRUPTED
+                raise Interrupted((xs, reports, knots)) from None
+        return xs, reports, knots
 
     def linearize(
         self,

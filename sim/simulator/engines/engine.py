@@ -22,7 +22,6 @@ from sim.model.interruptible_loops import pieces
 from sim.model.layout import data_view
 from sim.model.model import Model
 from sim.model.record_columns import Inactive, StepReport
-from sim.simulator.engines.division import Division
 from sim.simulator.engines.linked_model import LinkedModel
 from sim.simulator.engines.mean_states import MeanStates
 from sim.simulator.results import IMPULSE, NORMAL, POINT, Interrupted
@@ -32,7 +31,7 @@ from solvers.status import Status
 from solvers.types import Cube, Floats, Integers, Vector
 
 # numbers of a step, in loops that follow a law one more; and of one of its contacts or limits
-REPORT, CONTACT, CONE, BOUND = 6, 11, 12, 2
+REPORT, CONTACT, CONE, BOUND = int(StepReport.EARLIER), 11, 12, 2
 _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 
@@ -51,9 +50,10 @@ class DividedStep(NamedTuple):
         return len(self.rolled.reports)
 
     def report(self) -> Vector:
-        """(6,) that of the whole: all iterations, the largest of the other numbers."""
+        """(9,) that of the whole: all iterations, the largest of the other numbers."""
         out = self.rolled.reports.max(axis=0)
         out[StepReport.ITERATIONS], out[StepReport.WORST] = self.rolled.reports[:, StepReport.ITERATIONS].sum(), -1.0
+        out[StepReport.PARTS], out[StepReport.LOST] = self.parts, 1.0 - self.share
         return np.asarray(out)
 
     def contacts(self) -> Floats:
@@ -80,19 +80,20 @@ def contacts_of_parts(parts: Floats) -> Floats:
     return np.asarray(out)
 
 
-_UNDIVIDED = Division.none(0)
-
-
 class Rolled(NamedTuple):
     """A rollout; rows after the solved steps are undefined."""
 
     solved_steps: int
     xs: Floats  # (T + 1, nx)
-    reports: Floats  # (T, 6)
+    reports: Floats  # (T, 9) of StepReport
     contacts: Floats  # (T, ncontact, 11), or (0, ncontact, 11) beside derivatives
     A: Floats  # (T, ndx, ndx) derivatives, or (0, ndx, ndx)
     B: Floats  # (T, ndx, nu)
-    division: Division
+
+    @property
+    def parts(self) -> Integers:
+        """(T,) steps that each was divided into, 1 for whole ones."""
+        return np.maximum(self.reports[:, StepReport.PARTS], 1.0).astype(np.int64)
 
 
 def finite_rows(array: Floats) -> NDArray[np.bool_]:
@@ -116,8 +117,9 @@ def refuse(reports: Floats, count: int, *arrays: Floats) -> int:
 
 
 def interrupted(reports: Floats, knot: int) -> Floats:
-    """The reports (T, 6), with that of the step `knot`, if there is one, saying that it was not tried."""
-    reports[knot : knot + 1, :REPORT] = Status.INTERRUPTED, 0.0, 0.0, 0.0, -1.0, 0.0
+    """The reports (T, 9), with that of the step `knot`, if there is one, saying that it was not tried."""
+    reports[knot : knot + 1, :REPORT] = 0.0
+    reports[knot : knot + 1, StepReport.STATUS], reports[knot : knot + 1, StepReport.WORST] = Status.INTERRUPTED, -1.0
     return reports
 
 
@@ -199,17 +201,16 @@ class Engine(LinkedModel):
             contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
             model = self.step_table()
         motion = MotionBuffers(xs, us, self.external(wrenches), reports, contacts, A, B)
-        division = Division.none(steps)
         try:
-            knot = self.take_steps(model, motion, kappa, division)
+            knot = self.take_steps(model, motion, kappa)
         except Interrupted as stop:
             if derivatives:  # calls that differentiate have no partial result
                 raise KeyboardInterrupt from None
             knot = stop.result
-            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, division)) from None
+            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B)) from None
         if knot < steps:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
-        return Rolled(knot, xs, reports, contacts, A, B, division)
+        return Rolled(knot, xs, reports, contacts, A, B)
 
     def rehearse(self, x: Vector, *, derivatives: bool = False) -> None:
         """Make the calls of a motion through the state x (nx,) once: later ones load no code, and lay out no buffers.
@@ -226,7 +227,6 @@ class Engine(LinkedModel):
         model: Table,
         motion: MotionBuffers,
         kappa: float | None,
-        division: Division,
         following: FeedbackRun | None = None,
         first: int = 0,
         max_iterations: int | None = None,
@@ -234,7 +234,6 @@ class Engine(LinkedModel):
         """Steps from the one `first` until the end or the first unsolved one: the number of solved ones, those before
         included, which Interrupted carries, too.
 
-        division: of whole steps, where a divided step leaves its numbers, unless the motion follows a law.
         max_iterations: of a step; None: that of the settings.
         """
         steps, knot = len(motion.us) * (following.substeps if following else 1), first
@@ -302,7 +301,7 @@ class Engine(LinkedModel):
         motion = MotionBuffers(path.xs, path.us, policy.wrenches, path.report[None], *self.no_outputs)
         following = FeedbackRun(policy, float(alpha), *limits, substeps, path.cones, path.bounds)
         try:
-            done = self.take_steps(self.step_table(), motion, kappa, _UNDIVIDED, following, 0, max_iterations)
+            done = self.take_steps(self.step_table(), motion, kappa, following, 0, max_iterations)
         except Interrupted as stop:
             interrupted(path.report[None], 0 if stop.result < steps else 1)
             raise Interrupted((stop.result // substeps, path)) from None
@@ -378,8 +377,8 @@ class Engine(LinkedModel):
         A, B, x_next, reports = self.linearize(x[None], u[None], 1, kappa, None, wrenches)
         return A[0], B[0], x_next[0], reports[0]
 
-    def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
-        """(states, status and number of solved steps of every rollout), in parallel."""
+    def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Floats, Integers]:
+        """(states, report and number of solved steps of every rollout), in parallel."""
         n, steps = us.shape[:2]
         xs, reports, knots = np.zeros((n, steps + 1, self.nx)), np.zeros((n, 1, REPORT)), np.zeros(n, dtype=np.int64)
         motions = parallel_loops.BatchBuffers(
@@ -395,8 +394,8 @@ class Engine(LinkedModel):
                     break
         except KeyboardInterrupt:
             status[(knots < steps) & (status == Status.SOLVED)] = Status.INTERRUPTED
-            raise Interrupted((xs, status.astype(np.int64), knots)) from None
-        return xs, status.astype(np.int64), knots
+            raise Interrupted((xs, reports.reshape(n, REPORT), knots)) from None
+        return xs, reports.reshape(n, REPORT), knots
 
     def inactive(self) -> NDArray[np.bool_]:
         """Whether each contact was inactive in the last step of this thread, in its derivatives, too, (ncontact,)."""

@@ -27,7 +27,7 @@ from sim.model.interruptible_loops import pieces
 from sim.model.model import Model
 from sim.model.record_columns import StepReport
 from sim.simulator.engines.dividing_engine import DividingEngine
-from sim.simulator.engines.division import DIVISIBLE, Division
+from sim.simulator.engines.division import DIVISIBLE
 from sim.simulator.engines.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted
 from sim.simulator.engines.linear_systems import solved
 from sim.simulator.engines.python_loop_engine import PythonLoopEngine
@@ -44,11 +44,10 @@ class March(NamedTuple):
 
     solved_steps: int
     xs: Floats  # (T + 1, nx)
-    reports: Floats  # (T, 6)
+    reports: Floats  # (T, 9) of StepReport
     contacts: Floats  # (T, ncontact, 11)
     means: Floats  # (T + 1, nx) the states of order 2 where its steps begin
     near: NDArray[np.bool_]  # (T,) which those are
-    division: Division  # of the steps of order 2; others are whole
 
 
 class PhasedEngine(PythonLoopEngine):
@@ -76,23 +75,22 @@ class PhasedEngine(PythonLoopEngine):
         motion = MotionBuffers(means, us, self.external(wrenches), reports, contacts, *self.no_predictions[:2])
         path = Phases(xs, motion, near, not self.second_order_reason, self.settings.divide)
         xs[0], settings, (models, data_tables) = x, self._second.settings.array(kappa), self._lines()
-        division = Division.none(steps)
         self._second.forget_parts()
         try:
             for _ in pieces(settings, steps):
                 t = int(roll_phases(models, data_tables, settings, path, t))
-                while t < steps and near[t] and self._divide(path, t, kappa, division):
+                while t < steps and near[t] and self._divide(path, t, kappa):
                     t += 1
                     if t < steps:
                         t = int(roll_phases(models, data_tables, settings, path, t))
                 if t == steps or reports[t, StepReport.STATUS] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
-            raise Interrupted((t, xs, interrupted(reports, t), contacts, division)) from None
+            raise Interrupted((t, xs, interrupted(reports, t), contacts)) from None
         self._kept.near = bool(t and near[t - 1])
         if t < steps:
             np.nan_to_num(reports[t], copy=False, nan=np.inf, posinf=np.inf)
-        return March(t, xs, reports, contacts, means, near > 0, division)
+        return March(t, xs, reports, contacts, means, near > 0)
 
     def _lines(self) -> tuple[Table, Table]:
         """Tables of the models of both orders, and of this thread's Data of both."""
@@ -102,8 +100,8 @@ class PhasedEngine(PythonLoopEngine):
             self._kept.models = np.stack([self.linked(link_flight), self._second.step_table()])
         return self._kept.models, self._kept.data_tables[1]
 
-    def _divide(self, path: Phases, t: int, kappa: float | None, division: Division) -> bool:
-        """Take the unsolved step t of order 2 in parts; False where that does not solve it. division: written."""
+    def _divide(self, path: Phases, t: int, kappa: float | None) -> bool:
+        """Take the unsolved step t of order 2 in parts; False where that does not solve it."""
         motion, row = path.motion, slice(t, t + 1)
         if int(motion.reports[t, StepReport.STATUS]) not in DIVISIBLE:
             return False
@@ -115,7 +113,7 @@ class PhasedEngine(PythonLoopEngine):
             motion.contacts[row],
             *self.no_predictions[:2],
         )
-        if self._second.take_steps(self._second.step_table(), one, kappa, division.rows(row)) == 0:
+        if self._second.take_steps(self._second.step_table(), one, kappa) == 0:
             return False
         path.xs[t + 1] = motion.xs[t + 1]
         path.xs[t + 1, self.sizes.nq :] = self._second.states.node_velocities(motion.xs[t + 1 : t + 2])[0]
@@ -135,17 +133,17 @@ class PhasedEngine(PythonLoopEngine):
         try:
             m = self.march(x, us, wrenches, kappa)
         except Interrupted as stop:
-            knot, xs, reports, contacts, division = stop.result
-            raise Interrupted(Rolled(knot, xs, reports, contacts, A, B, division)) from None
+            knot, xs, reports, contacts = stop.result
+            raise Interrupted(Rolled(knot, xs, reports, contacts, A, B)) from None
         if not derivatives:
-            return Rolled(m.solved_steps, m.xs, m.reports, m.contacts, A, B, m.division)
+            return Rolled(m.solved_steps, m.xs, m.reports, m.contacts, A, B)
         A, B, _, found = self.linearize(m.xs[:-1], us, 1, kappa, None, wrenches)
         refused = np.flatnonzero(found[: m.solved_steps, StepReport.STATUS] != Status.SOLVED)
         end = int(refused[0]) if len(refused) else m.solved_steps
         m.reports[:end, StepReport.ACCURACY] = found[:end, StepReport.ACCURACY]
         if len(refused):  # the motion ends where a step has no derivatives
             m.reports[end] = found[end]
-        return Rolled(end, m.xs, m.reports, m.contacts, A, B, m.division)
+        return Rolled(end, m.xs, m.reports, m.contacts, A, B)
 
     def inactive(self) -> NDArray[np.bool_]:
         """As Engine.inactive; all of them where the step was of higher order."""

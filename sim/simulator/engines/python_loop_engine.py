@@ -6,11 +6,21 @@ import numpy as np
 
 from sim.integrators.feedback import FeedbackLaw, Path
 from sim.model.record_columns import StepReport
-from sim.simulator.engines.engine import REPORT, Floats, interrupted, knot_inputs
+from sim.simulator.engines.engine import REPORT, Floats, Rolled, interrupted, knot_inputs
 from sim.simulator.engines.high_order_engine import HighOrderEngine
 from sim.simulator.results import Interrupted
-from solvers.status import Status
 from solvers.types import Cube, Integers, Vector
+
+_LARGEST = [int(StepReport.LOST), int(StepReport.ERROR)]
+
+
+def _summary(rolled: Rolled) -> Vector:
+    """(9,) report of the last step that was tried, with the largest loss and error of the solved ones."""
+    if not len(rolled.reports):
+        return np.zeros(REPORT)
+    out = rolled.reports[min(rolled.solved_steps, len(rolled.reports) - 1)].copy()
+    out[_LARGEST] = rolled.reports[: rolled.solved_steps, _LARGEST].max(axis=0, initial=0.0)
+    return np.asarray(out)
 
 
 class PythonLoopEngine(HighOrderEngine):
@@ -18,25 +28,24 @@ class PythonLoopEngine(HighOrderEngine):
 
     in_one_kernel = False
 
-    def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
+    def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Floats, Integers]:
         """As Engine.roll_batch, on one core."""
         n, steps = us.shape[:2]
         xs = np.zeros((n, steps + 1, self.nx))
-        status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+        reports, knots = np.zeros((n, REPORT)), np.zeros(n, dtype=np.int64)
         xs[:, 0] = x0s
         for i in range(n):
             try:
                 rolled = self.roll(x0s[i], us[i])
                 knots[i], xs[i] = rolled.solved_steps, rolled.xs
             except KeyboardInterrupt as stop:
-                status[i:] = Status.INTERRUPTED
+                interrupted(reports[i:], 0)
+                reports[i:] = reports[i]
                 if isinstance(stop, Interrupted):
                     knots[i], xs[i] = stop.result.solved_steps, stop.result.xs
-                raise Interrupted((xs, status, knots)) from None
-            status[i] = (
-                rolled.reports[min(rolled.solved_steps, steps - 1), StepReport.STATUS] if steps else Status.SOLVED
-            )
-        return xs, status, knots
+                raise Interrupted((xs, reports, knots)) from None
+            reports[i] = _summary(rolled)
+        return xs, reports, knots
 
     def roll_feedback(
         self,
@@ -62,7 +71,9 @@ class PythonLoopEngine(HighOrderEngine):
             except KeyboardInterrupt:
                 interrupted(path.report[None], 0)
                 raise Interrupted((t, path)) from None
-            path.report[:REPORT] = rolled.reports[min(rolled.solved_steps, substeps - 1)]
+            before = path.report[_LARGEST]
+            path.report[:REPORT] = _summary(rolled)
+            path.report[_LARGEST] = np.maximum(before, path.report[_LARGEST])
             if rolled.solved_steps < substeps:
                 return t, path
             total += rolled.reports[:, StepReport.ITERATIONS].sum()
