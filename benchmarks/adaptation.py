@@ -84,9 +84,12 @@ class Watched:
         return u
 
     def found(self, total: float) -> float:
-        """Time from which on the mass of the loaded trunk, `total` [kg], is estimated to within `CLOSE` [s]."""
+        """Time from which on the mass of the loaded trunk, `total` [kg], is estimated to within `CLOSE` [s].
+
+        Infinite if it is not at the end.
+        """
         off = [now for now, values, *_ in self.history if abs(values["mass:trunk"] - total) > CLOSE * total]
-        return max(off, default=0.0)
+        return float("inf") if off and off[-1] == self.history[-1][0] else max(off, default=0.0)
 
     def knows(self) -> float:
         """Time at which friction is known first [s]; infinite if never."""
@@ -172,6 +175,7 @@ def adaptive_rows(outcomes: list[AdaptationRun], whole: bool) -> list[Row]:
     last, typical = (errors.max(), float(np.median(errors))) if len(errors) else (float("nan"), float("nan"))
     knows = np.isfinite([o.watched.knows() for o in outcomes])
     return [
+        number("runs that fall before the mass is read", float(np.isnan(mass).sum()), 0.0 if whole else None),
         number("error of the loaded trunk's mass after 1 s, median", float(np.nanmedian(mass)), 5.0, unit="%"),
         number("error of the loaded trunk's mass after 1 s, largest", float(np.nanmax(mass)), unit="%"),
         number("time until the loaded trunk's mass stays within 5 %, median", float(np.median(found)), unit="s"),

@@ -125,31 +125,35 @@ def crowd_case(seed: int) -> tuple[float, str, float]:
     return h, motion.status.name, float(gains[apart].max(initial=-1.0))
 
 
-def difference(sim: dojo.Simulator, x: Vector, direction: Vector, eps: float) -> Vector | None:
-    """Central difference of the next state along a direction, (ndx,); None where a step is not solved."""
+def difference(sim: dojo.Simulator, x: Vector, direction: Vector, eps: float, parts: int) -> Vector | None:
+    """Central difference of the next state along a direction, (ndx,); None where a step is not solved in as many parts.
+
+    A division is kept, as the derivatives keep it: another one is another step.
+    """
     ends = [sim.step(sim.integrate(x, s * eps * direction)) for s in (1.0, -1.0)]
-    if not all(end.success for end in ends):
+    if not all(end.success and end.parts == parts for end in ends):
         return None
     return np.asarray(sim.difference(ends[0].x, ends[1].x) / (2.0 * eps))
 
 
-def derivative_case(seed: int) -> float | None:
-    """Largest error of a derivative along a random direction, relative; None without a reference."""
+def derivative_case(seed: int) -> tuple[str, float]:
+    """("compared", largest relative error of a derivative along a random direction), or why there is none."""
     rng = np.random.default_rng([seed, 3])
     sim = dojo.Simulator(random_mechanism(rng, ANYTHING), time_step=0.01, kappa=1e-4, tolerance=1e-12)
     x, direction = random_state(sim, rng), rng.normal(size=sim.ndx)
-    if not sim.step(x).success:
-        return None
-    coarse, fine = (difference(sim, x, direction, eps) for eps in (1e-6, 3e-7))
+    step = sim.step(x)
+    if not step.success:
+        return "step not solved", 0.0
+    coarse, fine = (difference(sim, x, direction, eps, step.parts) for eps in (1e-6, 3e-7))
     if coarse is None or fine is None:
-        return None
+        return "no reference", 0.0
     size = 1.0 + np.abs(fine).max()
     if np.abs(coarse - fine).max() > AGREE * size:
-        return None
+        return "no reference", 0.0
     found = sim.linearize(x, np.zeros(sim.nu))
-    if not found.success:  # a divided step that loses momentum has no derivatives, and says so
-        return None
-    return float(np.abs(found.A @ direction - fine).max() / size)
+    if not found.success:
+        return ("refused" if step.momentum_fraction == 1.0 else "momentum lost"), 0.0
+    return "compared", float(np.abs(found.A @ direction - fine).max() / size)
 
 
 def attack(args: argparse.Namespace) -> Report:
@@ -219,11 +223,15 @@ def falls(report: Report, seeds: range, name: str, case: Callable[[int], tuple[f
 def derivatives(report: Report, seeds: range) -> None:
     """Against central differences."""
     named = [(f"derivative {seed}", (seed,)) for seed in seeds]
-    errors = [derivative_case(*case) for case in progress()(named, "derivatives")]
-    known = [error for error in errors if error is not None]
-    wrong = [seed for seed, error in zip(seeds, errors, strict=True) if error is not None and error > WRONG]
+    cases = [derivative_case(*case) for case in progress()(named, "derivatives")]
+    ends = Counter(end for end, _ in cases)
+    known = [error for end, error in cases if end == "compared"]
+    wrong = [seed for seed, (_, error) in zip(seeds, cases, strict=True) if error > WRONG]
+    refused = [seed for seed, (end, _) in zip(seeds, cases, strict=True) if end == "refused"]
     report.rows += [
         number("derivatives: with a reference", len(known)),
+        number("derivatives: refused of steps that conserve momentum", len(refused), 0, note=shown(refused)),
+        number("derivatives: of steps that lose momentum, which have none", ends["momentum lost"]),
         number("derivatives: wrong", len(wrong), 0, note=shown(wrong)),
         number("derivatives: median error", float(np.median(known)) if known else 0.0),
         number("derivatives: largest error", max(known, default=0.0)),

@@ -4,7 +4,7 @@
     python benchmarks/division.py            --match "chain of 5 |spin" for some of them
 
 Every motion runs twice: with divide=False, up to the first refused step, and with the default. The table has the number
-of divided steps, the largest number of parts, the number of steps that passed on only a share of the relative momentum
+of divided steps, the largest number of parts, the number of steps that lost relative momentum
 of bodies, and the processor time of a step in both runs.
 
 Pendulums, which lose nothing, and spinning bodies also run with accuracy=1e-4 on the same grid of states: a second

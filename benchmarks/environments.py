@@ -93,12 +93,12 @@ def run(given: argparse.Namespace) -> Report:
     """All tasks, or some."""
     rounds = 2 if given.quick else ROUNDS
     names = given.tasks or (["Cartpole"] if given.quick else [*TASKS, FORCES])
-    report, cells = Report("Cost of environments, per action", ""), []
+    report, cells, missing = Report("Cost of environments, per action", ""), [], []
     for name in progress()([(n, n) for n in names], "environment"):
         try:
             step, simulated = single(name, rounds)
         except ImportError as error:  # Go2 without its file
-            print(f"{name}: {error}", file=sys.stderr)
+            missing.append(f"{name}: {error}")
             continue
         each = batch(name, rounds)
         numbers = simulated, step, step - simulated, each, step / each
@@ -113,6 +113,7 @@ def run(given: argparse.Namespace) -> Report:
     over, gains = [row[3] for row in cells], [row[5] for row in cells]
     report.rows = [
         number("environments", len(cells)),
+        number("environments whose files are missing", len(missing), note="; ".join(missing)),
         number("largest Python per step", max(over), None if given.quick else MOST, unit="us"),
         number("least gain of a batch of 64, 15 over it", LEAST / min(gains), None if given.quick else 1.0),
     ]

@@ -6,7 +6,7 @@
 Every robot falls from its neutral state, at rest and with nine random velocities (normal, 1 m/s and 1 rad/s per degree
 of freedom), for time steps of 5, 10 and 20 ms and at three kappa, the default among them. Random states, as in
 robustness.py, do not find the jammed landings that occur in motions. The last columns have the falls with a divided
-step, and those with a step that passed on only a share of the relative momentum of bodies, of all kappa.
+step, and those with a step that lost relative momentum of bodies, of all kappa.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Falls(NamedTuple):
 
     unsolved: list[str]  # messages of those that stopped early
     divided: int  # those with a divided step
-    shared: int  # those with a step that passed on a share of the relative momentum of bodies
+    shared: int  # those with a step that lost relative momentum of bodies
 
 
 def fall(mechanism: dojo.Mechanism, time_steps: Sequence[float], kappa: float | None) -> Falls:

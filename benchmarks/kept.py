@@ -14,6 +14,7 @@ from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.plant.tick import milliseconds
 from dojo_opt.tasks.suite import SuiteTask
 from sim.io.json_text import json_text
+from solvers.compiler import stamp
 
 __all__ = ["Kept", "KeptRun", "add_keep", "tick_times"]
 
@@ -47,21 +48,23 @@ class Kept:
             folder.mkdir(parents=True, exist_ok=True)
 
     def run(self, name: str, task: SuiteTask, start: Callable[[], ClosedLoop]) -> KeptRun:
-        """A run, from its file if there is one."""
+        """A run, from its file if there is one of the same kernels."""
         file = None if self._folder is None else self._folder / f"{name}.json".replace(" ", "_").replace(",", "")
         if file is not None and file.exists():
-            return KeptRun(**json.loads(file.read_text(encoding="utf-8")))
+            kept = json.loads(file.read_text(encoding="utf-8"))
+            if kept.pop("kernels", "") == stamp():
+                return KeptRun(**kept)
         loop = start()
         times = milliseconds(loop.log, cpu=True).tolist()
         made = KeptRun(task.outcome(loop)._asdict(), times, len(loop.log), "" if loop.survived else loop.message)
         if file is not None:
-            file.write_text(json_text(made._asdict()), encoding="utf-8")
+            file.write_text(json_text({"kernels": stamp(), **made._asdict()}), encoding="utf-8")
         return made
 
 
 def add_keep(arguments: argparse.ArgumentParser) -> None:
     """Add the option for a folder of runs that have ended."""
-    text = "keep runs in DIR as they end, and take them from there: a benchmark that was stopped goes on"
+    text = "keep runs in DIR as they end, and take those of the same kernels from there: a stopped benchmark goes on"
     arguments.add_argument("--keep", type=Path, metavar="DIR", help=text)
 
 

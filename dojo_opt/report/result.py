@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from sim.io.json_text import json_text
+from solvers.compiler import stamp
 
 Cell = str | float | int | bool | None
 
@@ -166,7 +167,7 @@ def aligned(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def machine() -> dict[str, Any]:
-    """Processor, cores, load, and the versions that decide a timing."""
+    """Processor, cores, load, the versions that decide a timing, and a digest of the sources of all kernels."""
     facts: dict[str, Any] = {"processor": _processor(), "cores": os.cpu_count()}
     if hasattr(os, "getloadavg"):
         facts["load"] = round(os.getloadavg()[0], 1)
@@ -176,6 +177,7 @@ def machine() -> dict[str, Any]:
             facts[name] = version(name)
         except PackageNotFoundError:
             continue
+    facts["kernels"] = stamp()
     return facts
 
 

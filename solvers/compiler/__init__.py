@@ -12,13 +12,14 @@ fingerprint             the content of a function, equal for those that compile 
 reduced                 how an object is pickled that holds functions
 seconds, PAUSE          the clock of kernels
 cache_folder            the folder of the compiled code
+stamp                   a digest of the sources of all kernels
 compiled                the kernels that this process compiled
 compiled_signatures     the kernels compiled or loaded so far
 shipped                 the code that came compiled with the package
 CompilationError        Numba's error for code it cannot compile
 """
 
-from solvers.compiler.cache import cache_folder, shipped
+from solvers.compiler.cache import cache_folder, shipped, stamp
 from solvers.compiler.clock import PAUSE, seconds
 from solvers.compiler.function_digest import fingerprint
 from solvers.compiler.kernels import (
@@ -62,6 +63,7 @@ __all__ = [
     "reduced",
     "seconds",
     "shipped",
+    "stamp",
     "table",
     "threads",
     "users_callee",

@@ -39,7 +39,7 @@ STOP = 0.3  # [m, rad] on either side; twice this for a cone
 
 def check(kind: str) -> dict[str, float | None]:
     """All measures; None where a kind has no coordinate for one."""
-    measures: dict[str, Callable[[str], float]] = {
+    measures: dict[str, Callable[[str], float | None]] = {
         "momentum": momentum,
         "energy": energy,
         "limits": limits,
@@ -148,11 +148,11 @@ def _tilt(joint: Joint, q: Floats) -> Floats:
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(axis, turned), axis=1), turned @ axis))
 
 
-def spring(kind: str) -> float:
-    """See above."""
-    sim = Simulator(alone(kind, spring=SPRING if kind != "floating" else 0.0, damper=DAMPER), time_step=0.05)
+def spring(kind: str) -> float | None:
+    """See above; None for floating joints, which have no springs."""
     if kind == "floating":
-        return 0.0
+        return None
+    sim = Simulator(alone(kind, spring=SPRING, damper=DAMPER), time_step=0.05)
     ntrans, nrot = KINDS[kind]
     worst = 0.0
     for d in range(sim.nv):
