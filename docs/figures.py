@@ -23,6 +23,8 @@ number of a page that is listed there has to be in a sentence of the list, or in
     source = "stability > passed"
     columns = ["dojo-opt", "PyBullet"]
     rows = [["mass ratio", "up to 1e6 kg on a foot of 1 kg"]]     first cell, and the text behind it
+
+A table with the source `bars not met` lists all of them.
 """
 
 from __future__ import annotations
@@ -48,6 +50,7 @@ PAGES = (
     *(f"docs/theory/{name}.md" for name in ("restitution", "error_control", "dampers")),
 )
 BULKY = (("planning", "settings"),)  # details that nothing quotes, 0.4 MB: not taken to docs/measured
+NOT_MET = "bars not met"
 DIGITS = 6  # significant ones that are kept
 WIDTH = 120  # of a line of JSON
 
@@ -171,11 +174,23 @@ def _filled(
 
 def _table(table: dict[str, Any], studies: dict[str, Any]) -> str:
     """A table of a page: first cells and the text behind them, then columns of a measured one."""
+    if table["source"] == NOT_MET:
+        return _not_met(studies)
     lines = ["| " + " | ".join([*table["header"], *table["columns"]]) + " |"]
     lines.append("|---" * (len(table["header"]) + len(table["columns"])) + "|")
     for label, *words in table["rows"]:
         cells = [value(studies, f"{table['source']} > {label} > {column}") for column in table["columns"]]
         lines.append("| " + " | ".join(map(str, [label, *words, *cells])) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _not_met(studies: dict[str, Any]) -> str:
+    """All rows of studies whose bar is not met."""
+    lines = ["| study | quantity | measured | bar |", "|---|---|---|---|"]
+    for name, report in sorted(studies.items()):
+        for row in (row for row in report["rows"] if row["met"] is False):
+            bar = ("at least " if row["at_least"] else "at most ") + f"{row['bar']:g} {row['unit']}".strip()
+            lines.append(f"| {name} | {row['name']} | {shown(row['value'], '.4g')} | {bar} |")
     return "\n".join(lines) + "\n"
 
 
