@@ -4,9 +4,9 @@ The first strategy begins with a known approximation (known_start.py). The other
 ends in a fold of the central path is given up, and the next one starts elsewhere, at another kappa0. Some solutions lie
 beyond folds, such as those of legs that jam between a joint limit and the ground.
 
-`STRATEGIES` is the list. `benchmarks/start_strategies.py` counts the solutions that each of them finds: KNOWN and
-INCOMING find more than 99 %, and every row, also in the last rounds, finds some. `benchmarks/robustness.py` measures
-the list on 100,000 random extreme states (seeds 0 to 4).
+`STRATEGIES` is the list. `benchmarks/start_strategies.py` counts the solutions that each of them finds
+(docs/numbers.md): KNOWN and INCOMING find more than 99 %, every kind of row some, the later rounds hardly any.
+`benchmarks/robustness.py` measures the list on 100,000 random extreme states (seeds 0 to 4).
 """
 
 from __future__ import annotations
