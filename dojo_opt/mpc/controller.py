@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -194,7 +195,7 @@ class MPC:
             self._begin(now)
         elif now >= self._due - _ROUNDING:
             self._tick(now, self.policy)
-        u = self._command(now, self._measured.state(), measured)
+        u = self._command(now, self._measured.state, measured)
         if self._shear is not None and self.estimator is not None:
             u = self._limited(u + self._shear(now, measured, self._ground, self.estimator.knows_friction))
         self._delay.issue(now, u)
@@ -202,10 +203,10 @@ class MPC:
             self.estimator.observe(now, measured, self._delay.acting(now, u), self._ground)
         return u if self._actuator is None else self._actuator(u, measured)
 
-    def _command(self, now: float, x: Vector, sample: Vector) -> Vector:
+    def _command(self, now: float, state: Callable[[], Vector], sample: Vector) -> Vector:
         """The planned input, with feedback unless that is switched off.
 
-        x: (nx,) measured state in the model's convention; sample: as measured.
+        state: () -> (nx,) measured state in the model's convention, which only gains ask for; sample: as measured.
         """
         policy, settings = self.policy, self.settings
         assert policy is not None
@@ -214,7 +215,7 @@ class MPC:
         if self._servo is not None:
             u += self._servo(policy, now, sample)
         elif scale > 0.0:
-            u += scale * policy.feedback(now, x)
+            u += scale * policy.feedback(now, state())
         return self._limited(u)
 
     def _limited(self, u: Vector) -> Vector:
@@ -227,7 +228,7 @@ class MPC:
     def _ahead(self, now: float) -> Vector:
         """State (nx,) of the model when the plan that begins now takes effect."""
         if self.settings.computation and self.policy is not None:
-            return self._predict(now, self._measured, lambda time, x: self._command(time, x, x))
+            return self._predict(now, self._measured, lambda time, x: self._command(time, lambda: x, x))
         return self._delay.ahead(now, self._measured)
 
     @property

@@ -51,6 +51,20 @@ def test_predictions_have_the_parameters_of_a_model_that_has_changed():
     np.testing.assert_array_equal(after, expected)
 
 
+def test_predictions_copy_a_model_only_after_changes():
+    sim, mark = AdjustableSimulator.like(HOPPER), 0.02
+    fine = AdjustableSimulator.like(HOPPER)
+    fine.follow(sim)
+    fine.model.contact_height[:] = mark
+    fine.follow(sim)
+    assert fine.model.contact_height[0] == mark
+    for change in (lambda: sim.set_parameters({}), lambda: sim.follow(HOPPER)):
+        change()
+        fine.model.contact_height[:] = mark
+        fine.follow(sim)
+        assert fine.model.contact_height[0] == sim.model.contact_height[0] != mark
+
+
 def test_prediction_over_the_delay_ends_a_free_fall_where_it_ends():
     sim = standing_problem().sim
     measured, delay = Measurement(sim), Delay(sim, 0.02)
