@@ -9,6 +9,7 @@ from dojo_opt.tasks.idto.assembly import from_com
 from dojo_opt.tasks.jin import allegro, palm_up, trifinger
 from dojo_opt.tasks.jin.allegro import trial_of as allegro_trial
 from dojo_opt.tasks.jin.fingertips import mechanism, trial_of
+from dojo_opt.tasks.jin.fitted_ellipsoid import fitted_ellipsoid
 from dojo_opt.tasks.jin.grasp import grasp, place_of_ball
 from dojo_opt.tasks.jin.palm_objects import OBJECTS
 from dojo_opt.tasks.jin.placing import Placing
@@ -180,6 +181,21 @@ def test_a_hull_takes_the_place_of_an_object_in_the_plant():
     assert task.mpc.nominal.mechanism.collisions[0].shape_a == OBJECTS["cup"].shape
     with pytest.raises(ValueError, match="hull"):
         allegro("cup", hull=[[0.0, 0.0]])
+
+
+def test_plans_see_the_ellipsoid_nearest_to_a_hull():
+    """That on which its points lie, wherever it is and however turned, if they lie on one; not that of its size."""
+    sphere = np.random.default_rng(5).normal(size=(600, 3))
+    sphere /= np.linalg.norm(sphere, axis=1)[:, None]
+    axes, middle, turned = np.array([0.05, 0.03, 0.02]), np.array([0.01, -0.02, 0.005]), (0.9, 0.3, 0.1, 0.2)
+    turn = rotation_matrix(turned / np.linalg.norm(turned))
+    found = fitted_ellipsoid(middle + (sphere * axes) @ turn.T)
+    np.testing.assert_allclose([found.x, found.y, found.z], axes, rtol=0.03)
+    np.testing.assert_allclose(found.center, middle, atol=5e-4)
+    np.testing.assert_allclose(np.abs(rotation_matrix(found.orientation).T @ turn), np.eye(3), atol=0.05)
+    cross = np.concatenate([np.diag([0.05, 0.05, 0.01]), -np.diag([0.05, 0.05, 0.01])])  # slender beside its middle
+    seen = allegro("airplane", hull=cross).mpc.nominal.mechanism.collisions[0].shape_a
+    assert seen.x < 0.045 and seen.y < 0.045 and OBJECTS["airplane"].simple.y > 0.055
 
 
 @pytest.mark.slow

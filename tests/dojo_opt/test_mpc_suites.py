@@ -86,6 +86,16 @@ def test_a_puck_is_pushed_towards_its_goal():
     assert outcome.penetration < 1e-4
 
 
+def test_two_arms_lift_a_ball():
+    """In the first plan, by the friction of both, at less than half of the cost of its guess."""
+    task = dojo.tasks.idto.punyo()
+    problem, options = task.mpc.problem, task.mpc.settings.first
+    assert not overlaps(task.model.mechanism, task.start[: task.model.nq])
+    plan = dojo.ilqr(problem, options=options)
+    assert plan.success and plan.x[-1, 16] > 0.7
+    assert plan.fun < 0.5 * problem.cost(problem.sim.rollout(problem.start, problem.controls0).x, problem.controls0)
+
+
 def test_plans_of_the_hand_know_the_friction_of_the_palm():
     """With more than it has, the ball slides off the palm within a second."""
     task = dojo.tasks.idto.allegro()

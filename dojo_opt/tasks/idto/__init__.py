@@ -22,6 +22,7 @@ from dojo_opt.tasks.idto.jaco import jaco
 from dojo_opt.tasks.idto.jaco_ball import jaco_ball
 from dojo_opt.tasks.idto.mini_cheetah import mini_cheetah, mini_cheetah_hills
 from dojo_opt.tasks.idto.planar_hopper import hopper
+from dojo_opt.tasks.idto.punyo import punyo
 from dojo_opt.tasks.idto.spinner import spinner
 from sim.mechanism.checks import no_attribute
 
@@ -36,6 +37,7 @@ __all__ = [
     "jaco_ball",
     "mini_cheetah",
     "mini_cheetah_hills",
+    "punyo",
     "spinner",
 ]
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.tasks.jin.fitted_ellipsoid import fitted_ellipsoid
 from sim.mechanism import checks
 from sim.mechanism.body import Body
 from sim.mechanism.polytope import Polytope
@@ -61,7 +62,9 @@ class PalmObject(NamedTuple):
         return Body(name, self.mass, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), shape=self.shape)
 
     def hulled(self, points: ArrayLike) -> PalmObject:
-        """The same object with the convex hull of points as its shape, and its own in plans.
+        """The same object with the convex hull of points as its shape.
+
+        Plans see the ellipsoid that is nearest to it, if they see an ellipsoid of this object, and else its own shape.
 
         Args:
             points: (n, 3) points in the frame of the mesh [m].
@@ -72,8 +75,9 @@ class PalmObject(NamedTuple):
         Raises:
             ValueError: for points that span no volume.
         """
-        rows = checks.array("tasks.jin.allegro(hull=...)", points, (None, 3))
-        return self._replace(shape=Polytope(rows - np.asarray(self.com)), simple=self.simple or self.shape)
+        rows = checks.array("tasks.jin.allegro(hull=...)", points, (None, 3)) - np.asarray(self.com)
+        shape = Polytope(rows)
+        return self._replace(shape=shape, simple=self.shape if self.simple is None else fitted_ellipsoid(rows))
 
 
 def _ring_hull() -> Polytope:
