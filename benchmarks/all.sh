@@ -68,6 +68,7 @@ measure loops "$python" "$here/benchmarks/loops.py" $quick --out "$out"
 measure collisions "$python" "$here/benchmarks/collisions.py" --motions 120 $quick --out "$out"
 measure mpc "$python" "$here/benchmarks/mpc.py" $quick --out "$out"
 measure adaptation "$python" "$here/benchmarks/adaptation.py" $quick --out "$out"
+measure known_parameters "$python" "$here/benchmarks/known_parameters.py" $quick --out "$out"
 measure dexterous "$python" "$here/benchmarks/dexterous.py" $quick --out "$out"
 measure crisp "$python" "$here/benchmarks/crisp.py" $quick --out "$out"
 measure mpc_suites "$python" "$here/benchmarks/mpc_suites.py" $quick spinner acrobot free_gait_disturbed free_gait_fast --out "$out"  # the others take minutes

@@ -100,10 +100,13 @@ def resting_height(motions: list[Floats]) -> Floats:
     return np.array([1e3 * xs[-1, 2] for xs in motions])
 
 
-def fit(motions: list[Floats], window: int, names: tuple[str, ...], known: bool) -> dojo.Identified:
+def fit(
+    motions: list[Floats], window: int, names: tuple[str, ...], known: bool, shortest: int | None = None
+) -> dojo.Identified:
     """Friction, restitution, eight corners, and further parameters, from a guess that is far off.
 
-    known: with a prior, whose corners are those of the block, and not of the guess
+    known: with a prior, whose corners are those of the block, and not of the guess; shortest: steps of the windows that
+    the fit begins with (default None: it has those of `window` only)
     """
     start = cube(0.3, 0.05, 0.9 * HALF)
     prior: dict[str, Any] = {}
@@ -114,8 +117,8 @@ def fit(motions: list[Floats], window: int, names: tuple[str, ...], known: bool)
     data = [(xs, np.zeros((len(xs) - 1, 0))) for xs in motions]
     return dojo.identify(
         start, data, ("friction:*", "restitution:*", "contact_point", *names),
-        prior=prior, noise=NOISE, window=window, every=4, kappas=KAPPAS, tolerance=3e-4, max_iterations=40,
-        verbose=True,
+        prior=prior, noise=NOISE, window=window, shortest=shortest, redraws=3 if shortest else 0, every=4,
+        kappas=KAPPAS, tolerance=3e-4, max_iterations=40, verbose=True,
     )  # fmt: skip
 
 
@@ -123,7 +126,7 @@ def fitted(motions: list[Floats], judged: list[Floats], given: argparse.Namespac
     """A fit to tosses, its parameters, and its errors on others."""
     began = time.process_time()
     with redirect_stdout(sys.stderr):  # the table of iterations; the report may be JSON
-        found = fit(motions, given.window, tuple(given.further), not given.no_prior)
+        found = fit(motions, given.window, tuple(given.further), not given.no_prior, given.shortest)
     seconds = time.process_time() - began
     corners = found.values[2:26].reshape(8, 3)
     print(f"{len(motions)} tosses: {found!r}", file=sys.stderr)
@@ -245,6 +248,9 @@ def main(argv: list[str] | None = None) -> int:
     arguments.add_argument("--tosses", nargs="+", type=int, default=[4, 8, 16, 32, 64, 300])
     arguments.add_argument("--held-out", type=int, default=100)
     arguments.add_argument("--window", type=int, default=40)
+    arguments.add_argument(
+        "--shortest", type=int, help="begin with windows of so many steps, and draw starts of missed ones again"
+    )
     arguments.add_argument("--further", nargs="*", default=["inertia:cube", "com:cube"])
     arguments.add_argument(
         "--no-prior", action="store_true", help="without the prior from a ruler, scales and tables: PRIOR"

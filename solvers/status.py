@@ -50,6 +50,8 @@ class Status(Code):
     INTERRUPTED = 16
     # of a time step of a given accuracy
     ACCURACY_NOT_REACHED = 17
+    # of a fit
+    NOT_EXPLAINED = 18
 
     ANGULAR_STEP = _Old("TURN_TOO_LARGE")
     LOOP_STEP = _Old("LOOP_SINGULAR")
@@ -80,5 +82,7 @@ MESSAGES: dict[Status, str] = {
     Status.INFEASIBLE: "The constraints are still violated after the last penalty increase.",
     Status.STOPPED: "The callback stopped the solver.",
     Status.ACCURACY_NOT_REACHED: "The shortest step is too long for the requested accuracy; request a lower accuracy.",
+    Status.NOT_EXPLAINED: "The predictions miss too many measurements by far more than the noise: do not trust the "
+    "values; fit more parameters, give shorter windows, or end kappas=... with that of the motions.",
     Status.INTERRUPTED: "Ctrl-C interrupted the computation.",
 }

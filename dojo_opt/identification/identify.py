@@ -7,8 +7,10 @@ model add to the noise of the measurement; rms^2 measures by how much, and the d
 
 Starts are eliminated window by window (Schur complement), so the work grows with the data and not with its square. rho
 is Huber's, by iteratively reweighted least squares: a state whose scaled error has a root mean square above `outlier`
-counts linearly. Levenberg and Marquardt's damping; parameters stay within their bounds by projection. Motions through
-many contacts have local minima: fits from several starts, in workers if wanted, keep the one of the least cost.
+counts linearly. Levenberg and Marquardt's damping; parameters stay within their bounds by projection. Long
+predictions through contacts have local minima. So a fit begins with windows of a few steps, which are doubled, with the
+starts found so far; starts of windows that stay missed are drawn again. Fits from several values of the parameters, in
+workers if wanted, keep the one of the least cost.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ from numpy.typing import ArrayLike
 from dojo_opt.identification.delayed_space import DelayedSpace
 from dojo_opt.identification.normal_equations import NormalEquations
 from dojo_opt.identification.parameter_space import ParameterSpace
-from dojo_opt.identification.windows import Predictor, Window, WindowErrors, cut_windows
+from dojo_opt.identification.prior import Prior
+from dojo_opt.identification.shooting_fit import Expectation, ShootingFit
+from dojo_opt.identification.windows import Predictor, Window, cut_windows
 from dojo_opt.planning.executors import check_executor, results_in_order
 from sim.mechanism import checks
 from sim.mechanism.memory_limit import room_for
@@ -49,9 +53,11 @@ _WITHIN = 0.1  # standard deviations: the change of the parameters that it may s
 _AWAY = 0.3  # times a value: standard deviation of the starts of further fits without a prior
 _EXACT = 1e-10  # square of the errors over their noise: data without noise
 _MESSAGES = {**MESSAGES, Status.LINE_SEARCH: "No damped step decreases the cost as the linear model expects."}
-_MISSED = 0.5  # share of outliers above which the model does not explain the data
-COLUMNS = ("iteration", "kappa", "cost", "rms", "damping", "step", "outliers", "unsolved", "seconds")
-_HEADER = "{:>9} {:>8} {:>12} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8}".format(*COLUMNS)
+_SHORTEST = 5  # steps of the windows that fits of whole motions begin with
+_ROUGH, _FEW = 1e-2, 10  # tolerance and iterations of all stages but the last
+_MISSED = 0.1  # share of outliers above which the model does not explain the data
+COLUMNS = ("iteration", "window", "kappa", "cost", "rms", "damping", "step", "outliers", "unsolved", "seconds")
+_HEADER = "{:>9} {:>6} {:>8} {:>12} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8}".format(*COLUMNS)
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,10 +65,11 @@ class Identified:
     """Identified parameters, with the accuracy to which the data determine them.
 
     Attributes:
-        success: whether the last smoothing converged.
-        status: SOLVED, or the reason for an early end: MAX_ITERATIONS, LINE_SEARCH if no damped step decreases the
-            cost as the linear model expects, SIMULATION_FAILED if no window can be predicted.
-        message: the same as a sentence; also whether most states are outliers, which the model does not explain.
+        success: whether the fit converged to a model that explains the data.
+        status: SOLVED, or the reason why not: MAX_ITERATIONS, LINE_SEARCH if no damped step decreases the cost as the
+            linear model expects, SIMULATION_FAILED if no window can be predicted, NOT_EXPLAINED if more than a
+            tenth of the states are outliers.
+        message: the same as a sentence.
         labels: names of the fitted values.
         values: (n,) fitted values, in the units of their parameters.
         start: (n,) values before the fit.
@@ -173,122 +180,23 @@ class Identified:
         return "\n".join([*lines, self.closing_line()])
 
 
-class Prior:
-    """Prior knowledge of parameters: independent and normal.
-
-    mean (n,); precision (n,) the inverse of the variance, 0 where nothing is known
-    """
-
-    def __init__(self, space: DelayedSpace, given: Mapping[str, Any]) -> None:
-        self.mean, self.precision = space.values.copy(), np.zeros(len(space.values))
-        for name, value in checks.mapping("identify(prior=...)", given).items():
-            call = f"identify(prior=...): {name!r}"
-            rows = [
-                k for k, label in enumerate(space.labels) if label == name or label.startswith((f"{name}:", f"{name}["))
-            ]
-            if not rows:
-                checks.one_of("identify(prior=...)", name, space.labels)
-            mean, deviation = value if isinstance(value, tuple) else (self.mean[rows], value)
-            self.mean[rows] = np.broadcast_to(checks.floats(call, mean), (len(rows),))
-            self.precision[rows] = checks.number(call, deviation, above=0.0) ** -2
-
-    def cost(self, theta: Floats) -> float:
-        """Square of the distance from the mean, over the deviations."""
-        return float(np.sum(self.precision * (theta - self.mean) ** 2))
-
-
-class _Expectation(NamedTuple):
-    """Effect of a step in the linear model."""
-
-    decrease: float  # of the cost
-    deviations: float  # by which the parameters change, in standard deviations
-
-
-class _Fit:
-    """Parameters, starts and their normal equations."""
-
-    def __init__(
-        self, space: DelayedSpace, windows: list[Window], predictor: Predictor, outlier: float, prior: Prior
-    ) -> None:
-        self.space, self.windows, self.predictor, self.outlier, self.prior = space, windows, predictor, outlier, prior
-        self.theta, self.base = space.values.copy(), space.simulator(space.values)
-        self.prior_weight = 1.0  # of the prior
-        self.starts = [w.x[0].copy() for w in windows]
-        # coordinates differ in size by orders of magnitude
-        self.unit = np.maximum(np.abs(space.values), 1e-3)
-
-    def errors(self, theta: Floats, starts: list[Floats], kappa: float, slopes: bool) -> list[WindowErrors] | None:
-        """Of all windows; None where the parameters are impossible."""
-        try:
-            sim = self.space.simulator(theta).replace(kappa=kappa)
-        except ValueError:
-            return None
-        windows = self.space.delayed(self.windows, theta)
-        if not slopes:
-            return self.predictor.errors(sim, windows, starts)
-        predict, chain = self.predictor.predict, self.space.slopes(theta)
-        return [predict(sim, chain, w, s, kappa) for w, s in zip(windows, starts, strict=True)]
-
-    def weigh(self, found: list[WindowErrors], usable: list[bool]) -> tuple[float, list[Floats], float]:
-        """(cost, weights of the states of each window, share of outliers)."""
-        total, weights, far, count = 0.0, [], 0, 0
-        for w, use in zip(found, usable, strict=True):
-            size = np.sqrt(np.mean(w.errors**2, axis=1))
-            out = self.outlier / np.maximum(size, self.outlier) * use
-            weights.append(out)
-            inside = size <= self.outlier
-            rho = np.where(inside, size**2, 2.0 * self.outlier * size - self.outlier**2) * w.errors.shape[1]
-            if use:
-                total, far, count = total + float(rho.sum()), far + int((~inside).sum()), count + len(size)
-        return total, weights, far / max(count, 1)
-
-    def pull(self, theta: Floats) -> float:
-        """Cost of the distance from the prior."""
-        return self.prior_weight * self.prior.cost(theta)
-
-    def rest(self, cost: float, found: list[WindowErrors], usable: list[bool]) -> float:
-        """The cost of the data and the prior, whose share is chosen anew."""
-        values = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
-        self.prior_weight = max(1.0, cost / max(values, 1))
-        return cost + self.pull(self.theta)
-
-    def step(self, equations: NormalEquations, damping: float) -> tuple[Floats, list[Floats], _Expectation]:
-        """New parameters, within their bounds, new starts, and the effect of both in the linear model."""
-        H, g, back = equations.reduced(damping)
-        H += self.prior_weight * np.diag(self.prior.precision * self.unit**2)
-        g += self.prior_weight * self.prior.precision * (self.theta - self.prior.mean) * self.unit
-        low, high = (self.space.low - self.theta) / self.unit, (self.space.high - self.theta) / self.unit
-        H = H + np.diag(damping * np.diag(H) + 1e-14 * max(np.trace(H), 1e-14))
-        free = np.ones(len(g), dtype=np.bool_)
-        d = np.zeros(len(g))
-        for _ in range(len(g)):  # bounds that the step meets hold, and the others answer
-            rest = -g - H[:, ~free] @ d[~free]
-            d[free] = np.linalg.solve(H[np.ix_(free, free)], rest[free])
-            out = free & ((d < low) | (d > high))
-            if not out.any():
-                break
-            d = np.where(out, np.clip(d, low, high), d)
-            free &= ~out
-        theta = np.clip(self.theta + self.unit * d, self.space.low, self.space.high)
-        moves = -(back[:, :, -1] + back[:, :, :-1] @ d)
-        decrease = self.pull(self.theta) - self.pull(theta) - equations.change(d, moves)
-        expected = _Expectation(decrease, float(np.sqrt(d @ H @ d)))
-        return theta, list(self.base.integrate(np.array(self.starts), moves)), expected
-
-
 @dataclass(frozen=True)
 class IdentifyOptions:
     """Settings of `identify`.
 
     Attributes:
         window: steps that are predicted from one start, which is free within the noise (default None: whole motions).
+        shortest: steps of the windows that a fit begins with, at least, which are doubled up to those of `window`, as
+            long predictions have local minima (default None: 5 for whole motions, and `window` where it is given).
+        redraws: times that starts of missed windows are drawn again, for windows of each length (default 3); with 0,
+            starts also stay where they are when the smoothing changes.
         every: number of steps from one compared state to the next (default 1).
         delay: time from an input to the moment when it acts [s]: a number if it is known, or the range (low, high) of a
             delay to fit, as the parameter "delay" (default 0). An input that acts within a step counts with its share
             of the step; before a motion, inputs are those of its first step. Delays have local minima, a time step
             apart: give `fits`, which are spread over the range evenly.
         kappas: smoothing of contacts, one after the other [N s m]: smooth contacts act at a distance (default None:
-            that of the simulator).
+            that of the simulator). The last one is that of all windows but the shortest.
         outlier: number of deviations; states whose errors have a larger root mean square count linearly (default 3).
         tolerance: share of the cost; a smoothing ends when an iteration brings less (default 1e-4).
         max_iterations: limit per smoothing (default 30).
@@ -296,6 +204,8 @@ class IdentifyOptions:
     """
 
     window: int | None = None
+    shortest: int | None = None
+    redraws: int = 3
     every: int = 1
     delay: float | tuple[float, float] = 0.0
     kappas: Sequence[float] | None = None
@@ -305,7 +215,9 @@ class IdentifyOptions:
     verbose: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("every", "max_iterations", *(() if self.window is None else ("window",))):
+        checks.whole_number("identify(redraws=...)", self.redraws, 0)
+        given = [name for name in ("window", "shortest") if getattr(self, name) is not None]
+        for name in ("every", "max_iterations", *given):
             checks.whole_number(f"identify({name}=...)", getattr(self, name))
         for name in ("outlier", "tolerance"):
             checks.number(f"identify({name}=...)", getattr(self, name), above=0.0)
@@ -347,10 +259,10 @@ def identify(
             measurement.
         fits: number of fits; the first begins with the values of `sim`, further ones with values drawn from the
             prior, or around those of `sim` with a deviation of three tenths (default 1). The best one is returned.
-        seed: of these values (default 0).
+        seed: of these values, and of drawn starts (default 0).
         executor: whose workers fit, as for `dojo.monte_carlo`; the result does not depend on it (default None).
-        **options: fields of `dojo.IdentifyOptions` by name, whose help has their units and defaults: window, every,
-            delay, kappas, outlier, tolerance, max_iterations, verbose.
+        **options: fields of `dojo.IdentifyOptions` by name, whose help has their units and defaults: window,
+            shortest, redraws, every, delay, kappas, outlier, tolerance, max_iterations, verbose.
 
     Returns:
         Identified.
@@ -378,8 +290,9 @@ def identify(
     known = Prior(space, checks.mapping(f"{call}(prior=...)", prior))
     windows = cut_windows(sim, trajectories, o.window, space.past)
     count = room_for(f"{call}(fits=...)", fits, 8.0 * sum(w.x.size for w in windows), noun="fits")
-    first = _first_values(space, known, count, checks.whole_number(f"{call}(seed=...)", seed, 0))
-    calls = [(space, windows, deviations, o, known, values) for values in first]
+    checks.whole_number(f"{call}(seed=...)", seed, 0)
+    first = _first_values(space, known, count, seed)
+    calls = [(space, windows, deviations, o, known, seed, values) for values in first]
     found = list(results_in_order(_fitted, calls, executor))
     best = min(found, key=lambda each: (each.unsolved, each.cost))
     return replace(best, cpu_seconds=sum(each.cpu_seconds for each in found))
@@ -402,23 +315,58 @@ def _first_values(space: DelayedSpace, known: Prior, count: int, seed: int) -> l
 
 
 def _fitted(
-    space: DelayedSpace, windows: list[Window], noise: Floats, o: IdentifyOptions, known: Prior, values: Floats
+    space: DelayedSpace,
+    windows: list[Window],
+    noise: Floats,
+    o: IdentifyOptions,
+    known: Prior,
+    seed: int,
+    values: Floats,
 ) -> Identified:
     """The fit from one start; at module level, so that other processes can import it."""
     began = time.process_time()
-    fit = _Fit(space, windows, Predictor(space, noise, o.every), o.outlier, known)
+    fit = ShootingFit(space, windows, Predictor(space, noise, o.every), o.outlier, known)
     fit.theta = values.copy()
     history: list[dict[str, Any]] = []
-    levels, status = (fit.base.kappa,) if o.kappas is None else o.kappas, Status.SOLVED
-    for kappa in levels:
-        status = _descend(fit, kappa, o, began, history)
+    rng, stages, status = np.random.default_rng(seed), _stages(fit, windows, o), Status.SOLVED
+    for before, stage in zip((None, *stages), stages, strict=False):
+        fit.cut(windows, stage.length)
+        if o.redraws and before is not None and before.kappa != stage.kappa:
+            fit.begin_again(stage.kappa)
+        status = _descend(fit, stage, began, history)
+        for _ in range(o.redraws if stage.kappa == stages[-1].kappa else 0):
+            if status == Status.SIMULATION_FAILED or not fit.redraw(stage.kappa, rng):
+                break
+            status = _descend(fit, stage, began, history)
         if status == Status.SIMULATION_FAILED:
             break
-    return _identified(fit, kappa, status, history, began)
+    fit.cut(windows, stages[-1].length)
+    return _identified(fit, stage.kappa, status, history, began)
 
 
-def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history: list[dict[str, Any]]) -> Status:
-    """Iterations at one smoothing; how they ended."""
+class _Stage(NamedTuple):
+    """A length of the windows, a smoothing, and how exactly they are solved."""
+
+    length: int
+    kappa: float
+    options: IdentifyOptions
+
+
+def _stages(fit: ShootingFit, windows: list[Window], o: IdentifyOptions) -> list[_Stage]:
+    """All smoothings with the shortest windows, then longer and longer ones; only the last is solved exactly."""
+    kappas = (fit.base.kappa,) if o.kappas is None else o.kappas
+    longest = max(len(w.u) for w in windows)
+    shortest = o.shortest or o.window or _SHORTEST
+    doublings = max(int(np.log2(longest / shortest)), 0)
+    first = -(-longest // 2**doublings)
+    pairs = [(first, kappa) for kappa in kappas] + [(first * 2**k, kappas[-1]) for k in range(1, doublings + 1)]
+    rough = replace(o, tolerance=max(o.tolerance, _ROUGH), max_iterations=min(o.max_iterations, _FEW))
+    return [_Stage(*pair, rough) for pair in pairs[:-1]] + [_Stage(*pairs[-1], o)]
+
+
+def _descend(fit: ShootingFit, stage: _Stage, began: float, history: list[dict[str, Any]]) -> Status:
+    """Iterations of one stage; how they ended."""
+    length, kappa, o = stage
     found = fit.errors(fit.theta, fit.starts, kappa, slopes=True)
     if found is None:
         return Status.SIMULATION_FAILED
@@ -455,14 +403,14 @@ def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history:
         record = dict(
             zip(
                 COLUMNS,
-                (len(history) + 1, kappa, cost, np.sqrt(data / max(values, 1)), damping, size, far,
+                (len(history) + 1, length, kappa, cost, np.sqrt(data / max(values, 1)), damping, size, far,
                  usable.count(False), time.process_time() - began),
                 strict=True,
             )
         )  # fmt: skip
         if o.verbose:
             head = [] if history else [_HEADER]
-            line = "{:9d} {:8.1e} {:12.6g} {:9.4f} {:8.1e} {:8.1e} {:8.4f} {:8d} {:8.1f}".format(*record.values())
+            line = "{:9d} {:6d} {:8.1e} {:12.6g} {:9.4f} {:8.1e} {:8.1e} {:8.4f} {:8d} {:8.1f}".format(*record.values())
             print("\n".join([*head, line]), file=sys.stdout, flush=True)
         history.append(record)
         if gain < o.tolerance:
@@ -470,7 +418,7 @@ def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history:
     return Status.MAX_ITERATIONS
 
 
-def _stopped(expected: _Expectation, cost: float, o: IdentifyOptions) -> Status:
+def _stopped(expected: Expectation, cost: float, o: IdentifyOptions) -> Status:
     """How a smoothing ends whose cost falls no further, by the expectation of the least damped step.
 
     Where that is large, the motions are not as the linear model has them, as at a change of contacts. Where it would
@@ -480,13 +428,20 @@ def _stopped(expected: _Expectation, cost: float, o: IdentifyOptions) -> Status:
     return Status.SOLVED if near else Status.LINE_SEARCH
 
 
-def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str, Any]], began: float) -> Identified:
+def _identified(
+    fit: ShootingFit, kappa: float, status: Status, history: list[dict[str, Any]], began: float
+) -> Identified:
     """The result, with the covariance of the parameters at the end."""
     space, n = fit.space, len(fit.theta)
     found = fit.errors(fit.theta, fit.starts, kappa, slopes=True) or []
     usable = [w.solved for w in found]
     cost, weights, far = fit.weigh(found, usable)
     H = NormalEquations(found, weights, fit.unit).reduced(0.0)[0]
+    message, missed = _MESSAGES[status], _MESSAGES[Status.NOT_EXPLAINED]
+    if status == Status.SOLVED and far > _MISSED:
+        status, message = Status.NOT_EXPLAINED, missed
+    elif far > _MISSED:
+        message = f"{message} {missed}"
     count = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
     free = count - n - sum(usable) * fit.base.ndx
     variance = max(cost / max(free, 1), 1e-30)
@@ -502,19 +457,8 @@ def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str,
         for axis in axes[:, ~seen].T
     ]
     return Identified(
-        status == Status.SOLVED, status, _message(status, far), space.labels, fit.theta, space.values, covariance,
+        status == Status.SOLVED, status, message, space.labels, fit.theta, space.values, covariance,
         space.simulator(fit.theta), float(np.sqrt(cost / max(count, 1))), unseen, far,
         fit.rest(cost, found, usable), fit.starts, space.delayed(fit.windows, fit.theta), fit.predictor.noise, usable,
         history, kappa, time.process_time() - began,
     )  # fmt: skip
-
-
-def _message(status: Status, outliers: float) -> str:
-    """A sentence about the end of a fit, and one about a model that does not explain the data."""
-    if outliers <= _MISSED:
-        return _MESSAGES[status]
-    return (
-        f"{_MESSAGES[status]} But the predictions miss {100 * outliers:.0f} % of the states by far more than the "
-        "noise, so do not trust the values: end kappas=... with that of the motions, give shorter windows, or fit more "
-        "parameters."
-    )

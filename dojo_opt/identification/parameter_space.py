@@ -38,7 +38,8 @@ class ParameterSpace:
         def slopes(theta): ... space.chain(theta, space.simulator(theta).linearize(x, u, wrt=space.wrt)) ...
         scipy.optimize.least_squares(errors, space.values, slopes, bounds=(space.low, space.high))
 
-    The attributes `labels`, `values`, `low` and `high` (n,) belong to theta; `values` are those of `sim`.
+    The attributes `labels`, `values`, `low` and `high` (n,) belong to theta; `values` are those of `sim`, but for a
+    restitution of 0, which is 1e-6: without any, a contact has another law.
 
     Args:
         sim: the simulator.
@@ -47,7 +48,7 @@ class ParameterSpace:
             every value is a physical body (inertia_coordinates.py). With `inertia` among the names instead, theta may
             leave the set of physical bodies; `simulator` then raises a ValueError.
         bounds: {label: (low, high)} within those that mechanisms have: masses, sizes, friction > 0, springs, dampers,
-            armatures, radii >= 0, restitution from 0 to 1 (default None: the latter).
+            armatures, radii >= 0, restitution from 1e-6 to 1 (default None: the latter).
 
     Raises:
         ValueError: for an unknown name, a name given twice, no name at all, or bounds that exclude the value of `sim`.
@@ -191,7 +192,10 @@ class ParameterSpace:
             raise ValueError(f"{call}: {kind} is a vector; give all components of one part at a time, got {given}")
         if name.endswith("[scale]") and ":*" in name:
             raise ValueError(f"{call}: give the scale of one part at a time, got {name}")
-        rows = {entry: (value, *self._limits(entry, kind, value)) for entry, value in zip(entries, values, strict=True)}
+        rows = {}
+        for entry, value in zip(entries, values, strict=True):
+            low, high = self._limits(entry, kind, value)
+            rows[entry] = (float(np.clip(value, low, high)), low, high)
         self._append([name], chart, rows)
 
     def _limits(self, name: str, kind: str, value: float) -> tuple[float, float]:
@@ -240,8 +244,8 @@ def _limits(kind: str, value: float) -> tuple[float, float]:
     """Admissible range of a kind of parameter."""
     if kind in _POSITIVE:
         return _LEAST * abs(value), np.inf
-    if kind == "restitution":
-        return 0.0, 1.0
+    if kind == "restitution":  # a contact without any is another law, without a derivative by it
+        return _LEAST, 1.0
     if kind == "cone":
         return _LEAST, np.pi
     return (0.0 if kind in _NOT_NEGATIVE else -np.inf), np.inf

@@ -46,6 +46,24 @@ class Window:
 
     __repr__ = short_repr
 
+    def pieces(self, length: int) -> list[Window]:
+        """Windows that follow one another in this one.
+
+        Args:
+            length: steps of each; the last one is shorter.
+
+        Returns:
+            The windows.
+        """
+        m, size = len(self.past), len(self.u)
+        before = np.concatenate([self.past, self.u]) if m else self.u  # u[t] is before[m + t]
+        return [
+            Window(
+                self.trajectory, self.first + k, self.x[k : k + length + 1], self.u[k : k + length], before[k : k + m]
+            )
+            for k in range(0, size, length)
+        ]
+
     def delayed(self, steps: float, time_step: float | None) -> Window:
         """The window with the inputs that act if they come later by so many steps: means over each step.
 

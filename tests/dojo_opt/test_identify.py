@@ -11,8 +11,10 @@ from scipy.linalg import block_diag
 
 import dojo_opt as dojo
 from dojo_opt.identification.delayed_space import DelayedSpace
-from dojo_opt.identification.identify import IdentifyOptions, _Expectation, _Fit, _stopped
+from dojo_opt.identification.identify import IdentifyOptions, _stopped
 from dojo_opt.identification.normal_equations import NormalEquations
+from dojo_opt.identification.prior import Prior
+from dojo_opt.identification.shooting_fit import Expectation, ShootingFit
 from dojo_opt.identification.windows import Predictor, WindowErrors, cut_windows, difference_slopes
 from solvers.status import Status
 
@@ -59,28 +61,31 @@ def test_a_model_that_does_not_explain_the_data_is_told():
     sd = np.array([1e-5, 1e-4])
     motions = _motions(_arm(mass=3.0), np.random.default_rng(1), sd)
     wrong, right = (dojo.identify(_arm(0.2, mass), motions, ("damper",), noise=sd) for mass in (1.0, 3.0))
-    assert wrong.outliers > 0.5 and "do not trust the values" in wrong.message and wrong.message in wrong.closing_line()
+    assert wrong.outliers > 0.5 and (wrong.success, wrong.status) == (False, Status.NOT_EXPLAINED)
+    assert "do not trust the values" in wrong.message and wrong.message in wrong.closing_line()
     assert right.success and "do not trust" not in right.message
 
 
 def test_parameters_within_a_tenth_of_their_deviation_are_found():
     """As at the end of a fit of friction: only the starts of windows beside changes of contacts want to move."""
     for deviations, status in ((0.03, Status.SOLVED), (0.3, Status.LINE_SEARCH)):
-        assert _stopped(_Expectation(2.25, deviations), 1121.2, IdentifyOptions()) == status
+        assert _stopped(Expectation(2.25, deviations), 1121.2, IdentifyOptions()) == status
 
 
 def test_a_fit_whose_steps_all_raise_the_cost_is_not_called_solved(monkeypatch):
     """The linear model predicts a decrease that no step brings, at the second smoothing as at the first."""
-    errors = _Fit.errors
+    errors = ShootingFit.errors
 
     def worse(fit, theta, starts, kappa, slopes):
         found = errors(fit, theta, starts, kappa, slopes)
         late = not slopes and kappa == 1e-6
         return [replace(w, errors=10.0 * w.errors) for w in found] if late else found
 
-    monkeypatch.setattr(_Fit, "errors", worse)
+    monkeypatch.setattr(ShootingFit, "errors", worse)
     motions = _motions(_arm(), np.random.default_rng(4), np.array([0.01, 0.05]))
-    found = dojo.identify(_arm(0.1), motions, ("damper",), noise=0.01, kappas=(1e-4, 1e-6), max_iterations=1)
+    found = dojo.identify(
+        _arm(0.1), motions, ("damper",), noise=0.01, kappas=(1e-4, 1e-6), max_iterations=1, shortest=40
+    )
     assert [record["kappa"] for record in found.history] == [1e-4]
     assert not found.success and found.status == Status.LINE_SEARCH and "cost" in found.message
 
@@ -133,15 +138,35 @@ def test_several_starts_leave_a_local_minimum_and_need_not_be_fitted_here():
     motions = [(truth.rollout(np.array([1.0, 0.0]), steps=200).x, np.zeros((200, 1)))]
     wrong = truth.with_parameters({name: 0.3})
     known = {"prior": {name: (0.1, 0.1)}, "noise": 0.05, "bounds": {"armature:hinge": (1e-3, 1.0)}}
-    alone = dojo.identify(wrong, motions, (name,), **known)
+    alone = dojo.identify(wrong, motions, (name,), **known, shortest=200)
     assert abs(alone.values[0] - 0.02) > 0.05
-    several = dojo.identify(wrong, motions, (name,), fits=6, seed=1, **known)
+    several = dojo.identify(wrong, motions, (name,), fits=6, seed=1, shortest=200, **known)
     assert several.success and abs(several.values[0] - 0.02) < 1e-3 and several.cost < 0.01 * alone.cost
+    doubled = dojo.identify(wrong, motions, (name,), **known)  # from short windows on, one fit is enough
+    assert doubled.success and abs(doubled.values[0] - 0.02) < 1e-3
     with ThreadPoolExecutor(2) as pool:
-        elsewhere = dojo.identify(wrong, motions, (name,), fits=6, seed=1, executor=pool, **known)
+        elsewhere = dojo.identify(wrong, motions, (name,), fits=6, seed=1, shortest=200, executor=pool, **known)
     np.testing.assert_array_equal(elsewhere.values, several.values)
     with pytest.raises(TypeError, match=r"identify\(executor=\.\.\.\)"):
         dojo.identify(wrong, motions, (name,), executor=3, **known)
+
+
+def test_a_start_that_is_far_off_is_drawn_again():
+    sim, rng, sd = _arm(), np.random.default_rng(7), np.array([0.01, 0.05])
+    space = DelayedSpace(dojo.ParameterSpace(sim, ("damper",)), 0.0, sim.time_step)
+    windows = cut_windows(sim, _motions(sim, rng, 0.0), 10)
+    fit = ShootingFit(space, windows, Predictor(space, sd, 1), 3.0, Prior(space, {}))
+    assert not fit.redraw(sim.kappa, rng), "no window is missed"
+    near = fit.starts[4].copy()
+    fit.starts[4] = near + [0.2, 0.0]
+    before = [start.copy() for start in fit.starts]
+    assert fit.redraw(sim.kappa, rng)
+    assert np.linalg.norm((fit.starts[4] - near) / sd) < 18.0  # of 20 before
+    fit.starts[4] = near + [0.0, 0.2]
+    fit.begin_again(sim.kappa)
+    np.testing.assert_array_equal(fit.starts[4], near, "the measured start costs less")
+    fit.starts[4] = before[4]
+    np.testing.assert_array_equal(fit.starts, before)
 
 
 def test_friction_is_found_through_contacts():

@@ -103,6 +103,12 @@ def test_the_space_starts_where_the_simulator_is() -> None:
     assert space.labels[-10:] == tuple(f"block.{label}" for label in inertia_coordinates.LABELS)
 
 
+def test_a_restitution_of_zero_has_a_derivative() -> None:
+    """Which impacts without any do not have."""
+    space = dojo.ParameterSpace(dojo.Simulator(dojo.models.block()), ("restitution:*",))
+    np.testing.assert_array_equal(np.r_[space.values, space.low, space.high], [1e-6, 1e-6, 1.0])
+
+
 def test_a_common_shift_is_bounded_by_the_least_parameter() -> None:
     mech = dojo.models.npendulum(3)
     sim = dojo.Simulator(mech).with_parameters({"damper": [0.1, 0.2, 0.6]})
