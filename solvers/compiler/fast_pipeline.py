@@ -23,7 +23,7 @@ from solvers.compiler.lowering import KernelLowering
 from solvers.compiler.progress import compiling
 from solvers.compiler.single_assignment import reconstruct_single_assignment
 
-__all__ = ["EntryCompiler", "InnerCompiler", "OptionalCompiler", "RolledCompiler", "SeldomCompiler"]
+__all__ = ["EntryCompiler", "InnerCompiler", "OptionalCompiler", "RolledCompiler", "SeldomCompiler", "drop_caches"]
 
 _IDLE = (  # features that kernels do not use: closures, array expressions, literals as types, exceptions, and more
     untyped_passes.WithLifting,
@@ -48,6 +48,15 @@ def _tidy(func_ir: Any) -> None:
     func_ir.blocks = transforms.canonicalize_cfg(func_ir.blocks)
 
 
+def drop_caches(bytecode: Any) -> None:
+    """Drop the empty instructions in which Python 3.11 keeps its caches: half of all, and Numba interprets each."""
+    for instruction in reversed(list(bytecode.table.values())):
+        following = bytecode.table.get(instruction.next)
+        if following is not None and following.opname == "CACHE":
+            instruction.next = following.next
+            del bytecode.table[following.offset]
+
+
 class _Interpreter(interpreter.Interpreter):
     """Numba's, for functions without `with`, dictionaries and exceptions to catch."""
 
@@ -65,6 +74,7 @@ class _Translation(untyped_passes.TranslateByteCode):
 
     def run_pass(self, state: Any) -> bool:
         """Translate Python's byte code to Numba's representation."""
+        drop_caches(state.bc)
         state.func_ir = _Interpreter(state.func_id).interpret(state.bc)
         return True
 

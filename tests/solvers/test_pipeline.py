@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core.bytecode import ByteCode, FunctionIdentity
+from numba.core.interpreter import Interpreter
 
+from solvers.compiler.fast_pipeline import drop_caches
 from support.fork_server import forked
 from support.programs import python
 
@@ -35,6 +39,33 @@ def test_numbas_own_pipeline_gives_the_same_digits():
     plain, *others = json.loads(python(program, DOJO_OPT_PLAIN_NUMBA="1"))
     assert (fast, plain) == (True, False)
     np.testing.assert_allclose(numbers, others, rtol=1e-12, atol=1e-13)
+
+
+def _branches(a, out):
+    total = 0.0
+    for i in range(a.shape[0]):
+        j = 0
+        while j < i and a[i, j] > 0.0:
+            total += a[i, j] * a[j, i] if j % 2 else -a[i, j]
+            j += 1
+        if total > 10.0:
+            break
+        out[i], out[-1] = total, max(total, a[i, i])
+    return total
+
+
+def test_functions_are_the_same_without_the_caches_in_their_bytecode():
+    found = []
+    for drops in (False, True):
+        function = FunctionIdentity.from_function(_branches)
+        bytecode = ByteCode(function)
+        if drops:
+            drop_caches(bytecode)
+            assert "CACHE" not in [instruction.opname for instruction in bytecode]
+        text = io.StringIO()
+        Interpreter(function).interpret(bytecode).dump(file=text)
+        found.append(text.getvalue())
+    assert found[0] == found[1] and "getitem" in found[0]
 
 
 UNKNOWN = """
