@@ -117,24 +117,39 @@ def _step_ahead(
 
 
 @kernel
+def _settled(model_at: Table, data_at: Table, options: StepOptions, line: SubstepState) -> int:
+    """line.settled = nodes one step after that of the undivided step, and after that of the halves; the Status."""
+    model, data, nodes = model_view(model_at), data_view(data_at), line.settled
+    status = _step_ahead(model_at, data_at, options, line, line.node, line.ahead, False)
+    if status == _SOLVED:
+        status = node_of_mean(model, data, options.h, line.u, line.ahead, nodes[0])
+    if status == _SOLVED:
+        status = _step_ahead(model_at, data_at, options, line, line.trial, nodes[1], True)
+    return node_of_mean(model, data, options.h, line.u, nodes[1], nodes[1]) if status == _SOLVED else status
+
+
+@kernel
 def _difference(
-    model_at: Table, data_at: Table, options: StepOptions, goal: Vector, line: SubstepState, embedded: Embedded
+    model_at: Table, data_at: Table, steps: tuple[StepOptions, StepOptions], goal: Vector, line: SubstepState,
+    embedded: Embedded,
 ) -> float:  # fmt: skip
     """Largest e = |q - q'|/2 + |v - v'| t of the coordinates after a step and after its two halves [m, rad].
 
     In contact without an impact, _PRESSED times that: errors of the velocity go on there, and grow where a body tips.
     _HELD times by loops and gears alone.
 
-    v, v': after an impact, as means of another step, in which the ground has acted. Without an impact these do not
-    count: they are as different as the gap of a contact is, over the length of the step.
+    v, v': after an impact, as means of the last of two steps: the first, as short as the halves, ends the impact where
+    part of it is left, before contacts that it pressed open again; in the other one the ground has acted. Without an
+    impact these do not count: they are as different as the gap of a contact is, over the length of the step.
     t: the rest of the step, at least half a second: the time over which an error of the velocity counts.
     """
     model, data = model_view(model_at), data_view(data_at)
     nq, hits = data.theta1.shape[0], line.clock[Clock.HIT] > 0.0
     one, other, presses = line.node, line.trial, data.active_count[0] > 0
-    if hits and _step_ahead(model_at, data_at, options, line, line.node, line.ahead, False) == _SOLVED:
-        if _step_ahead(model_at, data_at, options, line, line.trial, line.node, True) == _SOLVED:
-            one, other = line.ahead, line.node
+    if hits and _settled(model_at, data_at, steps[0], line) == _SOLVED:
+        if _step_ahead(model_at, data_at, steps[1], line, line.settled[0], line.ahead, False) == _SOLVED:
+            if _step_ahead(model_at, data_at, steps[1], line, line.settled[1], line.settled[0], True) == _SOLVED:
+                one, other = line.ahead, line.settled[0]
     configuration_difference(model, line.whole[:nq], line.mean[:nq], embedded.distance)
     noise = NOISE if model.contact_body.shape[0] + model.limit_dof.shape[0] > 0 else CLOSED
     error, time = 0.0, max(goal[AccuracyGoal.END] - line.clock[Clock.TIME], 0.5) if hits else 0.0
@@ -234,8 +249,8 @@ def _judged(
     model, data, clock = model_view(models[1]), data_view(data_tables[0]), line.clock
     goal, settings, h = step
     stop = stopping_error(model, line.parts, line.slips, h)
-    behind = part_of(goal, settings, max(0.5 * h, _AHEAD), 1)
-    error = max(stop, _difference(models[1], data_tables[0], behind, goal, line, embedded))
+    steps = part_of(goal, settings, 0.5 * h, 1), part_of(goal, settings, max(0.5 * h, _AHEAD), 1)
+    error = max(stop, _difference(models[1], data_tables[0], steps, goal, line, embedded))
     allowed = goal[AccuracyGoal.ACCURACY] * h
     settles = data.active_count[0] > 0 and h < _SETTLES * goal[AccuracyGoal.SETTLED]
     if clock[Clock.HIT] + clock[Clock.BEYOND] == 0.0 and not settles:

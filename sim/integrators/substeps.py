@@ -72,6 +72,7 @@ class SubstepState(NamedTuple):
     half: Vector
     node: Vector  # (nx,) scratch: the node after the undivided step
     ahead: Vector  # (nx,) scratch: mean state of a step from there
+    settled: Matrix  # (2, nx) scratch: nodes a short step after that, and after the halves
     clock: Vector  # (28,) in place
     report: Vector  # (9,)
     parts: Cube  # (3, ncontact, 11) scratch: contacts of both halves, and of the whole step

@@ -130,6 +130,17 @@ def test_a_light_link_leaves_its_limit_as_exactly(accuracy: float) -> None:
     assert found.errors[0] > 1.0 or accuracy > 1e-5
 
 
+def test_an_impact_that_throws_off_what_rests_has_the_error_that_it_has() -> None:
+    """A stop of the elbow throws fingers off theirs, which the rest of that impact, in a long step, would press down."""
+    coarse, fine = (dojo.Simulator(models.panda(), time_step=0.02, accuracy=accuracy) for accuracy in (1e-3, 1e-5))
+    x = fine.rollout(fine.neutral(), steps=14, throw=True).x[-1]
+    found, exact = (sim.rollout(x, steps=4, throw=True) for sim in (coarse, fine))
+    stop = abs(found.x[:, 3] - coarse.mechanism.joints[3].limits[0][0]).min()
+    assert stop < 1e-5 and np.abs(found.x[-1, 7:9] - [0.0, 0.04]).min() > 1e-3
+    assert np.abs(found.x - exact.x)[:, : coarse.nq].max() < 1e-3 * 4 * 0.02
+    assert found.errors.max() < 10.0
+
+
 @pytest.mark.parametrize("name", ["hopper", "walker", "quadruped", "panda", "atlas"])
 def test_mobility_is_a_bound_and_near(name: str) -> None:
     """Of the diagonal of the inverse of the mass matrix, without translations of the base."""

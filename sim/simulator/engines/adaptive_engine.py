@@ -107,6 +107,7 @@ class AdaptiveEngine(PythonLoopEngine):
                 half,
                 node,
                 ahead,
+                np.zeros((2, nx)),
                 np.zeros(len(Clock)),
                 np.zeros(REPORT),
                 np.zeros((3, ncontact, CONTACT)),
