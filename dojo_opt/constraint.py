@@ -25,6 +25,7 @@ from dojo_opt.planning.term import (
     Spec,
     StateTerm,
     Term,
+    check_order,
     knot_list,
     numbers,
     state_table,
@@ -89,8 +90,7 @@ def _bounds(call: str, lower: ArrayLike, upper: ArrayLike, rows: int, chosen: In
         if given.shape not in ((), (columns,), (rows, columns)):
             raise ValueError(f"{call}({side}=...): expected shape () or ({columns},), got {given.shape}")
         with_inf.append(np.broadcast_to(given, (rows, columns)))
-    if np.any(np.isnan(with_inf)) or np.any(with_inf[0] > with_inf[1]):
-        raise ValueError(f"{call}: expected lower <= upper, got lower {lower!r}, upper {upper!r}")
+    check_order(call, lower, upper, with_inf)
     keep = [np.any(np.isfinite(b), axis=0) for b in with_inf]
     reference = np.concatenate([b[:, k] for b, k in zip(with_inf, keep, strict=True)], axis=1)
     big = np.where(np.isfinite(reference), reference, np.sign(reference) * 1e100)
@@ -139,7 +139,7 @@ class SpeedLimits(Spec):
     """|v_i| <= share speed_i for the joints whose inputs have a largest speed, as a file gives it.
 
     Attributes:
-        share: allowed share of that speed (default 1).
+        share: allowed share of that speed, above 0 (default 1). Of several inputs of one joint the slowest counts.
         knots: numbers of the knots (default None: 1 to T).
     """
 
@@ -149,11 +149,14 @@ class SpeedLimits(Spec):
     __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
-        mech = sim.mechanism
+        mech, share = sim.mechanism, checks.number("SpeedLimits(share=...)", self.share, above=0.0)
         limited = [(i, i.joint) for i in mech.inputs or () if i.joint is not None and np.isfinite(i.speed)]
         if not limited:
             raise ValueError(f"SpeedLimits(): no input of {mech.name!r} has a largest speed; see Input(speed=...)")
-        speeds = {mech.v_slice(joint).start + i.dof: self.share * i.speed for i, joint in limited}
+        speeds: dict[int, float] = {}
+        for i, joint in limited:
+            dof = mech.v_slice(joint).start + i.dof
+            speeds[dof] = min(speeds.get(dof, np.inf), share * i.speed)
         most = np.array(list(speeds.values()))
         return StateBounds(-most, most, mech.nv + np.array(list(speeds)), self.knots).bind(sim, horizon, layout)
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.planning.component_names import chosen_components
 from dojo_opt.planning.manifold import tangent_layout
-from dojo_opt.planning.term import Spec, largest_violation, numbers, state_table, table
+from dojo_opt.planning.term import Spec, check_order, largest_violation, numbers, state_table, table
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.memory_limit import check_room
@@ -49,6 +49,7 @@ def control_limits_of(limits: tuple[ArrayLike, ArrayLike] | None, sim: Simulator
     if np.any(lo > hi):
         i = int(np.argmax(lo > hi))
         raise ValueError(f"Problem(control_limits=...): expected lower <= upper, got [{lo[i]}, {hi[i]}] of control {i}")
+    check_order("Problem(control_limits=...)", lo, hi, [lo, hi])
     return lo, hi
 
 

@@ -225,6 +225,15 @@ def numbers(call: str, value: ArrayLike) -> Matrix:
     return checks.floats(call, value)
 
 
+def check_order(call: str, lower: Any, upper: Any, sides: list[Any]) -> None:
+    """Refuse bounds that nothing meets; sides: `lower` and `upper` as arrays of the same shape."""
+    if np.any(np.isnan(sides)) or np.any(sides[0] > sides[1]):
+        raise ValueError(f"{call}: expected lower <= upper, got lower {lower!r}, upper {upper!r}")
+    for side, bound, beyond in (("lower", sides[0], np.inf), ("upper", sides[1], -np.inf)):
+        if np.any(bound == beyond):
+            raise ValueError(f"{call}: {side}: expected a number, or {-beyond:g} for no bound, got {beyond:g}")
+
+
 def table(call: str, value: ArrayLike, rows: int, columns: int) -> Matrix:
     """Broadcast `value` to (rows, columns) and refuse anything that is not finite."""
     array = numbers(call, value)

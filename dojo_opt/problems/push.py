@@ -62,8 +62,8 @@ def push(
     1 cm behind the object, at the height of its centre of mass. In the guess the hand moves straight ahead with the
     object in front of it, under the torques that hold the arm, without contact. The links of the arm have no contacts
     with the object and the table. They stay outside of both where the arm can; a warning tells where it cannot. Place
-    and heading of the object at the end are constraints, and both are at rest there. The friction of the object's
-    shapes, 0.5 where they have none, acts at the table and at the ball.
+    and heading of the object at the end are constraints, and both are at rest there. Each shape of the object has its
+    own friction, 0.5 where it has none, at the table and at the ball.
 
     Args:
         arm: the mechanism, or its simulator, whose time step is then `time_step`; its own contacts are omitted.
@@ -289,8 +289,9 @@ def _follow(kin: Kinematics, q: Floats, tips: Floats, posture: tuple[float, floa
 def _scene(kin: Kinematics, thing: Body, pose: Floats, radius: float, table: float) -> Simulator:
     """The arm, the object on the table, and the ball between them."""
     mech = kin.mechanism
-    rough = max((shape.friction for shape in thing.shapes if shape.friction is not None), default=_ROUGH)
-    contacts = shape_contacts(_CALL, thing, friction=rough, height=table)
+    rough = [_ROUGH if shape.friction is None else shape.friction for shape in thing.shapes]
+    thing = replace(thing, shape=[replace(shape, friction=mu) for shape, mu in zip(thing.shapes, rough, strict=True)])
+    contacts = shape_contacts(_CALL, thing, height=table)
     joint = Joint("floating", None, thing.name)
     alone = Mechanism([thing], [joint], contacts, inputs=(), neutral=pose)
     number, point, _ = kin.place(_TIP)
@@ -298,7 +299,7 @@ def _scene(kin: Kinematics, thing: Body, pose: Floats, radius: float, table: flo
         raise ValueError(f"{_CALL}(object): the arm {mech.name!r} has a part called {thing.name!r}, too")
     ball = Sphere(radius, center=point)
     pairs = [
-        Collision(mech.body_names[number], thing.name, ball, shape, friction=rough, name=f"hand-{thing.name}.{k}")
+        Collision(mech.body_names[number], thing.name, ball, shape, friction=rough[k], name=f"hand-{thing.name}.{k}")
         for k, shape in enumerate(thing.shapes)
     ]
     return Simulator(mech.add(alone).with_collisions(*pairs), time_step=kin.sim.time_step, kappa=PLANNED)

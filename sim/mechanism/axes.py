@@ -6,7 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.mechanism.joint import Joint
+from sim.mechanism.shapes import rotation_matrix
 from solvers.types import Floats
+
+_ROUNDED = 1e-9  # parts of a unit vector below it are rounding
 
 
 def translation_axes(ntrans: int, axis: ArrayLike) -> Floats:
@@ -28,6 +31,17 @@ def fixed_axes(joint: Joint) -> Floats:
     """Orthonormal directions along which a joint does not move, (3 - ntrans, 3), joint frame."""
     free = translation_axes(joint.ntrans, joint.axis)[: joint.ntrans]
     return np.linalg.svd(free, full_matrices=True)[2][joint.ntrans :] if joint.ntrans else np.eye(3)
+
+
+def upward_rates(joint: Joint, rotation: Floats) -> Floats:
+    """(ntrans,) rates of the translations that move a joint's child straight up, in metres per metre; zero if none do.
+
+    rotation: (3, 3) of the parent.
+    """
+    up = (rotation @ rotation_matrix(joint.orientation))[2]  # in the joint frame
+    rates = translation_axes(joint.ntrans, joint.axis)[: joint.ntrans] @ up
+    rates = np.where(np.abs(rates) > _ROUNDED, rates, 0.0)
+    return rates if abs(float(rates @ rates) - 1.0) < _ROUNDED else np.zeros(joint.ntrans)
 
 
 def contact_frame(normal: ArrayLike) -> Floats:

@@ -120,7 +120,16 @@ class LevelSet:
         """Volume, integral of x (3,), and of x x^T (3, 3), of the solid with an offset.
 
         Cells near the surface are counted in parts, each by the share of it that a plane leaves inside.
+
+        Raises:
+            ValueError: the solid with its offset reaches beyond the grid, where phi is not known.
         """
+        if offset > 0.0 and not self._edge_distance > offset:
+            raise ValueError(
+                f"SignedDistance(offset=...): with an offset of {offset:g} m the solid reaches beyond its grid, whose "
+                f"edge is {self._edge_distance:.3g} m away, and volume and inertia are counted inside: take a larger "
+                "grid, or give Body(inertia=...) where the body has no other shape"
+            )
         from scipy.ndimage import binary_dilation
 
         h = self.spacing
@@ -140,6 +149,14 @@ class LevelSet:
             first += inside @ x
             second += (x * inside[:, None]).T @ x + inside.sum() * small**2 / 12.0 * np.eye(3)
         return float(volume), first, second
+
+    @cached_property
+    def _edge_distance(self) -> float:
+        """Least distance of the level set from the outermost grid points, as phi and its gradient tell [m]."""
+        outer = np.ones(self.values.shape, dtype=bool)
+        outer[1:-1, 1:-1, 1:-1] = False
+        f, g = self.field(self.origin + self.spacing * np.argwhere(outer))
+        return float((f / np.maximum(np.linalg.norm(g, axis=1), 1e-300)).min())
 
     def _parts(self, cells: Integers) -> Iterator[Floats]:
         """Centres of the parts of cells, in portions that fit the memory."""

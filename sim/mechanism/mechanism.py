@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import drawn
 from sim.mechanism import checks
+from sim.mechanism.axes import upward_rates
 from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision, shape_by_shape
 from sim.mechanism.contact import Contact
@@ -265,6 +266,9 @@ class Mechanism:
         self, terrain: Terrain, contacts: Sequence[str] | None = None, bodies: Sequence[str] = (), **options: Any
     ) -> Mechanism:
         """The same mechanism on other ground; its neutral state stands on it with the lowest contact.
+
+        Bases move up or down for that: those that float, and those of planar robots and on vertical slides, unless
+        their height has limits. Others stay where they are.
 
         Args:
             terrain: the ground. Contacts keep their friction; their normal and height are replaced.
@@ -560,17 +564,23 @@ def _on_terrain(
 
 
 def _standing(mech: Mechanism) -> Floats:
-    """Neutral coordinates with every floating root as high as its lowest contact touches the ground."""
+    """Neutral coordinates with every base that can rise as high as its lowest contact touches the ground."""
     q = np.array(mech.neutral, dtype=np.float64)
     at = body_poses(mech.joints, q)
+    frames = {WORLD}  # the world, and bodies without mass between it and a base
+    light = {body.name for body in mech.bodies if body.mass == 0.0}
     for joint in mech.joints:
-        if joint.parent != WORLD or joint.kind != "floating":
+        if joint.parent not in frames:
+            continue
+        climb = upward_rates(joint, at[joint.parent].rotation if joint.parent in at else np.eye(3))
+        place = mech.q_slice(joint.name).start + np.flatnonzero(climb)
+        if not len(place) or np.isfinite([bound[place] for bound in mech.coordinate_limits]).any():
+            frames |= light & {joint.child}
             continue
         hanging = {joint.child}
         for other in mech.joints:
             if other.parent in hanging:
                 hanging.add(other.child)
-        first = mech.q_slice(joint.name).start
         rises = []
         for c in mech.contacts:
             center = at[c.body].at(c.point)
@@ -578,5 +588,5 @@ def _standing(mech: Mechanism) -> Floats:
             if c.body in hanging and slope > 0.0:
                 rises.append((_CLEAR - float(c.gap(center))) / slope)
         if rises:
-            q[first : first + 3] += max(rises) * rotation_matrix(joint.orientation)[2]
+            q[place] += max(rises) * climb[climb != 0.0]
     return q

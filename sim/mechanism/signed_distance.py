@@ -51,6 +51,7 @@ class SignedDistance(Solid):
         origin: (3,) place of the first value, in the frame of the shape [m].
         spacing: distance of neighbouring grid points, the same along all axes [m].
         offset: distance by which the solid extends beyond the level set, everywhere along the normal [m] (default 0).
+            Volume and inertia of the solid with its offset need a grid that contains it.
 
     Raises:
         ValueError: for values that are nowhere negative, not positive at the edges of the grid, or not finite.

@@ -43,7 +43,9 @@ class Terrain:
 
     Attributes:
         heights: (nx, ny) above the lines of a grid [m], with a C2 spline in between; one column (nx, 1) is the same for
-            all y. Beyond the grid the ground is level, at the height of the edge (default level ground).
+            all y. Beyond the grid the ground goes on as smoothly, and is level from two grid lines on, about as high as
+            the slope at the edge reaches in one: at the height of the edge where the heights are level there (default
+            level ground).
         origin: (2,) place (x, y) of heights[0, 0] [m] (default the origin).
         spacing: (2,) spacing (dx, dy) of the grid [m] (default 1).
         direction: (2,) direction (x, y) of the first grid axis (default x).

@@ -57,3 +57,22 @@ def test_speed_limits_hold_in_a_plan() -> None:
     plain = dojo.Simulator(dojo.models.pendulum(), 0.05)
     with pytest.raises(ValueError, match=r"SpeedLimits\(\): no input of 'pendulum' has a largest speed"):
         dojo.Problem(plain, plain.neutral(), 20, cost=dojo.cost.Effort(1.0), constraints=dojo.constraint.SpeedLimits())
+
+
+def test_the_slowest_input_of_a_joint_limits_its_speed() -> None:
+    mech = dojo.models.pendulum()
+    joint = mech.joint_names[0]
+    inputs = [dojo.Input(joint, speed=speed, name=f"drive {speed:g}") for speed in (1.0, 5.0)]
+    sim = dojo.Simulator(replace(mech, inputs=inputs), time_step=0.05)
+
+    def problem(share: object) -> dojo.Problem:
+        return dojo.Problem(sim, sim.neutral(), 3, constraints=dojo.constraint.SpeedLimits(share))  # type: ignore[arg-type]
+
+    x = np.tile([*sim.neutral()[:1], 3.0], (4, 1))
+    assert problem(0.5).violation(x, np.zeros((3, 2))) == pytest.approx(2.5)
+    for share in (-1.0, 0.0, np.nan, "1"):
+        with pytest.raises(ValueError, match=r"SpeedLimits\(share=...\)"):
+            problem(share)
+    for limits in ((np.inf, np.inf), (-np.inf, -np.inf)):
+        with pytest.raises(ValueError, match=r"control_limits=...\): (lower|upper): expected a number"):
+            dojo.Problem(sim, sim.neutral(), 3, control_limits=limits)

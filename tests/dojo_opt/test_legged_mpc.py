@@ -122,6 +122,20 @@ def test_links_that_cannot_stay_outside_are_told():
         dojo.problems.push(arm, box, (0.0, 0.1), offset=(0.0, -0.1, 0.0), duration=0.2)
 
 
+def test_shapes_of_a_pushed_object_keep_their_friction():
+    joints = [dojo.Joint("prismatic", None, "rod", axis=(0, 1, 0), parent_point=(0, 0, 0.05))]
+    arm = dojo.Mechanism([dojo.Body("rod", 1.0, shape=dojo.Box(0.02, 0.2, 0.02))], joints)
+    parts = [
+        dojo.Box(0.1, 0.1, 0.05, center=(0, 0, z), friction=mu, name=name)
+        for name, z, mu in (("foot", -0.025, 0.1), ("lid", 0.025, 0.9))
+    ]
+    body = dojo.Body("box", 0.2, shape=[*parts, dojo.Sphere(0.02, name="knob")])
+    mech = dojo.problems.push(arm, body, (0.0, 0.1), offset=(0.0, 0.1, 0.0), duration=0.2).sim.mechanism
+    expected = {"foot": 0.1, "lid": 0.9, "knob": 0.5}
+    assert {c.name.split("_")[0].split(".")[1]: c.friction for c in mech.contacts} == expected
+    assert [c.friction for c in mech.collisions] == list(expected.values())
+
+
 @pytest.mark.slow
 def test_an_arm_pushes_a_box_along_a_table():
     box = dojo.Body("box", 0.5, shape=dojo.Box(0.1, 0.1, 0.1))

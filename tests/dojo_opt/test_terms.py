@@ -174,6 +174,12 @@ def test_bounds_measure_only_the_excess():
         (Effort([1.0, 2.0]), r"Effort\(weight=...\)"),
         (Goal(np.zeros(2), components=[2]), r"expected components in \[0, 2\), got \[2\]"),
         (StateBounds(1.0, -1.0), "expected lower <= upper"),
+        (
+            StateBounds(np.inf, np.inf, components=[1]),
+            r"StateBounds: lower: expected a number, or -inf for no bound, got inf",
+        ),
+        (StateBounds([-1.0, -np.inf], [1.0, -np.inf]), r"StateBounds: upper: expected a number, or inf for no bound"),
+        (ControlBounds(np.inf, np.inf), r"ControlBounds: lower: expected a number"),
     ],
 )
 def test_bad_terms_name_the_call(spec, message):

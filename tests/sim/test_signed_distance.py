@@ -83,6 +83,22 @@ def test_a_spacing_is_chosen_by_the_distance_from_the_mesh(monkeypatch: pytest.M
         dojo.SignedDistance.from_mesh((vertices, faces))
 
 
+def test_a_mass_needs_a_grid_around_the_offset() -> None:
+    """Volumes were counted inside the grid only, which an offset may leave; contacts may, too."""
+
+    def sphere(offset: float) -> dojo.SignedDistance:
+        return dojo.SignedDistance.from_function(
+            lambda p: np.linalg.norm(p, axis=1) - 0.05, [[-0.08] * 3, [0.08] * 3], 0.02, offset=offset
+        )
+
+    assert sphere(0.025).volume() == pytest.approx(4.0 / 3.0 * np.pi * 0.075**3, rel=1e-2)
+    assert dojo.Body("ball", inertia=(0.01, 0.01, 0.01), shape=sphere(0.1)).mass == 1.0
+    with pytest.raises(
+        ValueError, match=r"offset of 0.1 m the solid reaches beyond its grid, whose edge is 0.0325 m away"
+    ):
+        dojo.Body("ball", shape=sphere(0.1))
+
+
 @pytest.mark.parametrize("kind", [Pair.SPHERE_FIELD, Pair.CAPSULE_FIELD], ids=["ball", "capsule"])
 def test_distances_and_derivatives(kind: Pair, rng: np.random.Generator) -> None:
     """Near, deep and far off the grid; the gap to the egg against points of its surface."""

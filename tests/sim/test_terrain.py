@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from sim.mechanism.stance import gaps
 from support.hills import GRID, WAVES, H, derivatives_of, waves
 from support.scenes import ball, block, chain, order, run
 
@@ -34,6 +35,36 @@ def test_splines_give_back_cubics_and_go_on_level():
     np.testing.assert_allclose(T.height(x, y), cubic(x, y), atol=1e-12)
     far = T.height(np.array([5.0, 50.0]), np.array([0.2, 0.2]))
     assert far[0] == far[1]
+    ramp = dojo.Terrain(0.1 * np.arange(5.0)[:, None])  # goes on by a grid line; with level edges it does not rise
+    np.testing.assert_allclose(
+        ramp.height([-9.0, -2.0, 0.0, 4.0, 6.0, 9.0], 0.0), [-0.1, -0.1, 0.0, 0.4, 0.5, 0.5], atol=1e-12
+    )
+    level = dojo.Terrain(np.r_[np.zeros(12), 0.1, np.full(12, 0.2)][:, None])
+    np.testing.assert_allclose(level.height([-9.0, 0.0, 24.0, 40.0], 0.0), [0.0, 0.0, 0.2, 0.2], atol=2e-6)
+
+
+@pytest.mark.parametrize("name", ["walker", "block2d", "raiberthopper"])
+def test_bases_that_can_rise_stand_on_other_ground(name):
+    mech = getattr(dojo.models, name)()
+    for terrain, rise in ((dojo.Terrain([[0.5]]), 0.5), (dojo.Terrain.slope(0.2, (0.0, 1.0), height=-0.3), None)):
+        moved = mech.with_terrain(terrain)
+        assert gaps(moved, np.array(moved.neutral)).min() == pytest.approx(1e-9, abs=1e-12)
+        change = np.subtract(moved.neutral, mech.neutral)
+        up = 2 if mech.joints[0].kind == "floating" else 1
+        assert np.flatnonzero(change).tolist() == [up] and (rise is None or change[up] == pytest.approx(rise, abs=1e-8))
+
+
+def test_bases_on_slides_rise_where_nothing_limits_them():
+    """A plane's joints one by one, with bodies without mass in between; the upper slide is turned."""
+    turned = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)  # its x axis points down
+    for limits in (None, (-1.0, 1.0)):
+        joints = [
+            dojo.Joint("prismatic", None, "cart", axis=(0, 1, 0)),
+            dojo.Joint("prismatic", "cart", "ball", axis=(1, 0, 0), orientation=turned, limits=limits),
+        ]
+        bodies = [dojo.Body("cart", 0.0), dojo.Body("ball", 1.0, shape=dojo.Sphere(0.1))]
+        moved = dojo.Mechanism(bodies, joints).with_terrain(dojo.Terrain([[0.5]]), bodies=["ball"])
+        np.testing.assert_allclose(moved.neutral, [0.0, -0.6 if limits is None else 0.0], atol=1e-8)
 
 
 @pytest.mark.parametrize("radius", [0.02, 0.3])

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.planning.task_space.quantity import Quantity
 from dojo_opt.planning.task_space.task_term import Entries, PeriodicTaskTerm, TaskTerm
-from dojo_opt.planning.term import Spec, Term, knot_list, numbers, table
+from dojo_opt.planning.term import Spec, Term, check_order, knot_list, numbers, table
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.simulator import Simulator
@@ -119,8 +119,7 @@ def bounds(
                 f"{call}({side}=...): expected shape (), ({width},) or ({rows}, {width}), got {given.shape}"
             )
         sides.append(np.broadcast_to(given, (rows, width)))
-    if np.any(np.isnan(sides)) or np.any(sides[0] > sides[1]):
-        raise ValueError(f"{call}: expected lower <= upper, got lower {lower!r}, upper {upper!r}")
+    check_order(call, lower, upper, sides)
     keep = [np.isfinite(side).any(axis=0) for side in sides]
     reference = np.concatenate([side[:, k] for side, k in zip(sides, keep, strict=True)], axis=1)
     if reference.shape[1] == 0:
