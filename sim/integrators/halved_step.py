@@ -102,30 +102,31 @@ def _step_ahead(
 ) -> int:  # fmt: skip
     """out = the mean state one step after the node x, in which the ground acts on both alike; the Status.
 
-    again: the step before was the same, to line.ahead, from a node nearby.
+    again: the step before was the same, to line.ahead, from a node nearby, which is a start to be tried first.
     """
     model, data = model_view(model_at), data_view(data_at)
     begin_part(data, line.wrench)
     status = mean_of_node(model_at, data_at, options.h, line.u, x, line.half)
     if status != _SOLVED:
         return status
-    begin_part(data, line.wrench)
     nq = data.theta1.shape[0]
-    near = again and _hands_on(model)
-    guess = Guess(line.ahead[nq:] if near else line.half[nq:], near)
-    return step_mean(model, data, options, line.u, line.half, guess, out, line.report)
+    if again and _hands_on(model):
+        begin_part(data, line.wrench)
+        near = Guess(line.ahead[nq:], True)
+        if step_mean(model, data, options, line.u, line.half, near, out, line.report) == _SOLVED:
+            return _SOLVED
+    begin_part(data, line.wrench)
+    return step_mean(model, data, options, line.u, line.half, Guess(line.half[nq:], False), out, line.report)
 
 
 @kernel
-def _settled(model_at: Table, data_at: Table, options: StepOptions, line: SubstepState) -> int:
-    """line.settled = nodes one step after that of the undivided step, and after that of the halves; the Status."""
-    model, data, nodes = model_view(model_at), data_view(data_at), line.settled
-    status = _step_ahead(model_at, data_at, options, line, line.node, line.ahead, False)
-    if status == _SOLVED:
-        status = node_of_mean(model, data, options.h, line.u, line.ahead, nodes[0])
-    if status == _SOLVED:
-        status = _step_ahead(model_at, data_at, options, line, line.trial, nodes[1], True)
-    return node_of_mean(model, data, options.h, line.u, nodes[1], nodes[1]) if status == _SOLVED else status
+def _settle(model_at: Table, data_at: Table, options: StepOptions, line: SubstepState, x: Vector, k: int) -> None:
+    """line.settled[k] = the node one step after the node x; x itself where that step is not solved."""
+    model, data, out = model_view(model_at), data_view(data_at), line.settled[k]
+    status = _step_ahead(model_at, data_at, options, line, x, out, k > 0)
+    copy_vector(out, line.ahead)
+    if status != _SOLVED or node_of_mean(model, data, options.h, line.u, line.ahead, out) != _SOLVED:
+        copy_vector(x, out)
 
 
 @kernel
@@ -139,17 +140,21 @@ def _difference(
     _HELD times by loops and gears alone.
 
     v, v': after an impact, as means of the last of two steps: the first, as short as the halves, ends the impact where
-    part of it is left, before contacts that it pressed open again; in the other one the ground has acted. Without an
-    impact these do not count: they are as different as the gap of a contact is, over the length of the step.
+    part of it is left, before contacts that it pressed open again; in the other one the ground has acted. Where that is
+    not solved, as an impact follows at once, they are those after the first one. Without an impact these do not count:
+    they are as different as the gap of a contact is, over the length of the step.
     t: the rest of the step, at least half a second: the time over which an error of the velocity counts.
     """
     model, data = model_view(model_at), data_view(data_at)
     nq, hits = data.theta1.shape[0], line.clock[Clock.HIT] > 0.0
     one, other, presses = line.node, line.trial, data.active_count[0] > 0
-    if hits and _settled(model_at, data_at, steps[0], line) == _SOLVED:
-        if _step_ahead(model_at, data_at, steps[1], line, line.settled[0], line.ahead, False) == _SOLVED:
-            if _step_ahead(model_at, data_at, steps[1], line, line.settled[1], line.settled[0], True) == _SOLVED:
-                one, other = line.ahead, line.settled[0]
+    if hits:
+        _settle(model_at, data_at, steps[0], line, one, 0)
+        _settle(model_at, data_at, steps[0], line, other, 1)
+        one, other = line.settled[0], line.settled[1]
+        if _step_ahead(model_at, data_at, steps[1], line, one, line.ahead, False) == _SOLVED:
+            if _step_ahead(model_at, data_at, steps[1], line, other, line.node, True) == _SOLVED:
+                one, other = line.ahead, line.node
     configuration_difference(model, line.whole[:nq], line.mean[:nq], embedded.distance)
     noise = NOISE if model.contact_body.shape[0] + model.limit_dof.shape[0] > 0 else CLOSED
     error, time = 0.0, max(goal[AccuracyGoal.END] - line.clock[Clock.TIME], 0.5) if hits else 0.0
