@@ -7,7 +7,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
-from sim.io.mjcf import MjcfWarning, load_mjcf
+from sim.io.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
 from sim.simulator.simulator import Simulator
 
 pytest.importorskip("mujoco")
@@ -62,6 +62,50 @@ def test_omitted_elements_are_reported() -> None:
         rubbing = load_mjcf(text, joint_friction=True)
     assert [float(np.max(joint.friction)) for joint in rubbing.joints] == [0.0, 1.0, 0.0]
     assert "dry" not in str(rubbing.report)
+
+
+ARM = """<mujoco><compiler angle="radian"/><option><flag {}/></option><worldbody><geom name="floor" type="plane" size="1 1 1"/>
+  <body pos="0 0 1"><joint name="j" axis="0 1 0" range="-1 1" limited="true" damping="3" stiffness="2" {}/>
+    <geom size=".1" pos="0 0 .3"/></body></worldbody>
+  <actuator><motor name="m" joint="j" ctrlrange="-100 100" group="2"/>{}</actuator></mujoco>"""
+
+
+def test_flags_of_the_file_are_heeded() -> None:
+    def load(*flags: str) -> MjcfMechanism:
+        return load_mjcf(ARM.format(" ".join(f'{flag}="disable"' for flag in flags), "", ""))
+
+    for flag, field, before in (("limit", "limits", (-1.0, 1.0)), ("damper", "damper", 3.0), ("spring", "spring", 2.0)):
+        assert getattr(load().joints[0], field) == (before,)
+        mech = load(flag)
+        assert getattr(mech.joints[0], field)[0] in (0.0, (-np.inf, np.inf)), flag
+        assert f"that disable these: {flag}" in str(mech.report)
+    assert load("constraint").joints[0].limits == load("limit").joints[0].limits
+    assert load("gravity").gravity == (0.0, 0.0, 0.0) != load().gravity
+    assert not load("contact").contacts and len(load().contacts) == 1
+    assert load_mjcf(ARM.format('gravity="disable"', "", ""), gravity=(0, 0, -1)).gravity == (0.0, 0.0, -1.0)
+    off = load("actuation")
+    assert not off.inputs and "switches off are omitted: m" in str(off.report)
+    grouped = ARM.replace("<option>", '<option actuatorgroupdisable="2">').format("", "", "")
+    assert not load_mjcf(grouped).inputs
+
+
+def test_ranges_of_actuator_forces_are_read() -> None:
+    ranged = 'actuatorfrcrange="-5 3"'
+    assert load_mjcf(ARM.format("", ranged, "")).input_limits == ([-5.0], [3.0])
+    servo = '<position name="s" joint="j" kp="50" forcerange="-4 20"/>'
+    with pytest.warns(MjcfWarning, match="bounds each of their actuators alone, and none at a site: j"):
+        mech = load_mjcf(ARM.format("", ranged, servo))
+    assert [part.force_limits[1] for part in mech.inputs or ()] == [np.inf, 3.0]
+    with pytest.warns(MjcfWarning, match="inputs without bounds, where those of the file leave one value: m \\(3\\)"):
+        load_mjcf(ARM.replace("-100 100", "4 100").format("", ranged, ""))
+
+
+def test_free_joints_have_the_armature_of_their_translations() -> None:
+    text = '<mujoco><worldbody><body><joint name="j" type="free" {}/><geom size=".1"/></body></worldbody></mujoco>'
+    with pytest.warns(MjcfWarning, match="armature of the rotations of free joints is omitted: j"):
+        assert load_mjcf(text.format('armature="2"')).joints[0].armature == (2.0, 2.0, 2.0, 0.0, 0.0, 0.0)
+    with pytest.warns(MjcfWarning, match="springs of free joints are omitted: j"):
+        load_mjcf(text.format('stiffness="50"'))
 
 
 HELD = """

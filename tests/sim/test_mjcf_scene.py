@@ -69,9 +69,35 @@ def test_geoms_meet_where_mujoco_lets_them() -> None:
     assert (pairs["table-ball"].law, pairs["cube-ball"].law) == ("nonlinear", "nonlinear")  # condim: the larger
     assert not quietly(TABLE).collisions
     notes = "\n".join(str(note) for note in (quietly(TABLE).report or mech.report).notes)  # type: ignore[union-attr]
-    for words in ("explicit contact pairs are omitted: pair_0", "no obstacles (collisions=True makes them): table"):
+    for words in ("omitted (collisions=True has them): pair_0", "no obstacles (collisions=True makes them): table"):
         assert words in notes
-    assert not any(words in str(mech.report) for words in ("pairs are omitted", "no obstacles", "do not collide"))
+    assert not any(words in str(mech.report) for words in ("contact pairs", "no obstacles", "do not collide"))
+
+
+@pytest.mark.parametrize(
+    ("geom", "given", "friction"),
+    [
+        ('contype="0" conaffinity="0"', '<pair geom1="foot" geom2="floor" friction=".3 .3 .01 .01 .01"/>', 0.3),
+        ("", '<exclude body1="world" body2="b"/>', None),
+        ("", "", 1.0),
+    ],
+)
+@pytest.mark.parametrize(
+    ("kind", "part"), [('size=".1"', "contacts"), ('type="ellipsoid" size=".1 .1 .1"', "collisions")]
+)
+def test_pairs_and_excludes_hold_for_planes(
+    geom: str, given: str, friction: float | None, kind: str, part: str
+) -> None:
+    text = f"""<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/><body name="b" pos="0 0 .05"><freejoint/>
+        <geom name="foot" {kind} {geom}/></body></worldbody><contact>{given}</contact></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == (friction is not None)
+    for collisions in (False, True, "self"):
+        mech = load_mjcf(text, collisions=collisions)
+        assert [c.friction for c in getattr(mech, part)] == [friction] * data.ncon
+        assert "contact pairs" not in str(mech.report)
 
 
 def test_a_box_lies_on_a_table_and_carries_a_ball() -> None:

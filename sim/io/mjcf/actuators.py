@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from sim.io.mjcf.flags import actuator_disabled, contacts_disabled
 from sim.io.mjcf.joints import BALL, FREE
-from sim.io.mjcf.welded_bodies import Where, name_of, pose_of
+from sim.io.mjcf.welded_bodies import PLANE, Where, name_of, pose_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
@@ -30,6 +31,9 @@ def find_inputs(
     rows: list[tuple[float, float, float]] = []
     for a in range(model.nu):
         name, j = name_of(model, "actuator", a), int(model.actuator_trnid[a, 0])
+        if actuator_disabled(model, a):
+            notes.add("actuators that the file switches off are omitted", [name])
+            continue
         wrench = _at_site(model, a, name, where)
         on_joint = int(model.actuator_trntype[a]) in (_JOINT, _JOINT_IN_PARENT)
         if wrench is None and (not on_joint or model.jnt_type[j] in (FREE, BALL)):
@@ -39,9 +43,8 @@ def find_inputs(
         if servo is not None:
             part, ratio = replace(servo, joint=homes[j][0], dof=homes[j][1], name=name), 1.0 / model.actuator_gear[a, 0]
             low, high = _ctrl_bounds(model, a, ratio)
-            if model.actuator_forcelimited[a]:
-                ends = sorted(float(x * model.actuator_gear[a, 0]) for x in model.actuator_forcerange[a])
-                part = replace(part, force_limits=(ends[0], ends[1]))
+            forces = _within(_force_range(model, a, float(model.actuator_gear[a, 0])), _joint_range(model, j))
+            part = replace(part, force_limits=forces)
             inputs.append(replace(part, limits=(low, high)) if low < high else part)
             rows.append((ratio, low, high))
             continue
@@ -55,9 +58,15 @@ def find_inputs(
         ratio = 1.0 if wrench else float(model.actuator_gear[a, 0])
         gear = ratio * (float(model.actuator_gainprm[a, 0]) if plain else 1.0)
         low, high = _bounds(model, a, gear, ratio, bool(plain))
+        if not wrench:
+            low, high = _within((low, high), _joint_range(model, j))
+        if not low < high:
+            text = "inputs without bounds, where those of the file leave one value"
+            notes.add(text, [f"{name} ({low:g})"], warn=True)
         part = wrench or Input(homes[j][0], dof=homes[j][1], name=name)
         inputs.append(replace(part, limits=(low, high)) if low < high else part)
         rows.append((gear, low, high))
+    _note_shared_ranges(model, notes)
     table = np.array(rows, dtype=np.float64).reshape(-1, 3)
     return inputs, table[:, 0], table[:, 1], table[:, 2]
 
@@ -98,11 +107,42 @@ def _at_site(model: Any, a: int, name: str, where: Where) -> Input | None:
 
 def _bounds(model: Any, a: int, gear: float, ratio: float, plain: bool) -> tuple[float, float]:
     """Bounds of an input from those of its control, and of its force times the ratio [N, N m]."""
-    low, high = _ctrl_bounds(model, a, gear) if plain else (-np.inf, np.inf)
-    if model.actuator_forcelimited[a]:
-        ends = sorted(float(ratio * x) for x in model.actuator_forcerange[a])
-        low, high = max(low, ends[0]), min(high, ends[1])
+    free = (-np.inf, np.inf)
+    return _within(_ctrl_bounds(model, a, gear) if plain else free, _force_range(model, a, ratio))
+
+
+def _force_range(model: Any, a: int, ratio: float) -> tuple[float, float]:
+    """Bounds of the force of an actuator, times the ratio."""
+    if not model.actuator_forcelimited[a]:
+        return -np.inf, np.inf
+    low, high = sorted(float(ratio * x) for x in model.actuator_forcerange[a])
     return low, high
+
+
+def _joint_range(model: Any, j: int) -> tuple[float, float]:
+    """Bounds of what all actuators together do to a joint [N, N m]."""
+    if not model.jnt_actfrclimited[j]:
+        return -np.inf, np.inf
+    low, high = (float(x) for x in model.jnt_actfrcrange[j])
+    return low, high
+
+
+def _within(bounds: tuple[float, float], outer: tuple[float, float]) -> tuple[float, float]:
+    """Bounds, each clamped to others, as MuJoCo clamps one number after the other."""
+    low, high = (float(x) for x in np.clip(bounds, *outer))
+    return low, high
+
+
+def _note_shared_ranges(model: Any, notes: Notes) -> None:
+    """A note on the joints where an actuatorfrcrange bounds a sum, which here bounds each part of it."""
+    active = [a for a in range(model.nu) if not actuator_disabled(model, a)]
+    on_joint = [a for a in active if int(model.actuator_trntype[a]) in (_JOINT, _JOINT_IN_PARENT)]
+    driven = [int(model.actuator_trnid[a, 0]) for a in on_joint]
+    limited = np.flatnonzero(model.jnt_actfrclimited).tolist()
+    several = [j for j in limited if driven.count(j) > 1 or len(on_joint) < len(active)]
+    text = "actuatorfrcrange of joints bounds each of their actuators alone, and none at a site"
+    if several:
+        notes.add(text, [name_of(model, "joint", j) for j in several], warn=True)
 
 
 def _ctrl_bounds(model: Any, a: int, gear: float) -> tuple[float, float]:
@@ -132,14 +172,17 @@ def with_friction(
     return [replace(joint, friction=forces[joint.name]) if forces[joint.name].any() else joint for joint in joints]
 
 
-def note_omitted(model: Any, collisions: bool, notes: Notes) -> None:
+def note_omitted(model: Any, collisions: bool | str, notes: Notes) -> None:
     """Notes on the elements of the file that the mechanism lacks."""
+    pairs = range(0 if contacts_disabled(model) else model.npair)
     if model.ntendon:
         forces = (model.tendon_stiffness, model.tendon_damping, model.tendon_limited, model.tendon_frictionloss)
         felt = any(np.any(field) for field in forces)
         notes.add("tendons are omitted", [name_of(model, "tendon", k) for k in range(model.ntendon)], warn=felt)
-    if model.npair and not collisions:
-        notes.add("explicit contact pairs are omitted", [name_of(model, "pair", k) for k in range(model.npair)])
+    ends = [(int(model.geom_type[model.pair_geom1[k]]), int(model.geom_type[model.pair_geom2[k]])) for k in pairs]
+    missing = [name_of(model, "pair", k) for k in pairs if PLANE not in ends[k]]
+    if missing and collisions is not True:
+        notes.add("explicit contact pairs, but for those with planes, are omitted (collisions=True has them)", missing)
     for field, feature in (("dof_dampingpoly", "nonlinear damping"), ("jnt_stiffnesspoly", "nonlinear stiffness")):
         if np.any(getattr(model, field, 0.0)):
             notes.add(f"{feature} is omitted", warn=True)
@@ -147,7 +190,7 @@ def note_omitted(model: Any, collisions: bool, notes: Notes) -> None:
         notes.add("the drag of a fluid is omitted", warn=True)
     moving = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] != 0]
     types, affinities = model.geom_contype[moving], model.geom_conaffinity[moving]
-    if collisions or not len(moving):
+    if collisions or not len(moving) or contacts_disabled(model):
         return
     if np.any(types[:, None] & affinities[None, :]):
         notes.add("bodies do not collide with one another (collisions=True lets them)")

@@ -1,9 +1,10 @@
 """Collisions from the geoms of an MJCF file: bodies with one another, and with geoms that are fixed to the world.
 
 Two geoms meet where MuJoCo lets them: contype and conaffinity fit, they move relative to one another, neither body is
-the parent of the other (but the world), the file does not <exclude> their bodies; or a <pair> names them. Friction is
-the larger of both, or that of the geom with priority, or of the <pair>; condim 1 is without. Planes are left to
-sim/io/mjcf/contacts.py, but for geoms that have no balls or points to stand on: those collide with a half-space.
+the parent of the other (but the world, or where a flag allows it), the file does not <exclude> their bodies; or a
+<pair> names them. Friction is the larger of both, or that of the geom with priority, or of the <pair>; condim 1 is
+without. Planes are left to sim/io/mjcf/contacts.py, but for geoms that have no balls or points to stand on: those
+collide with a half-space.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from itertools import combinations
 from typing import Any
 
 from sim.io.loader_choices import LoaderChoices
-from sim.io.mjcf.contacts import STANDING, fixed_planes, label_on, meet, mixed, plane_pose
+from sim.io.mjcf.contacts import STANDING, excluded, fixed_planes, label_on, listed, meet, mixed, plane_pose, rubbing
+from sim.io.mjcf.flags import contacts_disabled, parents_apart
 from sim.io.mjcf.welded_bodies import NO_SHAPE, PLANE, GeomGroup, Where, name_of, solid_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.collision import Collision
@@ -49,13 +51,12 @@ def find_on_planes(model: Any, where: Where, choices: LoaderChoices) -> list[Col
         group, solid = _owner(model, where, g), _solid(model, where, g)
         if group is None or solid is None or int(model.geom_type[g]) in STANDING:
             continue
-        touched = [p for p in planes if meet(model, g, p)]
-        for p in touched:
+        rough = {p: rubbed for p in planes if (rubbed := rubbing(model, g, p))}
+        for p, (friction, slippery) in rough.items():
             plane = plane_pose(model, p)
-            friction, slippery = mixed(model, g, p)
             ground = HalfSpace(center=plane.point, orientation=plane.quaternion)
             mu = friction if chosen is None else chosen
-            name = label_on(model, g, p, touched)
+            name = label_on(model, g, p, list(rough))
             out.append(
                 Collision(group.name, None, solid, ground, friction=mu, law="impact" if slippery else law, name=name)
             )
@@ -64,15 +65,17 @@ def find_on_planes(model: Any, where: Where, choices: LoaderChoices) -> list[Col
 
 def _pairs(model: Any, where: Where) -> Iterator[tuple[int, int, tuple[float, bool]]]:
     """Geoms a < b that may meet, planes aside, and their (friction, whether there is none)."""
-    listed = {tuple(sorted((int(model.pair_geom1[k]), int(model.pair_geom2[k])))): k for k in range(model.npair)}
+    if contacts_disabled(model):
+        return
+    named, apart = listed(model), parents_apart(model)
     for a, b in combinations(range(model.ngeom), 2):
         owners = _owner(model, where, a), _owner(model, where, b)
         if owners[0] is owners[1] or PLANE in (model.geom_type[a], model.geom_type[b]):
             continue
-        if (a, b) in listed:
-            k = listed[a, b]
+        if (a, b) in named:
+            k = named[a, b]
             yield a, b, (float(model.pair_friction[k, 0]), int(model.pair_dim[k]) == 1)
-        elif meet(model, a, b) and not _related(*owners) and not _excluded(model, a, b):
+        elif meet(model, a, b) and not (apart and _related(*owners)) and not excluded(model, a, b):
             yield a, b, mixed(model, a, b)
 
 
@@ -84,13 +87,6 @@ def _owner(model: Any, where: Where, g: int) -> GeomGroup | None:
 def _related(a: GeomGroup | None, b: GeomGroup | None) -> bool:
     """Whether one hangs on the other; everything may meet the world."""
     return a is not None and b is not None and (a.parent is b or b.parent is a)
-
-
-def _excluded(model: Any, a: int, b: int) -> bool:
-    """Whether the file excludes the bodies of two geoms."""
-    first, second = sorted((int(model.geom_bodyid[a]), int(model.geom_bodyid[b])))
-    signature = (first << 16) + second
-    return bool((model.exclude_signature == signature).any())
 
 
 def _solid(model: Any, where: Where, g: int) -> Solid | None:

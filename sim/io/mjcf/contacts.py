@@ -7,8 +7,9 @@
     mesh        the corners of its convex hull, reduced to 32 at most
     ellipsoid   none: the point that touches moves over it; a collision with a half-space (collisions.py)
 
-A plane counts where it is fixed to the world; a geom touches it if MuJoCo's contype and conaffinity allow it. Friction
-is the larger of both, or that of the geom with priority; condim 1 is without.
+A plane counts where it is fixed to the world; a geom touches it if MuJoCo's contype and conaffinity allow it and no
+<exclude> names both bodies, or if a <pair> names both geoms. Friction is the larger of both, or that of the geom with
+priority, or of the <pair>; condim 1 is without.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from sim.io.loader_choices import LoaderChoices
+from sim.io.mjcf.flags import contacts_disabled
 from sim.io.mjcf.welded_bodies import (
     BOX,
     CAPSULE,
@@ -56,7 +58,7 @@ def find_contacts(model: Any, where: Where, choices: LoaderChoices, collisions: 
             if solid and not collisions:
                 notes.add(f"geoms fixed to the world other than planes {_UNLESS}", [name_of(model, "geom", g)])
             continue
-        touched = [p for p in planes if meet(model, g, p)]
+        touched = [p for p in planes if rubbing(model, g, p)]
         if not touched:
             continue
         kind = int(model.geom_type[g])
@@ -111,6 +113,28 @@ def meet(model: Any, a: int, b: int) -> bool:
     return bool(ab | (model.geom_contype[b] & model.geom_conaffinity[a]))
 
 
+def listed(model: Any) -> dict[tuple[int, int], int]:
+    """The number of every <pair> by its geoms, the lower one first."""
+    return {tuple(sorted((int(model.pair_geom1[k]), int(model.pair_geom2[k])))): k for k in range(model.npair)}
+
+
+def excluded(model: Any, a: int, b: int) -> bool:
+    """Whether the file excludes the bodies of two geoms."""
+    first, second = sorted((int(model.geom_bodyid[a]), int(model.geom_bodyid[b])))
+    signature = (first << 16) + second
+    return bool((model.exclude_signature == signature).any())
+
+
+def rubbing(model: Any, a: int, b: int) -> tuple[float, bool] | None:
+    """(friction, whether there is none) of two geoms that may touch, wherever their bodies are; None of others."""
+    if contacts_disabled(model):
+        return None
+    pair = listed(model).get((min(a, b), max(a, b)))
+    if pair is not None:
+        return float(model.pair_friction[pair, 0]), int(model.pair_dim[pair]) == 1
+    return mixed(model, a, b) if meet(model, a, b) and not excluded(model, a, b) else None
+
+
 def mixed(model: Any, a: int, b: int) -> tuple[float, bool]:
     """(friction, whether there is none) of two geoms: the larger ones, or those of the geom with priority."""
     own, other = int(model.geom_priority[a]), int(model.geom_priority[b])
@@ -126,7 +150,9 @@ def _contact(
     chosen, law = choices.friction, choices.law
     plane = plane_pose(model, p)
     normal = plane.rotation[:, 2]
-    friction, slippery = mixed(model, g, p)
+    rubbed = rubbing(model, g, p)
+    assert rubbed is not None
+    friction, slippery = rubbed
     return Contact(
         group.name,
         ball[0] - group.com,

@@ -103,7 +103,15 @@ def _joint(model: Any, run: list[int], parent: str, child: str, frame: Pose, com
     name = child if len(run) > 1 else name_of(model, "joint", run[0])
     if kind == "floating":
         j = run[0]
-        return Joint(kind, parent, child, name, child_point=-com, damper=_dofs(model, "dof_damping", j, 6))
+        armature = _dofs(model, "dof_armature", j, 6)
+        if model.jnt_stiffness[j]:
+            notes.add("springs of free joints are omitted", [name_of(model, "joint", j)], warn=True)
+        if armature[3:].any():
+            text = "armature of the rotations of free joints is omitted"
+            notes.add(text, [name_of(model, "joint", j)], warn=True)
+            armature[3:] = 0.0
+        damper = _dofs(model, "dof_damping", j, 6)
+        return Joint(kind, parent, child, name, child_point=-com, damper=damper, armature=armature)
     last = run[-1]
     slides = [j for j in run if model.jnt_type[j] == SLIDE]
     anchor = np.array(model.jnt_pos[last]) if model.jnt_type[last] != SLIDE else np.zeros(3)

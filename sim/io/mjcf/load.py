@@ -17,6 +17,7 @@ from sim.io.mjcf.actuators import find_inputs, note_omitted, with_friction
 from sim.io.mjcf.collisions import find_collisions, find_on_planes
 from sim.io.mjcf.contacts import find_contacts
 from sim.io.mjcf.equalities import find_gears, find_loops
+from sim.io.mjcf.flags import heed_flags
 from sim.io.mjcf.joints import BALL, FREE, carry
 from sim.io.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
 from sim.io.mjcf.welded_bodies import GeomGroup, body_shapes, find_groups
@@ -58,7 +59,7 @@ def load_mjcf(
             them: its spheres, capsules, boxes, cylinders, ellipsoids and meshes, each the convex hull of 32
             corners at most (sim/io/mjcf/collisions.py). "self" lets all bodies collide with one another but those that
             a joint connects; `report` lists pairs of shapes that overlap in the neutral state, which do not.
-        gravity: (3,) acceleration of gravity [m/s^2]; None: that of the file.
+        gravity: (3,) acceleration of gravity [m/s^2]; None: that of the file, none where a <flag> disables it.
         joint_friction: whether hinges and slides have the dry friction (frictionloss) of the file, see
             `Joint.friction`. Steps of a higher order or of a given accuracy are for joints without it.
 
@@ -73,6 +74,8 @@ def load_mjcf(
     """
     model, file = _compile(source)
     with _named(file):
+        notes = Notes()
+        heed_flags(model, notes)
         choices = loader_choices(
             "load_mjcf",
             ground=ground,
@@ -83,13 +86,12 @@ def load_mjcf(
             gravity=model.opt.gravity if gravity is None else gravity,
             collisions=None if isinstance(collisions, bool) else collisions,
         )
-        notes = Notes()
         groups, where = find_groups(model)
         bodies, joints, homes = _tree(model, groups, merge, notes)
         if not joints:
             raise ValueError(f"load_mjcf: {file}: no joint is free to move")
         inputs, gear, low, high = find_inputs(model, homes, where, notes)
-        note_omitted(model, bool(collisions), notes)
+        note_omitted(model, collisions, notes)
         mech = MjcfMechanism(
             bodies,
             [*with_friction(model, joints, homes, choices.joint_friction, notes), *find_loops(model, where, notes)],
