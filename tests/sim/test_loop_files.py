@@ -52,6 +52,19 @@ def test_a_loop_joint_agrees_with_the_mechanism_by_hand(tmp_path: Path, damping:
         np.testing.assert_allclose(ta.x[:, a.mechanism.q_slice(name)], tb.x[:, b.mechanism.q_slice(name)], atol=1e-9)
 
 
+def test_a_loop_joint_has_its_dry_friction_where_it_is_wanted(tmp_path: Path) -> None:
+    path = write(tmp_path, *PARTS, PIN.format('<dynamics friction="2"/>'))
+    plain, rough = (dojo.load_urdf(path, floating=False, neutral=NEUTRAL, joint_friction=on) for on in (False, True))
+    assert "dry friction of the file, which joint_friction=True adds to hinges: pin" in str(plain.report)
+    assert "dry friction" not in str(rough.report)
+    by_hand = fourbar("pin", friction=2.0)
+    assert [(j.name, j.friction) for j in rough.joints] == [(j.name, j.friction) for j in by_hand.joints]
+    assert ("pin", (2.0,)) in [(j.name, j.friction) for j in rough.joints]
+    below = write(tmp_path, *PARTS, PIN.format('<dynamics friction="-2"/>'))
+    with pytest.warns(dojo.UrdfWarning, match="friction is negative in the file have none: pin"):
+        assert dojo.load_urdf(below, floating=False, neutral=NEUTRAL, joint_friction=True).nv == 3
+
+
 def test_the_frames_of_both_links_are_read(tmp_path: Path) -> None:
     """The same pin with its axis along z of turned frames; one of them merged into its body through a fixed joint."""
     turned = PIN.replace('xyz="1 0 0"', 'xyz="0 0 0" rpy="-1.5707963267948966 0 0"').replace("coupler", "tip")

@@ -95,7 +95,31 @@ def test_fitted_primitives_agree_with_the_mesh() -> None:
     np.testing.assert_allclose(np.linalg.det(found.pose.rotation), 1.0)
 
 
+@pytest.mark.parametrize(
+    "points", [[(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 0), (2, 0)]]
+)
+def test_flat_meshes_have_fitted_primitives(points: list[tuple[float, float]]) -> None:
+    flat = np.array([(x, y, 0.5) for x, y in points], dtype=np.float64)
+    thin = np.minimum(np.ptp(flat, axis=0), 1.0) > 0.0
+    box = fit("box", flat)
+    assert min(box.sizes) == pytest.approx(2e-3) and max(box.sizes) > 0.9
+    assert (np.abs((flat - box.pose.point) @ box.pose.rotation) <= 0.5 * np.array(box.sizes) + 1e-9).all()
+    assert thin.sum() == sum(size > 0.1 for size in box.sizes)
+    rod, ball = fit("capsule", flat), fit("sphere", flat)
+    assert sum(rod.sizes) > 0.9 and ball.sizes[0] > 0.1 and ball.error > 0.0
+
+
 # -- paths -------------------------------------------------------------------------------------------------------------
+
+
+def test_folders_of_meshes_may_be_below_the_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "ws/kit").mkdir(parents=True)
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "ws/kit/foot.stl")
+    (tmp_path / "robot").mkdir()
+    foot = collision('<mesh filename="package://kit/foot.stl"/>')
+    path = write(tmp_path / "robot", link("foot", inertial(), foot))
+    assert len(dojo.load_urdf(path, mesh_dirs=["~/ws"]).contacts) == 8
 
 
 def test_names_are_resolved_as_ros_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

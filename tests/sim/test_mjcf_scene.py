@@ -100,6 +100,15 @@ def test_pairs_and_excludes_hold_for_planes(
         assert "contact pairs" not in str(mech.report)
 
 
+def test_chosen_friction_is_that_of_self_collisions_but_for_slippery_geoms() -> None:
+    text = "<mujoco><worldbody>{}</worldbody></mujoco>"
+    body = '<body name="{}" pos="0 0 {}"><freejoint/><geom size=".1" condim="{}"/></body>'
+    for condim, friction in ((3, 0.25), (1, 0.0)):
+        bodies = [body.format(name, height, condim) for height, name in enumerate("ab", 1)]
+        mech = load_mjcf(text.format("".join(bodies)), collisions="self", friction=0.25, law="linear")
+        assert [(c.friction, c.law) for c in mech.collisions] == [(friction, "linear")]
+
+
 def test_a_box_lies_on_a_table_and_carries_a_ball() -> None:
     sim = Simulator(quietly(TABLE, collisions=True), time_step=0.01)
     t = sim.rollout(sim.neutral(), np.zeros((100, sim.nu)), throw=True)

@@ -152,6 +152,19 @@ def test_friction_is_the_callers_or_the_files_or_the_usual_one(tmp_path: Path) -
     assert one(tmp_path, collision(SPHERE), law="linear").contacts[0].law == "linear"
 
 
+def test_friction_and_law_are_those_of_self_collisions_too(tmp_path: Path) -> None:
+    names = ("a", "b", "c")
+    slick = '<contact><lateral_friction value="0.2"/></contact>'
+    parts = [link(name, inertial(), collision(SPHERE), slick if name == "a" else "") for name in names]
+    chain = [joint(f"j{name}", *ends, at='xyz="0 0 1"') for name, ends in (("b", "ab"), ("c", "bc"))]
+    path = write(tmp_path, *parts, *chain)
+    pairs = [
+        dojo.load_urdf(path, collisions="self", **given).collisions[0]  # type: ignore[arg-type]
+        for given in ({}, {"friction": 0.1, "law": "linear", "restitution": 0.3})
+    ]
+    assert [(c.friction, c.law, c.restitution) for c in pairs] == [(0.2, "nonlinear", 0.0), (0.1, "linear", 0.3)]
+
+
 def test_restitution_is_that_of_the_file_where_the_caller_asks_for_it(tmp_path: Path) -> None:
     """Not by default: physics engines multiply it with that of their ground, which is zero."""
     rubber = '<contact><lateral_friction value="0.7"/><restitution value="0.5"/></contact>'

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.io.meshes.reduced_hull import reduced_hull
+from sim.io.meshes.reduced_hull import reduced_hull, with_volume
 from sim.mechanism.pose import Pose
 from solvers.types import Floats
 
@@ -24,10 +24,12 @@ def fit(kind: str, points: Floats) -> Fitted:
     """The primitive of that kind for the convex hull of points (n, 3) [m].
 
     sphere: of least squares over the surface of the hull. box: the smallest one around the hull that has a side in one
-    of the facets of the reduced hull. capsule: along the longest side of that box, around the hull.
+    of the facets of the reduced hull. capsule: along the longest side of that box, around the hull. Points in one
+    plane, or on one line, have the thickness of their reduced hull.
     """
     from scipy.spatial import ConvexHull
 
+    points = with_volume(points)
     hull = ConvexHull(points)
     corners = points[hull.vertices]
     if kind == "sphere":

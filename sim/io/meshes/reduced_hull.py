@@ -31,7 +31,7 @@ def _reduced(data: bytes, corners: int) -> tuple[Floats, float]:
     from scipy.spatial import ConvexHull
 
     points = np.frombuffer(data).reshape(-1, 3)
-    spread = _with_volume(points)
+    spread = with_volume(points)
     full = spread[ConvexHull(spread).vertices]
     if len(full) <= corners:
         return full, 0.0
@@ -59,7 +59,7 @@ def _extremes(full: Floats) -> list[int]:
     return chosen
 
 
-def _with_volume(points: Floats) -> Floats:
+def with_volume(points: Floats) -> Floats:
     """The points; where they lie in a plane or on a line, twice, THIN to either side of it."""
     center = points.mean(axis=0)
     sizes, axes = np.linalg.svd(points - center, full_matrices=False)[1:]

@@ -115,7 +115,8 @@ def meet(model: Any, a: int, b: int) -> bool:
 
 def listed(model: Any) -> dict[tuple[int, int], int]:
     """The number of every <pair> by its geoms, the lower one first."""
-    return {tuple(sorted((int(model.pair_geom1[k]), int(model.pair_geom2[k])))): k for k in range(model.npair)}
+    ends = [(int(model.pair_geom1[k]), int(model.pair_geom2[k])) for k in range(model.npair)]
+    return {(min(pair), max(pair)): k for k, pair in enumerate(ends)}
 
 
 def excluded(model: Any, a: int, b: int) -> bool:

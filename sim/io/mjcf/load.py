@@ -48,8 +48,8 @@ def load_mjcf(
     Args:
         source: path of the file, or its text, which begins with "<".
         ground: whether geoms cannot enter the planes of the file.
-        friction: coefficient of friction of all contacts; None: that of the geoms.
-        law: law of contacts with friction, see `dojo.Contact`; geoms with condim 1 are without.
+        friction: coefficient of friction of all contacts and collisions; None: that of the geoms.
+        law: law of contacts and collisions with friction, see `dojo.Contact`; geoms with condim 1 are without.
         merge: whether slides and a hinge in a row become one joint if there is a kind for it, with the same
             coordinates. All other joints in a row are a chain with massless bodies between them.
         keyframe: number of the keyframe whose qpos is the neutral state; None: the default one, with joints outside
@@ -108,7 +108,7 @@ def load_mjcf(
         )
         mech = _without_constant_gaps(mech, notes)
         mech = _clear(mech) if keyframe is None else mech
-        mech = with_self_collisions(mech, notes) if choices.itself else mech
+        mech = with_self_collisions(mech, choices, notes, slippery=True) if choices.itself else mech
         known = {model.joint(j).name or f"joint_{j}": home for j, home in homes.items()}
         report = MjcfReport(file, notes.close(), _frames(model, where), known, gear, low, high)
         _warn(report)

@@ -85,8 +85,8 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
     if len(bases) == 1 and bases[0] not in choices.neutral:
         mech = replace(mech, neutral=lifted(mech, bases[0]))
     _ground_notes(mech, choices, bool(bases), notes)
-    _friction_notes(groups, choices, notes)
-    mech = with_self_collisions(mech, notes) if choices.shared.itself else mech
+    _friction_notes([body.joint for body in groups if body.joint and not body.fixed], loops, choices, notes)
+    mech = with_self_collisions(mech, choices.shared, notes) if choices.shared.itself else mech
     report = _report(given, mech, places, coms, choices.file, notes)
     for note in report.notes:
         if note.warn:
@@ -228,14 +228,14 @@ def _joint(
         axis=joint.axis,
         orientation=frame.quaternion,
         damper=0.0 if body.fixed else joint.damping,
-        friction=max(joint.friction, 0.0) if choices.shared.joint_friction and _may_rub(body, joint) else 0.0,
+        friction=joint.friction if choices.shared.joint_friction and not body.fixed and _may_rub(joint) else 0.0,
         limits=None if body.fixed else joint.limits,
     )
 
 
-def _may_rub(body: MergedLinks, joint: UrdfJoint) -> bool:
+def _may_rub(joint: UrdfJoint) -> bool:
     """Whether a joint has coordinates that dry friction can hold."""
-    return not body.fixed and KINDS[joint.kind][1] < 3
+    return KINDS[joint.kind][1] < 3
 
 
 def _body(body: MergedLinks, part: RigidInertia) -> Body:
@@ -258,8 +258,12 @@ def _closing(
     notes: Notes,
 ) -> list[Joint]:
     """The joints that close loops."""
-    found = [closing_joint(loop, places, coms, zero, choices.position, notes) for loop in loops.values()]
-    return [joint for joint in found if joint is not None]
+    found = {name: closing_joint(loop, places, coms, zero, choices.position, notes) for name, loop in loops.items()}
+    kept = {name: joint for name, joint in found.items() if joint is not None}
+    if choices.shared.joint_friction:
+        forces = {name: loops[name].joint.friction for name in kept if _may_rub(loops[name].joint)}
+        kept |= {name: replace(kept[name], friction=force) for name, force in forces.items()}
+    return list(kept.values())
 
 
 def _inputs(joints: list[Joint], closing: list[Joint], given: Mapping[str, UrdfJoint], choices: Choices) -> list[Input]:
@@ -299,12 +303,12 @@ def _ground_notes(mech: UrdfMechanism, choices: Choices, floating: bool, notes: 
             notes.add("contacts that are below the ground in the neutral state; see position, neutral", low, warn=True)
 
 
-def _friction_notes(groups: list[MergedLinks], choices: Choices, notes: Notes) -> None:
+def _friction_notes(joints: list[UrdfJoint], loops: Mapping[str, UrdfLoop], choices: Choices, notes: Notes) -> None:
     """A note on the dry friction of the file that the joints do not have."""
     rough = [
-        body.joint.name
-        for body in groups
-        if body.joint and body.joint.friction and not (choices.shared.joint_friction and _may_rub(body, body.joint))
+        joint.name
+        for joint in (*joints, *(loop.joint for loop in loops.values()))
+        if joint.friction and not (choices.shared.joint_friction and _may_rub(joint))
     ]
     if rough:
         notes.add("joints move without the dry friction of the file, which joint_friction=True adds to hinges", rough)

@@ -58,12 +58,14 @@ def load_urdf(
             "floating_base": its coordinates are the position of the root's frame and its quaternion, its speeds that of
             the frame's origin (world) and of rotation (body).
         ground: whether collision shapes cannot enter the half-space z < 0.
-        friction: coefficient of friction of all contacts; None: <lateral_friction> of the link if the file has it, else
-            0.8.
+        friction: coefficient of friction of all contacts, but for a dojo.Contact of the caller, and of self-collisions;
+            None: <lateral_friction> of the link if the file has it, else 0.8; of self-collisions the larger one of both
+            links, 0.5 where neither has one.
         contacts: names of the links that touch the ground, or dojo.Contact(link, point, radius), with the point in the
             frame of the link, in place of the link's shapes; "*" among them: all other links, by their shapes. None:
             all that have a sphere, box (8 corners), capsule (2 balls), cylinder (points on both rims; 2 balls for a
-            wheel, a cylinder that turns about its own axis) or mesh.
+            wheel, a cylinder that turns about its own axis) or mesh. A dojo.Contact keeps its own friction,
+            restitution and law.
         merge_fixed: whether links on fixed joints become one body; a link without mass always does.
         position: (3,) place of the root's frame, if it is fixed [m].
         neutral: coordinates of the neutral state by joint [rad, m]; others are at zero, or in the middle of their range
@@ -75,9 +77,9 @@ def load_urdf(
         actuated: names of the joints with an input, in the order of u; None: all that move, but for floating ones.
         joint_friction: whether joints have the dry friction that the file gives them, see `Joint.friction`. Steps of a
             higher order or of a given accuracy are for joints without it.
-        restitution: coefficient of restitution of all contacts and shapes; None: <restitution> of the link if the file
-            has it, else 0.
-        law: law of contacts with friction, see `dojo.Contact`.
+        restitution: coefficient of restitution of all shapes and their contacts; None: <restitution> of the link if
+            the file has it, else 0.
+        law: law of contacts of shapes and of self-collisions, see `dojo.Contact`.
         rim_points: number of points per rim of a cylinder.
         collisions: "self" lets all links collide but those that a joint connects; `report` lists pairs of shapes that
             overlap in the neutral state, which do not. None: the robot does not touch itself.
@@ -105,7 +107,9 @@ def load_urdf(
     file, notes = checks.path("load_urdf(path)", path), Notes()
     root = parse(file)
     robot = read_robot(root, notes)
-    folders = [Path(folder) for folder in ([mesh_dirs] if isinstance(mesh_dirs, str | Path) else mesh_dirs)]
+    folders = [
+        Path(folder).expanduser() for folder in ([mesh_dirs] if isinstance(mesh_dirs, str | Path) else mesh_dirs)
+    ]
     choice = mesh_choices(meshes, robot.links), whole_number("load_urdf(mesh_corners=...)", mesh_corners, 4)
     robot = _bouncing(robot, restitution, notes)
     every = contacts is None or ALL in as_list(contacts)

@@ -4,7 +4,7 @@
       <link1 link="coupler" xyz="0.5 0 0" rpy="0 0 0"/>      the joint frame in the parent
       <link2 link="rocker"  xyz="0.4 0 0" rpy="0 0 0"/>      and in the child
       <axis xyz="0 1 0"/>                                    in the joint frame
-      <dynamics damping="0.1"/> <limit lower="-1" upper="1"/>
+      <dynamics damping="0.1" friction="0.2"/> <limit lower="-1" upper="1"/>
     </loop_joint>
 
 Every type of a <joint> (sim/io/urdf/robot.py) can close a loop; a floating one needs damping, as of a bushing.

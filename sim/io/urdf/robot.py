@@ -249,6 +249,8 @@ def read_joint(element: Element, ends: tuple[str, str], pose: Pose, notes: Notes
     if dynamics and damping < 0.0:
         raise dynamics.error(f"expected damping >= 0, got {damping:g}")
     friction = dynamics.number("friction", 0.0) if dynamics else 0.0
+    if friction < 0.0:
+        notes.add("joints whose dry friction is negative in the file have none", [name], warn=True)
     bounds = [
         limit.number(field, np.inf) if limit and field in limit.attributes else np.inf
         for field in ("effort", "velocity")
@@ -267,7 +269,7 @@ def read_joint(element: Element, ends: tuple[str, str], pose: Pose, notes: Notes
         axis,
         _limits(name, given, limit, notes),
         damping,
-        friction,
+        max(friction, 0.0),
         bounds[0],
         bounds[1],
         element,
