@@ -224,7 +224,8 @@ def jump(
         height: rise of the base over its first height [m], above 0, at most 1,000 times the crouch.
         crouch: drop of the base before the push [m], above 0.
         clearance: distance by which the feet are drawn in during the flight [m].
-        before: time in which the base sinks [s], above 0.
+        before: time in which the base sinks [s], above 0. It, `after`, the push and the flight are rounded to whole
+            time steps, one at least.
         after: time in which the base comes to rest [s], above 0.
 
     Returns:

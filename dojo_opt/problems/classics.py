@@ -64,7 +64,7 @@ def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.
         ],
         constraints=[Goal(goal, components=np.arange(sim.nv))],
         substeps=substeps,
-        controls0=np.array([0.0, 0.0, 9.81 * mass]),
+        controls0=np.array([0.0, 0.0, -mass * np.asarray(sim.mechanism.gravity)[2]]),
     )
 
 

@@ -28,7 +28,6 @@ _STILL = 0.1  # [s] at the end, in which the base stands
 _RAISED = 0.3  # of the crouch that the push rises beyond the stance
 _LEAD = 0.3  # [rad] of the turn at take-off
 _ATTITUDE, _ANGLE = 10.0, 0.05  # weights of squares per second
-_GRAVITY = 9.81  # [m/s^2]
 
 
 @checked_numbers("problems")
@@ -76,12 +75,13 @@ def backflip(
     step = checks.number(f"{call}(time_step=...)", time_step, above=0.0)
     refinement = whole_number(f"{call}(refinement=...)", refinement)
     sim = Simulator(models.quadruped(damper=damping, **model), time_step=step, kappa=PLANNED)
+    flight = _flight(height, sim)
     start, _ = equilibrium(sim)
     still, torques = standing(sim)
-    horizon = round(min((_CROUCHED + _PUSH + _flight(height) + _LANDED) / step, 1e300))
+    horizon = round(min((_CROUCHED + _PUSH + flight + _LANDED) / step, 1e300))
     check_room(f"{call}(height=..., time_step=...)", horizon, 8.0 * sim.nx, "flip lower, or with longer knots", "knots")
     still_knots = np.arange(max(1, horizon - round(min(_STILL / step, 1e300))), horizon + 1)
-    poses = _poses(start, np.linspace(0.0, step * horizon, horizon + 1), distance, height, crouch)
+    poses = _poses(start, np.linspace(0.0, step * horizon, horizon + 1), flight, distance, height, crouch)
     states = np.tile(still, (horizon + 1, 1))
     states[:, BaseState.POSE] = poses[:, BaseState.POSE]
     states[:, 2] += still[2] - start[2]
@@ -100,15 +100,18 @@ def backflip(
     )
 
 
-def _flight(height: float) -> float:
+def _flight(height: float, sim: Simulator) -> float:
     """Time on a parabola of a height [s]."""
-    return float(2.0 * np.sqrt(2.0 * height / _GRAVITY))
+    gravity = float(np.linalg.norm(sim.mechanism.gravity))
+    if gravity == 0.0:
+        raise ValueError("problems.backflip(gravity=...): without gravity the robot never comes down")
+    return float(2.0 * np.sqrt(2.0 * height / gravity))
 
 
-def _poses(start: Floats, time: Floats, distance: float, height: float, crouch: float) -> Floats:
+def _poses(start: Floats, time: Floats, flight: float, distance: float, height: float, crouch: float) -> Floats:
     """States (N + 1, nx) of the cost at times (N + 1,), with the legs as at the start (nx,)."""
     push = np.clip((time - _CROUCHED) / _PUSH, 0.0, 1.0)
-    air = np.clip((time - _CROUCHED - _PUSH) / _flight(height), 0.0, 1.0)
+    air = np.clip((time - _CROUCHED - _PUSH) / flight, 0.0, 1.0)
     poses = np.tile(start, (len(time), 1))
     poses[:, 0] += distance * air
     rise = np.where(air > 0.0, 4.0 * height * air * (1.0 - air), crouch * ((1.0 + _RAISED) * push - 1.0))

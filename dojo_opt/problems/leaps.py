@@ -14,6 +14,7 @@ from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from dojo_opt.problems.locomotion import EFFORT, TORQUE_LIMIT, standing, weights
+from dojo_opt.problems.whole_knots import whole_knots
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.memory_limit import check_room
@@ -40,9 +41,9 @@ def leap(
     As in `hop`, the cost has a few reference poses: for a fifth of `duration` the standing pose lowered by `crouch`,
     for two fifths the pose half-way to the goal, raised by `height`, then the pose at the goal. Squares of place weigh
     1, 1, 20, attitude 2, angles .05 per second, the rest as in `follow`. The pose of the base at the end is a
-    constraint. The guess is a robot that stands still at the smoothing of the planner's first stage: states and
-    torques. Torques alone are no good guess: under them the robot falls on its back, and plans that begin there may
-    stay there.
+    constraint. The guess is a robot that stands still at the smoothing of the planner's first stage, or of the first at
+    which it stands: states and torques. Torques alone are no good guess: under them the robot falls on its back, and
+    plans that begin there may stay there.
 
     Legs that push from the standing pose reach their torque limits below .27 m. Hence the crouch, which the planner
     does not find from a goal above. Most leaps planned with steps of 20 ms stumble at their landing in shorter steps;
@@ -52,7 +53,7 @@ def leap(
     Args:
         distance: displacement along x [m].
         height: rise of the base [m].
-        duration: duration of the motion [s].
+        duration: duration of the motion, rounded to whole knots, five at least [s].
         crouch: drop of the base before the leap [m], at least 0.
         damping: damper of the joints [N m s/rad].
         time_step: length of a knot [s].
@@ -70,15 +71,14 @@ def leap(
     call = "problems.leap"
     distance = checks.number(f"{call}(distance=...)", distance)
     height = checks.number(f"{call}(height=...)", height)
-    duration = checks.number(f"{call}(duration=...)", duration, above=0.0)
     crouch = checks.number(f"{call}(crouch=...)", crouch, at_least=0.0)
     step = checks.number(f"{call}(time_step=...)", time_step, above=0.0)
+    horizon = whole_knots(f"{call}(duration=...)", duration, step, 5)
     refinement = whole_number(f"{call}(refinement=...)", refinement)
     sim = Simulator(models.quadruped(damper=damping, **model), time_step=step, kappa=PLANNED)
     start, _ = equilibrium(sim)
     still, torques = standing(sim)
     low, apex, goal = (_moved(start, *by) for by in ((0.0, -crouch), (0.5 * distance, height), (distance, 0.0)))
-    horizon = max(5, round(min(duration / step, 1e300)))
     check_room(f"{call}(duration=...)", horizon, 8.0 * sim.nx, "leap in less time, or with longer knots", "knots")
     down, up = round(0.2 * horizon), round(0.4 * horizon)
     poses = np.array([low] * down + [apex] * up + [goal] * (horizon + 1 - down - up))

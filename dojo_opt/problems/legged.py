@@ -18,6 +18,7 @@ from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from dojo_opt.problems import locomotion
 from dojo_opt.problems.locomotion import EFFORT, FOLLOW, PLACE, check_settings, follow
+from dojo_opt.problems.whole_knots import whole_knots
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.model.state_columns import BaseState
@@ -236,8 +237,8 @@ def stand_up(
             radii [m] in a dict keyed by name (default None: found, as `dojo_opt.gaits.legs.Legs` says).
         low: height of the base at the beginning over that of the stance, between 0 and 1 (default None: 0.55, or the
             least above it for which flat feet stay on the ground under the centre of mass).
-        duration: of the rise and the rest [s] (default None: 1 s for a robot as high as the A1, for others in
-            proportion to the root of the height).
+        duration: of the rise and the rest, rounded to whole knots, two at least [s] (default None: 1 s for a robot as
+            high as the A1, for others in proportion to the root of the height).
         damping: least damper of the joints, see `Legs` (default None: in proportion to weight and height).
         stance: coordinates of the stance by joint (default None: found).
         **settings: further arguments of `follow` (guess, substeps, control_limits, effort, ...).
@@ -255,11 +256,11 @@ def stand_up(
     follows, rest = _shared_out(settings)
     checks.keywords("problems.stand_up(...)", rest, (*FOLLOW, "low", "duration", "damping", "stance"))
     slow = legs.size**0.5
-    length = slow if duration is None else checks.number("problems.stand_up(duration=...)", duration, above=0.0)
     substeps = whole_number("problems.stand_up(substeps=...)", follows.get("substeps", 1))
     step = _rounded(_STEP * slow) / substeps
     sim = legs.simulator(step, PLANNED)
-    knots = max(2, round(min(length / (step * substeps), 1e300)))
+    length = slow if duration is None else duration
+    knots = whole_knots("problems.stand_up(duration=...)", length, step * substeps, 2)
     check_length("problems.stand_up(duration=...)", sim, float(substeps) * knots, "stand up in less time")
     count = substeps * knots
     drop = _deepest(sim, legs.height) if low is None else (1.0 - low) * legs.height

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -61,7 +62,7 @@ def follow(
         gait: the gait, with its simulator.
         guess: "reference" begins with the states of the gait and its torques by inverse dynamics, whose gaps the solve
             closes; "standing" with a robot that stands still, in equilibrium at the smoothing of the planner's first
-            stage.
+            stage, or of the first at which it stands.
         substeps: time steps of the gait per knot; their number is a multiple of it.
         control_limits: (lower, upper), numbers or (nu,) [N m] (default None: the limits of the inputs).
         place: weight of squares of the base's place, a number or (3,) along x, y, z [1/(m^2 s)].
@@ -124,9 +125,17 @@ def weights(sim: Simulator, place: ArrayLike, attitude: float, angle: float) -> 
 
 
 def standing(sim: Simulator, feet: tuple[str, ...] | None = None) -> tuple[Floats, Floats]:
-    """State and torques of a standing robot at the first smoothing of the planner."""
+    """State and torques of a standing robot at the first smoothing of the planner at which it stands.
+
+    Contacts push with kappa over time step and gap: in short steps, or with little weight, the first smoothing may hold
+    the robot so high that its other contacts, or its joints, cannot balance it.
+    """
     on_feet = replace(sim.mechanism, contacts=Feet(sim, feet).contacts)
-    return equilibrium(sim.replace(mechanism=on_feet, kappa=CONTINUATION[0].kappa_eval))
+    *smooth, last = (stage.kappa_eval for stage in CONTINUATION)
+    for kappa in smooth:
+        with suppress(ValueError), np.errstate(all="ignore"):
+            return equilibrium(sim.replace(mechanism=on_feet, kappa=kappa))
+    return equilibrium(sim.replace(mechanism=on_feet, kappa=last))
 
 
 def _stride(sim: Simulator, reference: Floats) -> Floats:

@@ -15,6 +15,7 @@ from dojo_opt.gaits.static_motions import input_map
 from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
+from dojo_opt.problems.whole_knots import whole_knots
 from sim.mechanism import checks
 from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
@@ -75,7 +76,8 @@ def push(
         start: (nq,) coordinates from which the search for the starting pose begins (default None: the neutral ones).
         at: (3,) point of the table below the object at the beginning [m] (default None: on the ground, below the ball
             of the coordinates `start`; without these, and if it cannot push from there, further away from the base).
-        duration: duration of the motion, a fifth of which is rest at the end [s].
+        duration: duration of the motion, a fifth of which is rest at the end; rounded to whole knots, five at least
+            [s].
         time_step: time step of the simulator [s].
 
     Returns:
@@ -94,13 +96,12 @@ def push(
     far = float(np.linalg.norm(way))
     if far == 0.0:
         raise ValueError(f"{_CALL}(goal): expected a displacement along the table, got zero")
-    checks.number(f"{_CALL}(duration=...)", duration, above=0.0)
+    horizon = whole_knots(f"{_CALL}(duration=...)", duration, time_step, 5)
     q = alone.neutral()[: alone.nq]
     q = q if start is None else np.array(checks.array(f"{_CALL}(start=...)", start, (alone.nq,)))
     below = np.append(kin.pose(_TIP, q)[0][:2], 0.0) if at is None else checks.array(f"{_CALL}(at=...)", at, (3,))
     up = (0.0, 0.0, _half(object, np.array([0.0, 0.0, -1.0])))
     forward = way / far
-    horizon = max(5, round(min(duration / time_step, 1e300)))
     check_room(f"{_CALL}(duration=...)", horizon, 8.0 * alone.nx, "push in less time, or with longer steps", "knots")
     share = np.clip(np.arange(-1.0, horizon + 1.0) / ((1.0 - _REST) * horizon), 0.0, 1.0)
     moved = -_GAP + (far + _GAP) * _smooth(share)

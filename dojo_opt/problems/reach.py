@@ -13,6 +13,7 @@ from dojo_opt.gaits.equilibrium import potential_gradient
 from dojo_opt.gaits.static_motions import input_map
 from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.problem import Problem
+from dojo_opt.problems.whole_knots import whole_knots
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
@@ -52,7 +53,7 @@ def reach(
         frame: name of a link, merged ones too, or of a body, as in `dojo.Kinematics`.
         target: (3,) place of the frame [m], or (place, unit quaternion (w, x, y, z)).
         start: (nq,) coordinates, or (nx,) state (default None: the neutral state).
-        duration: duration of the motion [s].
+        duration: duration of the motion, rounded to whole knots, two at least [s].
         time_step: time step of the simulator [s].
         substeps: time steps per knot.
         offset: (3,) of the point that reaches the place from the origin of the frame, in its axes [m] (default zero).
@@ -77,8 +78,7 @@ def reach(
     if not found.success:
         raise ValueError(f"problems.reach({frame!r}, target): {found.message}")
     substeps = whole_number("problems.reach(substeps=...)", substeps)
-    checks.number("problems.reach(duration=...)", duration, above=0.0)
-    horizon = max(2, round(min(duration / (time_step * substeps), 1e300)))
+    horizon = whole_knots("problems.reach(duration=...)", duration, time_step * substeps, 2)
     check_room(
         "problems.reach(duration=...)", horizon, 8.0 * sim.nx, "reach in less time, or with longer steps", "knots"
     )

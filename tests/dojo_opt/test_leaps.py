@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+import dojo_opt as dojo
 from dojo_opt import problems
 from dojo_opt.planning.ilqr import ilqr
+from dojo_opt.planning.options import CONTINUATION
+from dojo_opt.problems.locomotion import standing
 from support.planned_legs import lands, lowest_foot
 
 
@@ -75,3 +78,20 @@ def test_a_backflip_to_the_moon_is_refused():
         problems.backflip(height=1e18)
     with pytest.raises(ValueError, match=r"problems.backflip\(height=...\)"):
         problems.backflip(height=0.0)
+    with pytest.raises(ValueError, match=r"problems.backflip\(gravity=...\): without gravity"):
+        problems.backflip(gravity=(0.0, 0.0, 0.0))
+
+
+def test_a_guess_stands_at_the_first_smoothing_that_lets_it():
+    """At the first two of the planner, a light block floats so high that its upper corners carry as much."""
+    sim = dojo.Simulator(dojo.models.block(gravity=(0.0, 0.0, -1.0)), time_step=0.01)
+    still, _ = standing(sim)
+    gap = still[2] - sim.neutral()[2]  # of four corners that carry 1 N
+    assert gap == pytest.approx(4.0 * CONTINUATION[2].kappa_eval / sim.time_step, rel=0.1)
+
+
+def test_guesses_take_the_gravity_of_the_scene():
+    force, moon = (problems.hop(**by).controls0[0] for by in ({}, {"gravity": (0.0, 0.0, -1.62)}))
+    np.testing.assert_allclose(moon, force * 1.62 / 9.81)
+    flight = 2.0 * np.sqrt(2.0 * 0.4 / 15.0)
+    assert problems.backflip(gravity=(0.0, 0.0, -15.0)).horizon == round((0.9 + flight) / 0.02)
