@@ -27,7 +27,7 @@ def self_collisions(
 ) -> tuple[list[Collision], list[str]]:
     """Collisions of all pairs of shapes, but those of links that a joint connects, and those that overlap.
 
-    Links without mass between two others, and fixed joints, do not part neighbours.
+    Links without mass between two others, and fixed joints, those that close loops included, do not part neighbours.
 
     Args:
         bodies: the bodies.
@@ -79,6 +79,10 @@ def _neighbors(bodies: Sequence[Body], joints: Sequence[Joint], loops: Sequence[
     for joint in joints:
         fixed = joint.nv == 0 and joint.parent != WORLD
         home[joint.child] = home[joint.parent or ""] if fixed else joint.child
+    for weld in loops:  # as of the share of a body that carries a damper or a motor of a closing joint (loop_joints.py)
+        if weld.nv == 0 and weld.parent != WORLD:
+            one, other = home[weld.parent or ""], home[weld.child]
+            home = {name: one if whole == other else whole for name, whole in home.items()}
 
     def above(name: str) -> str:
         """The next body with mass from here on."""

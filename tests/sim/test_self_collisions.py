@@ -82,6 +82,26 @@ def test_a_file_collides_with_itself_where_it_can(tmp_path: Path) -> None:
         dojo.load_urdf(file, collisions="all")
 
 
+@pytest.mark.parametrize(
+    "options", [{}, {"damper": 0.1}, {"limits": [(-2.0, 2.0)]}, {"friction": 1.0}, {"spring": 2.0, "rest": 0.1}]
+)
+def test_closing_joints_make_neighbors_whatever_they_carry(options: dict[str, object]) -> None:
+    bar, left, right = dojo.Box(0.3, 0.05, 0.05), (-0.25, 0, 0), (0.25, 0, 0)
+    bodies = [dojo.Body(name, 1.0, shape=bar) for name in ("crank", "coupler", "rocker", "tip")]
+    joints = [
+        dojo.Joint("revolute", None, "crank", child_point=left, axis=(0, 1, 0)),
+        dojo.Joint("revolute", "crank", "coupler", parent_point=right, child_point=left, axis=(0, 1, 0)),
+        dojo.Joint("revolute", None, "rocker", parent_point=(0.5, 0, 0), child_point=left, axis=(0, 1, 0)),
+        dojo.Joint("fixed", "rocker", "tip", parent_point=(0, 0, 0.5)),
+        dojo.Joint("revolute", "coupler", "rocker", "pin", right, right, axis=(0, 1, 0), close=True, **options),  # type: ignore[arg-type]
+    ]
+    start = {"crank": 0.5, "coupler": -0.5, "rocker": 0.5}
+    pairs = {c.name for c in dojo.Mechanism(bodies, joints, collisions="self", neutral=start).collisions}
+    assert pairs == {"crank-rocker", "crank-tip"}
+    driven = dojo.Mechanism(bodies, joints, inputs=[dojo.Input("pin")], collisions="self", neutral=start)
+    assert {c.name for c in driven.collisions} == pairs
+
+
 def test_a_chain_folds_onto_itself_and_no_further() -> None:
     chain = pendulum(3, damper=0.1)
     bodies = [replace(body, shape=dojo.Sphere(0.2)) for body in chain.bodies]
