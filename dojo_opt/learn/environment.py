@@ -87,6 +87,8 @@ class _TaskEpisode:
         touch = self.task.touch_groups
         row = sim.stepper(self.task.substeps, touch is not None)
         if not row.advance(x[0, :nx], inputs):
+            if not row.began:
+                sim.step(x[0, :nx], inputs)  # which says what is wrong with the state
             return x, row.result(x[:, :nx]).message
         after = x.copy()
         after[0, :nx] = row.end
@@ -136,7 +138,7 @@ class _ProblemEpisode:
         if t >= self.steps:
             raise RuntimeError("Environment.step: the episode is over, or has not begun; call reset()")
         us, plant = self._us, self.plant
-        us[t] = self._middle + self._half * _numbers(action, us.shape[1])
+        us[t] = self._middle + self._half * np.clip(_numbers(action, us.shape[1]), -self.edge, self.edge)
         message = plant.hold(us[t], self._substeps)
         self._knot = t + 1
         self._xs[t + 1] = plant.x
@@ -161,7 +163,8 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
                       are limited, as by actuators; an unsolved step ends the episode with `info["message"]`
         problem       one episode is one horizon, a step is one knot
           observation   state x (nx,), measured
-          action        (nu,) in [-1, 1] between the problem's control limits; inputs [N, N m] where it has none
+          action        (nu,) in [-1, 1] between the problem's control limits, beyond which inputs are limited, too;
+                        inputs [N, N m] where it has none
           reward        minus the problem's costs at the knot, and with the last step those at the end
           terminated    the robot has fallen, or a step could not be solved: see `info["message"]`
           truncated     the horizon is over; `info["violation"]` is the largest violation of a constraint

@@ -17,7 +17,7 @@ from dojo_opt.learn.task import Task
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.npz_file import check_head, check_shapes, read_npz, reading, write_npz
-from solvers.types import Floats
+from solvers.types import Floats, Integers
 
 __all__ = ["LearnedPolicy", "policy_of"]
 
@@ -111,7 +111,8 @@ class LearnedPolicy:
         Returns:
             (nu,) action in [-1, 1].
         """
-        sizes, work = self._buffers
+        sizes = self._sizes
+        work = np.zeros(2 * int(sizes.max()))  # of this call: a policy may act in several threads
         first = perceptron(sizes, self.weights, number_of(self.network.activation), self.scaled(observation), work)
         y = work[first : first + sizes[-1]]
         return np.clip(y, -1.0, 1.0) if self.linear else np.tanh(y)
@@ -153,9 +154,8 @@ class LearnedPolicy:
         return controller
 
     @cached_property
-    def _buffers(self) -> tuple[Any, Floats]:
-        sizes = np.array(self.network.sizes, dtype=np.int64)
-        return sizes, np.zeros(2 * max(self.network.sizes))
+    def _sizes(self) -> Integers:
+        return np.array(self.network.sizes, dtype=np.int64)
 
     def export_onnx(self, path: str | Path) -> None:
         """Write the policy as an ONNX model: "observation" (n, no) to "action" (n, nu) in [-1, 1], both float32.

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -21,15 +22,26 @@ if TYPE_CHECKING:
 __all__ = ["environment", "register", "task_of", "vector_environment"]
 
 
-@cache
 def task_of(name: str, **options: Any) -> Task:
-    """One task for all environments of a process: its models and compiled functions are shared.
+    """One task for all environments of a process with these options: its models and compiled functions are shared.
 
-    options: arguments of its function.
+    options: arguments of its function; those that cannot be hashed, such as lists, make a task of their own.
     """
+    try:
+        return _shared(name, **options)
+    except TypeError:
+        if all(isinstance(option, Hashable) for option in options.values()):
+            raise
+        return _made(name, **options)
+
+
+def _made(name: str, **options: Any) -> Task:
     module, function, _ = TASKS[name]
     found: Task = getattr(import_module(f"dojo_opt.learn.{module}"), function)(**options)
     return found
+
+
+_shared = cache(_made)
 
 
 def environment(task: str, render_mode: str | None = None, **options: Any) -> Environment:
@@ -44,9 +56,12 @@ def vector_environment(
     num_envs: int = 1,
     autoreset_mode: Any = None,
     max_episode_steps: int | None = None,
+    render_mode: None = None,
     **options: Any,
 ) -> VectorEnvironment:
-    """Many environments."""
+    """Many environments, which are not drawn."""
+    if render_mode is not None:
+        raise ValueError(f"make_vec(render_mode=...): only single environments are drawn, got {render_mode!r}")
     from dojo_opt.learn.vector_environment import VectorEnvironment
 
     return VectorEnvironment(task_of(task, **options), num_envs, autoreset_mode, max_episode_steps)

@@ -98,6 +98,8 @@ def label_lines(ax: Axes) -> None:
     for k, (artist, label) in enumerate(curves):
         color, style = f"C{k % 10}", _STYLES[(k // 10) % len(_STYLES)]
         data = artist.get_data()
+        if not len(data.values if hasattr(data, "values") else data[1]):
+            continue  # of a motion without a step
         value = float(data.values[-1] if hasattr(data, "values") else data[1][-1])
         if hasattr(data, "values"):
             artist.set_edgecolor(color)

@@ -52,6 +52,8 @@ class Live:
         self._page = still.replace("track();\n</script>", f"track();\n{_CONNECT}\n</script>")
         self._listeners: set[Any] = set()
         self._shown = -np.inf
+        self._next: Any = None  # state that is to be shown
+        self._lock = threading.Lock()  # of it
         self._last: list[bytes] = []
         self._started = threading.Event()
         self._failed: Exception | None = None
@@ -78,7 +80,7 @@ class Live:
         return f'<iframe src="{self.url}" style="width: 100%; height: 420px; border: 0"></iframe>'
 
     def show(self, x: ArrayLike) -> None:
-        """Move the robot to a state; states that arrive faster than the screen shows them are skipped.
+        """Move the robot to a state. Of states that arrive faster than the screen shows them, the last one is shown.
 
         Args:
             x: (nx,) state.
@@ -89,12 +91,13 @@ class Live:
         if self._loop is None:
             raise ValueError("Live.show: the page is closed")
         state = checks.array("Live.show(x)", x, (self._sim.nx,))
-        now = clock.perf_counter()
-        if now - self._shown < self._least:
-            return
-        self._shown = now
-        self._last = self._moves(state)
-        self._loop.call_soon_threadsafe(self._send, self._last)
+        rest = self._shown + self._least - clock.perf_counter()
+        with self._lock:
+            waits, self._next = self._next is not None, state.copy()
+        if rest > 0.0 and not waits:
+            self._loop.call_soon_threadsafe(self._loop.call_later, rest, self._send_next)
+        elif rest <= 0.0:
+            self._loop.call_soon_threadsafe(self._send_next)
 
     def watch(self, controller: Callable[[float, Any], Any]) -> Callable[[float, Any], Any]:
         """A controller that shows every state that it is called with.
@@ -138,10 +141,15 @@ class Live:
         )
         return [packb(SetTransform(place, node).lower()) for node, place in places]
 
-    def _send(self, commands: list[bytes]) -> None:
-        """Send to all open pages; runs in the thread of the server."""
+    def _send_next(self) -> None:
+        """Send the state that was given last to all open pages; runs in the thread of the server."""
+        with self._lock:
+            state, self._next = self._next, None
+        if state is None:  # sent already
+            return
+        self._shown, self._last = clock.perf_counter(), self._moves(state)
         for listener in list(self._listeners):
-            for command in commands:
+            for command in self._last:
                 listener.write_message(command, binary=True)
 
     def _serve(self, port: int) -> None:

@@ -31,6 +31,7 @@ _BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 _DRAWN = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
 _LARGEST = 16384  # pixels along an edge
 _COLORS = 128  # of a GIF
+_SHORTEST = 2  # delay of a picture of a GIF [s/100]
 
 
 def save_video(
@@ -197,8 +198,23 @@ def _write_gif(frames: Iterator[Pixels], path: Path, rate: float) -> None:
 
     pictures = [Image.fromarray(frame) for frame in frames]
     first = pictures[0].quantize(_COLORS, dither=Image.Dither.NONE)
-    rest = [picture.quantize(palette=first, dither=Image.Dither.NONE) for picture in pictures[1:]]
-    first.save(path, save_all=True, append_images=rest, duration=round(1e3 / rate), loop=0)
+    shown, delays = _in_hundredths(len(pictures), rate)
+    rest = [pictures[k].quantize(palette=first, dither=Image.Dither.NONE) for k in shown[1:]]
+    first.save(path, save_all=True, append_images=rest, duration=[10 * delay for delay in delays], loop=0)
+
+
+def _in_hundredths(count: int, rate: float) -> tuple[list[int], list[int]]:
+    """The pictures of a GIF, and the time that each is shown, which is a whole number of hundredths of a second.
+
+    Pictures that would be shown for less than two, for which browsers show them for ten, are omitted.
+    """
+    shown, begins, end = [0], [0], max(round(100.0 * count / rate), _SHORTEST)
+    for k in range(1, count):
+        begin = round(100.0 * k / rate)
+        if begin - begins[-1] >= _SHORTEST and end - begin >= _SHORTEST:
+            shown.append(k)
+            begins.append(begin)
+    return shown, np.diff([*begins, end]).tolist()
 
 
 def _write_mp4(frames: Iterator[Pixels], path: Path, rate: float) -> None:

@@ -42,6 +42,8 @@ def test_actions_are_shares_of_the_limits():
     env.reset(seed=0)
     _, reward, *_ = env.step(np.array([1.0, -1.0, 0.0]))
     np.testing.assert_allclose(reward, -(2.0**2 + 2.0**2 + 2.0**2))
+    _, reward, *_ = env.step(np.array([50.0, -50.0, 0.0]))
+    np.testing.assert_allclose(reward, -(2.0**2 + 2.0**2 + 2.0**2))
     assert env.action_space.high.tolist() == [1, 1, 1]
 
 

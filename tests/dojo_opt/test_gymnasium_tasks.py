@@ -131,6 +131,12 @@ def test_a_batch_is_its_environments_one_by_one(mode):
     assert resets > 3
 
 
+def test_options_may_be_lists_and_batches_are_not_drawn():
+    assert task_of("Quadruped", fastest=[1.0, 0.5, 1.0]).commands == task_of("Quadruped").commands
+    with pytest.raises(ValueError, match="only single environments"):
+        gymnasium.make_vec("dojo/Pendulum-v0", num_envs=2, render_mode="rgb_array")
+
+
 def test_batches_can_be_reset_in_part():
     env = gymnasium.make_vec("dojo_opt.learn:dojo/Cartpole-v0", num_envs=3, autoreset_mode=AutoresetMode.DISABLED)
     before, _ = env.reset(seed=1)

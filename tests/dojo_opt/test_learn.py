@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from concurrent.futures import ProcessPoolExecutor
+import sys
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
 
@@ -329,6 +330,21 @@ def _scaling(run):
 def _stop(record, epoch):
     if record["epoch"] == epoch:
         raise StopIteration
+
+
+def test_a_policy_acts_in_several_threads_as_in_one():
+    rng, interval = np.random.default_rng(0), sys.getswitchinterval()
+    net = Network((4, 256, 256, 2))
+    policy = LearnedPolicy(net, net.start(rng), np.zeros(4), np.ones(4))
+    seen = rng.normal(size=(400, 4))
+    alone = np.array([policy.action(x) for x in seen])
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            together = list(pool.map(lambda x: policy.action(x), np.tile(seen, (4, 1))))
+    finally:
+        sys.setswitchinterval(interval)
+    np.testing.assert_array_equal(together, np.tile(alone, (4, 1)))
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import asyncio
 import html
 import re
 import socket
+import time
 import urllib.request
 
 import numpy as np
@@ -56,6 +57,13 @@ def test_a_page_hears_the_states_of_a_loop(sim):
         assert command["type"] == "set_transform" and command["path"].startswith("/meshcat/bodies/0")
         expected = sim.maximal(np.array([1.2, 0.0]))[0, :3]
         np.testing.assert_allclose(command["matrix"][12:15], expected, atol=1e-6)
+        slow = dojo.viewer.live(sim, rate=20.0)
+        for angle in (0.5, 1.2):  # both within the time of the first picture
+            slow.show(np.array([angle, 0.0]))
+        time.sleep(0.1)
+        (command,) = asyncio.run(heard(slow.url, 1))
+        np.testing.assert_allclose(command["matrix"][12:15], expected, atol=1e-6)
+        slow.close()
         port = int(view.url.rsplit(":", 1)[1].strip("/"))
         with pytest.raises(OSError, match="did not start"):
             dojo.viewer.live(sim, port=port)

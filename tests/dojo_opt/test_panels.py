@@ -39,6 +39,14 @@ def test_a_robot_with_legs_is_drawn_leg_by_leg(motion):
 
 
 @pytest.mark.slow
+def test_a_motion_without_a_step_is_drawn(motion):
+    sim = motion.simulator
+    still = sim.rollout(motion.x[0], np.zeros((0, sim.nu)))
+    for drawn in (still, dojo.Simulator(dojo.models.npendulum(2)).rollout(np.zeros(4), np.zeros((0, 2)))):
+        assert dojo.plots.trajectory(drawn).axes and dojo.plots.controls(drawn).axes
+    assert dojo.plots.trajectory(sim.mechanism).axes
+
+
 def test_names_at_the_lines_do_not_touch(motion):
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.text import Text

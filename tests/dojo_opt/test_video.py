@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from dojo_opt.viewer.video import _in_hundredths
 
 pytestmark = [  # a browser process that is closed leaves sockets to the garbage collector
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
@@ -43,6 +44,12 @@ def test_a_robot_moves_in_a_video(fall, tmp_path):
     pytest.importorskip("imageio_ffmpeg")
     film = dojo.viewer.save_video(fall, tmp_path / "fall.mp4", size=(160, 120), rate=10.0)
     assert b"ftyp" in film.read_bytes()[:12]
+
+
+def test_a_gif_lasts_as_long_as_its_motion():
+    for rate in (7.0, 10.0, 15.0, 30.0, 60.0, 200.0):
+        shown, delays = _in_hundredths(round(2 * rate), rate)
+        assert sum(delays) == 200 and min(delays) >= 2 and len(shown) == len(delays), rate
 
 
 def test_other_formats_and_odd_sizes_are_refused(fall, tmp_path):
