@@ -217,6 +217,17 @@ def test_show_reads_a_file_and_names_unsupported_elements(tmp_path: Path, capsys
 
 
 @pytest.mark.filterwarnings("ignore::sim.io.urdf.report.UrdfWarning")
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [(["block", "--fixed"], "--fixed"), (["toy.xml", "--meshes", "box", "--contacts", "all"], "--meshes, --contacts")],
+)
+def test_show_refuses_what_only_urdf_files_have(
+    words: list[str], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["show", *words]) != 0
+    assert f"{named}: only for .urdf files" in capsys.readouterr().err
+
+
 def test_show_plays_the_motion_until_it_is_interrupted(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -44,7 +44,6 @@ def add_show(commands: Any) -> None:
     parser.add_argument(
         "--meshes",
         choices=("hull", "decompose", "sphere", "box", "capsule", "none"),
-        default="hull",
         help="shapes in place of the collision meshes of ROBOT.urdf, hull by default",
     )
     parser.add_argument(
@@ -66,14 +65,16 @@ def load(args: argparse.Namespace) -> dojo.Mechanism:
     if suffix == ".urdf":
         contacts = touching(args.contacts)
         return dojo.load_urdf(
-            args.robot, floating=not args.fixed, repair=args.repair, contacts=contacts, meshes=args.meshes
+            args.robot, floating=not args.fixed, repair=args.repair, contacts=contacts, meshes=args.meshes or "hull"
         )
     if suffix == ".xml":
+        _of_urdf(args, contacts=True)
         return dojo.load_mjcf(args.robot)
     names = dojo.models.__all__
     if args.robot not in names:
         close = nearest(args.robot, names) or "; `dojo-opt models` lists them"
         raise ValueError(f"{args.robot!r} is neither a .urdf nor an .xml file, nor a model{close}")
+    _of_urdf(args, contacts=False)
     build = getattr(dojo.models, args.robot)
     chosen: dict[str, Any] = {}
     if args.contacts:
@@ -85,6 +86,15 @@ def load(args: argparse.Namespace) -> dojo.Mechanism:
     except TypeError as error:
         raise ValueError(f"--contacts: {args.robot} has no choice of contacts") from error
     return found
+
+
+def _of_urdf(args: argparse.Namespace, *, contacts: bool) -> None:
+    """Refuse options that only URDF files have; contacts: --contacts, too."""
+    given = {"--fixed": args.fixed, "--repair": args.repair, "--meshes": args.meshes}
+    given |= {"--contacts": args.contacts} if contacts else {}
+    wrong = [name for name, value in given.items() if value]
+    if wrong:
+        raise ValueError(f"{', '.join(wrong)}: only for .urdf files, got {args.robot!r}")
 
 
 def touching(words: Sequence[str] | None) -> list[str | dojo.Contact] | None:
