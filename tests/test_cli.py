@@ -216,7 +216,6 @@ def test_show_reads_a_file_and_names_unsupported_elements(tmp_path: Path, capsys
     assert "shoulder" in text and "robot.urdf: 7 links" in text
 
 
-@pytest.mark.filterwarnings("ignore::sim.io.urdf.report.UrdfWarning")
 @pytest.mark.parametrize(
     ("words", "named"),
     [(["block", "--fixed"], "--fixed"), (["toy.xml", "--meshes", "box", "--contacts", "all"], "--meshes, --contacts")],
@@ -228,6 +227,7 @@ def test_show_refuses_what_only_urdf_files_have(
     assert f"{named}: only for .urdf files" in capsys.readouterr().err
 
 
+@pytest.mark.filterwarnings("ignore::sim.io.urdf.report.UrdfWarning")
 def test_show_plays_the_motion_until_it_is_interrupted(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -159,8 +159,9 @@ class _ProblemEpisode:
 class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
     """A Task, or a Problem with a plant, for reinforcement learning.
 
-        task          observation, reward, end and number of steps are its own; actions in [-1, 1], beyond which inputs
-                      are limited, as by actuators; an unsolved step ends the episode with `info["message"]`
+        task          observation, reward, end and number of steps are its own, so `max_episode_steps` of gymnasium.make
+                      can only shorten an episode; actions in [-1, 1], beyond which inputs are limited, as by actuators;
+                      an unsolved step ends the episode with `info["message"]`
         problem       one episode is one horizon, a step is one knot
           observation   state x (nx,), measured
           action        (nu,) in [-1, 1] between the problem's control limits, beyond which inputs are limited, too;

@@ -47,6 +47,23 @@ def test_actions_are_shares_of_the_limits():
     assert env.action_space.high.tolist() == [1, 1, 1]
 
 
+def test_a_first_state_without_a_unit_quaternion_is_named():
+    sim = dojo.Simulator(dojo.models.block(), time_step=0.02, kappa=1e-4)
+
+    def observation(x, out):
+        out[0] = x[2]
+
+    def reward(x, a, after):
+        return after[0] - x[0]
+
+    task = dojo.learn.Task(sim, 1, observation, 1, reward, low=[-5.0] * 3, high=[5.0] * 3,
+                           start=lambda rng: sim.neutral() + 0.05, steps=20)  # fmt: skip
+    env = dojo.Environment(task)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="unit quaternion"):
+        env.step(np.zeros(3))
+
+
 def test_perturbations_are_drawn_from_the_seed_and_a_fall_ends_it():
     problem = dojo.problems.hop()
     plant = dojo.Plant(problem.sim.replace(time_step=0.01), problem.start)

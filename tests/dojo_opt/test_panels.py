@@ -38,7 +38,6 @@ def test_a_robot_with_legs_is_drawn_leg_by_leg(motion):
     assert not any(ax.get_legend() for ax in titled)
 
 
-@pytest.mark.slow
 def test_a_motion_without_a_step_is_drawn(motion):
     sim = motion.simulator
     still = sim.rollout(motion.x[0], np.zeros((0, sim.nu)))
@@ -47,6 +46,7 @@ def test_a_motion_without_a_step_is_drawn(motion):
     assert dojo.plots.trajectory(sim.mechanism).axes
 
 
+@pytest.mark.slow
 def test_names_at_the_lines_do_not_touch(motion):
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.text import Text
