@@ -10,6 +10,7 @@ from dojo_opt.identification.delayed_space import DelayedSpace
 from dojo_opt.identification.normal_equations import NormalEquations
 from dojo_opt.identification.prior import Prior
 from dojo_opt.identification.windows import Predictor, Window, WindowErrors
+from sim.simulator.simulator import Simulator
 from solvers.types import Floats
 
 __all__ = ["Expectation", "ShootingFit"]
@@ -50,14 +51,17 @@ class ShootingFit:
     def errors(self, theta: Floats, starts: list[Floats], kappa: float, slopes: bool) -> list[WindowErrors] | None:
         """Of all windows; None where the parameters are impossible."""
         try:
-            sim = self.space.simulator(theta).replace(kappa=kappa)
+            sim, windows = self._model(theta, kappa)
         except ValueError:
             return None
-        windows = self.space.delayed(self.windows, theta)
         if not slopes:
             return self.predictor.errors(sim, windows, starts)
         predict, chain = self.predictor.predict, self.space.slopes(theta)
         return [predict(sim, chain, w, s, kappa) for w, s in zip(windows, starts, strict=True)]
+
+    def _model(self, theta: Floats, kappa: float) -> tuple[Simulator, list[Window]]:
+        """The simulator of the parameters at a smoothing, and the windows with their delay."""
+        return self.space.simulator(theta).replace(kappa=kappa), self.space.delayed(self.windows, theta)
 
     def weigh(self, found: list[WindowErrors], usable: list[bool]) -> tuple[float, list[Floats], float]:
         """(cost, weights of the states of each window, share of outliers)."""
@@ -107,10 +111,7 @@ class ShootingFit:
 
     def begin_again(self, kappa: float) -> None:
         """Replace starts by measured ones that cost less: those of another smoothing may be far off."""
-        sim, windows = (
-            self.space.simulator(self.theta).replace(kappa=kappa),
-            self.space.delayed(self.windows, self.theta),
-        )
+        sim, windows = self._model(self.theta, kappa)
         measured = [w.x[0].copy() for w in windows]
         ends = [self.predictor.errors(sim, windows, starts) for starts in (self.starts, measured)]
         for k, (now, other) in enumerate(zip(*ends, strict=True)):
@@ -124,10 +125,7 @@ class ShootingFit:
         fall. Draws are from N(s_k, c (S_k'S_k)^-1), the distribution of the start for known parameters, where c
         grows with the errors of the window.
         """
-        sim, windows = (
-            self.space.simulator(self.theta).replace(kappa=kappa),
-            self.space.delayed(self.windows, self.theta),
-        )
+        sim, windows = self._model(self.theta, kappa)
         costs = np.array([self.cost_of(w) for w in self.predictor.errors(sim, windows, self.starts)])
         solved = np.isfinite(costs)
         if not solved.any():

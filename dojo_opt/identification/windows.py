@@ -97,11 +97,8 @@ def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None,
         raw = (given.x, given.u) if isinstance(given, Trajectory) else states_and_inputs(call, given)
         us = checks.array(call, raw[1], ("T", sim.nu))
         xs = checks.array(call, raw[0], (len(us) + 1, sim.nx))
-        size = len(us) if length is None else length
-        before = np.concatenate([np.repeat(us[:1], past, axis=0), us])  # us[t] is before[past + t]
-        for first in range(0, len(us), max(size, 1)):
-            last = min(first + size, len(us))
-            out.append(Window(number, first, xs[first : last + 1], us[first:last], before[first : first + past]))
+        whole = Window(number, 0, xs, us, np.repeat(us[:1], past, axis=0))
+        out += whole.pieces(max(len(us), 1) if length is None else length)
     if not out:
         raise ValueError(f"{call}: expected motions of at least one step, got none")
     return out

@@ -27,12 +27,8 @@ def task_of(name: str, **options: Any) -> Task:
 
     options: arguments of its function; those that cannot be hashed, such as lists, make a task of their own.
     """
-    try:
-        return _shared(name, **options)
-    except TypeError:
-        if all(isinstance(option, Hashable) for option in options.values()):
-            raise
-        return _made(name, **options)
+    shared = all(isinstance(option, Hashable) for option in options.values())
+    return (_shared if shared else _made)(name, **options)
 
 
 def _made(name: str, **options: Any) -> Task:

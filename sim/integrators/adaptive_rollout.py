@@ -15,7 +15,7 @@ from sim.model.record_columns import StepReport
 from solvers.compiler import Table, kernel
 from solvers.dense import copy, copy_vector
 from solvers.status import Status
-from solvers.types import Cube, Integers, Matrix, Vector
+from solvers.types import Cube, Matrix, Vector
 
 _SOLVED = int(Status.SOLVED)
 _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
@@ -29,8 +29,6 @@ class SubstepMotion(NamedTuple):
     xs: Matrix  # (T + 1, nx) nodes, of which xs[0] is given
     reports: Matrix  # (T, 9)
     contacts: Cube  # (T, ncontact, 11)
-    substeps: Integers  # (T,)
-    errors: Vector  # (T,) estimated, over those allowed
 
 
 @kernel
@@ -41,7 +39,6 @@ def _begin(line: SubstepState, path: SubstepMotion, end: float, t: int) -> None:
     if t < path.wrenches.shape[0]:
         copy(path.wrenches[t], line.wrench[0])
     begin_substeps(line, end)
-    path.substeps[t] = 0
 
 
 @kernel
@@ -52,7 +49,7 @@ def _end(line: SubstepState, path: SubstepMotion, end: float, t: int, status: in
     if status == _SOLVED:
         copy_vector(line.x, path.xs[t + 1])
         copy(line.contacts, path.contacts[t])
-        path.errors[t] = line.clock[Clock.ERROR] / end
+        path.reports[t, StepReport.ERROR] = line.clock[Clock.ERROR] / end
     line.clock[Clock.BEGUN] = 0.0
 
 
@@ -80,8 +77,7 @@ def roll_substeps(
         while line.clock[Clock.TIME] < end:
             effort, line.taken[0] = line.report[StepReport.ITERATIONS], 0
             status = attempt(models, data_tables, settings, goal, embedded, line)
-            path.substeps[t] += line.taken[0]
-            if path.substeps[t] > goal[AccuracyGoal.MOST]:
+            if line.report[StepReport.PARTS] > goal[AccuracyGoal.MOST]:
                 status = _MAX_ITERATIONS
             if status != _SOLVED:
                 _end(line, path, end, t, status)

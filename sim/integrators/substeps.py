@@ -6,7 +6,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from sim.integrators.contact_events import BEGINS, NEVER, UNKNOWN
-from sim.model.record_columns import ContactRow
+from sim.model.record_columns import ContactRow, StepReport
 from solvers.codes import Code
 from solvers.compiler import kernel
 from solvers.dense import clear, copy_vector
@@ -74,7 +74,7 @@ class SubstepState(NamedTuple):
     ahead: Vector  # (nx,) scratch: mean state of a step from there
     settled: Matrix  # (2, nx) scratch: nodes a short step after that, and after the halves
     clock: Vector  # (28,) in place
-    report: Vector  # (9,)
+    report: Vector  # (9,) in place; PARTS counts the sub-steps
     parts: Cube  # (3, ncontact, 11) scratch: contacts of both halves, and of the whole step
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the step
     contacts: Matrix  # (ncontact, 11) in place: impulses so far, the rest of the last step
@@ -118,6 +118,7 @@ def keep(line: SubstepState, h: float, order: int) -> None:
     copy_vector(line.x, line.starts[n])
     line.lengths[n], line.orders[n] = h, order
     line.taken[0] = n + 1
+    line.report[StepReport.PARTS] += 1.0
     copy_vector(line.trial, line.x)
     line.clock[Clock.TIME] += h
     line.clock[Clock.CUT] = line.clock[Clock.LEAST] = NEVER

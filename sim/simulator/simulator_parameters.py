@@ -47,9 +47,10 @@ class SimulatorParameters:
     @property
     def _table(self) -> Table:
         """By names, at the values in the model."""
+        if self._written is self._mechanism:
+            return self._own_table
         if self._of_written is None:
-            known = self._known if self._written is self._mechanism else all_parameters(self._written, self._time_step)
-            self._of_written = by_names(known)
+            self._of_written = by_names(all_parameters(self._written, self._time_step))
         return self._of_written
 
     @property

@@ -288,8 +288,7 @@ class RowBatch:
         engine = self.rows.engines[self.rows.index[row]]
         us = np.repeat(self.us[row : row + 1], self.substeps, axis=0)
         rolled = engine.roll(self.xs[row], us, kappa=self._kappa(row), derivatives=derivatives)
-        reports[row] = rolled.reports[min(rolled.solved_steps, self.substeps - 1)]
-        reports[row, StepReport.LOST] = rolled.reports[: rolled.solved_steps, StepReport.LOST].max(initial=0.0)
+        reports[row] = rolled.summary()
         if rolled.solved_steps < self.substeps:
             return
         x_next[row] = rolled.xs[-1]

@@ -14,8 +14,8 @@ from itertools import combinations
 from typing import Any
 
 from sim.io.loader_choices import LoaderChoices
-from sim.io.mjcf.contacts import STANDING, excluded, fixed_planes, label_on, listed, meet, mixed, plane_pose, rubbing
-from sim.io.mjcf.flags import contacts_disabled, parents_apart
+from sim.io.mjcf.contacts import STANDING, Rubbing, fixed_planes, label_on, listed, plane_pose, rubbing
+from sim.io.mjcf.flags import parents_apart
 from sim.io.mjcf.welded_bodies import NO_SHAPE, PLANE, GeomGroup, Where, name_of, solid_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.collision import Collision
@@ -45,13 +45,13 @@ def find_collisions(model: Any, where: Where, choices: LoaderChoices, notes: Not
 def find_on_planes(model: Any, where: Where, choices: LoaderChoices) -> list[Collision]:
     """The collisions of geoms without balls and points with all planes that they touch."""
     chosen, law = choices.friction, choices.law
-    planes = fixed_planes(model, where)
+    planes, pairs = fixed_planes(model, where), listed(model)
     out = []
     for g in range(model.ngeom):
         group, solid = _owner(model, where, g), _solid(model, where, g)
         if group is None or solid is None or int(model.geom_type[g]) in STANDING:
             continue
-        rough = {p: rubbed for p in planes if (rubbed := rubbing(model, g, p))}
+        rough = {p: rubbed for p in planes if (rubbed := rubbing(model, pairs, g, p))}
         for p, (friction, slippery) in rough.items():
             plane = plane_pose(model, p)
             ground = HalfSpace(center=plane.point, orientation=plane.quaternion)
@@ -63,20 +63,18 @@ def find_on_planes(model: Any, where: Where, choices: LoaderChoices) -> list[Col
     return out
 
 
-def _pairs(model: Any, where: Where) -> Iterator[tuple[int, int, tuple[float, bool]]]:
+def _pairs(model: Any, where: Where) -> Iterator[tuple[int, int, Rubbing]]:
     """Geoms a < b that may meet, planes aside, and their (friction, whether there is none)."""
-    if contacts_disabled(model):
-        return
     named, apart = listed(model), parents_apart(model)
     for a, b in combinations(range(model.ngeom), 2):
         owners = _owner(model, where, a), _owner(model, where, b)
         if owners[0] is owners[1] or PLANE in (model.geom_type[a], model.geom_type[b]):
             continue
-        if (a, b) in named:
-            k = named[a, b]
-            yield a, b, (float(model.pair_friction[k, 0]), int(model.pair_dim[k]) == 1)
-        elif meet(model, a, b) and not (apart and _related(*owners)) and not excluded(model, a, b):
-            yield a, b, mixed(model, a, b)
+        if apart and _related(*owners) and (a, b) not in named:
+            continue
+        rubbed = rubbing(model, named, a, b)
+        if rubbed is not None:
+            yield a, b, rubbed
 
 
 def _owner(model: Any, where: Where, g: int) -> GeomGroup | None:

@@ -14,6 +14,7 @@ priority, or of the <pair>; condim 1 is without.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
@@ -41,6 +42,7 @@ from sim.mechanism.pose import Pose
 from solvers.types import Floats
 
 STANDING = (SPHERE, CAPSULE, BOX, CYLINDER, MESH)  # on balls and points
+Rubbing = tuple[float, bool]  # friction, and whether there is none
 _UNLESS = "are no obstacles (collisions=True makes them)"
 
 
@@ -49,7 +51,7 @@ def find_contacts(model: Any, where: Where, choices: LoaderChoices, collisions: 
 
     collisions: whether the other fixed geoms are obstacles, by sim/io/mjcf/collisions.py.
     """
-    planes = fixed_planes(model, where)
+    planes, pairs = fixed_planes(model, where), listed(model)
     out: list[Contact] = []
     for g in range(model.ngeom):
         group, frame = where[int(model.geom_bodyid[g])]
@@ -58,8 +60,8 @@ def find_contacts(model: Any, where: Where, choices: LoaderChoices, collisions: 
             if solid and not collisions:
                 notes.add(f"geoms fixed to the world other than planes {_UNLESS}", [name_of(model, "geom", g)])
             continue
-        touched = [p for p in planes if rubbing(model, g, p)]
-        if not touched:
+        rough = {p: rubbed for p in planes if (rubbed := rubbing(model, pairs, g, p))}
+        if not rough:
             continue
         kind = int(model.geom_type[g])
         if kind in NO_SHAPE:
@@ -73,11 +75,11 @@ def find_contacts(model: Any, where: Where, choices: LoaderChoices, collisions: 
             )
             notes.add(text, [f"{name_of(model, 'geom', g)} ({error:.2g} mm)"])
         balls = _balls(model, g, frame, choices.rim_points)
-        for p in touched:
-            label = label_on(model, g, p, touched)
+        for p, rubbed in rough.items():
+            label, plane = label_on(model, g, p, list(rough)), plane_pose(model, p)
             names = [label if len(balls) == 1 else f"{label}_{k}" for k in range(len(balls))]
             out += [
-                _contact(model, (g, p), group, ball, name, choices) for ball, name in zip(balls, names, strict=True)
+                _contact(plane, rubbed, group, ball, name, choices) for ball, name in zip(balls, names, strict=True)
             ]
     return out
 
@@ -107,7 +109,7 @@ def _owner(model: Any, where: Where, g: int) -> GeomGroup | None:
     return where[int(model.geom_bodyid[g])][0]
 
 
-def meet(model: Any, a: int, b: int) -> bool:
+def _meet(model: Any, a: int, b: int) -> bool:
     """Whether MuJoCo lets two geoms collide."""
     ab = model.geom_contype[a] & model.geom_conaffinity[b]
     return bool(ab | (model.geom_contype[b] & model.geom_conaffinity[a]))
@@ -119,24 +121,27 @@ def listed(model: Any) -> dict[tuple[int, int], int]:
     return {(min(pair), max(pair)): k for k, pair in enumerate(ends)}
 
 
-def excluded(model: Any, a: int, b: int) -> bool:
+def _excluded(model: Any, a: int, b: int) -> bool:
     """Whether the file excludes the bodies of two geoms."""
     first, second = sorted((int(model.geom_bodyid[a]), int(model.geom_bodyid[b])))
     signature = (first << 16) + second
     return bool((model.exclude_signature == signature).any())
 
 
-def rubbing(model: Any, a: int, b: int) -> tuple[float, bool] | None:
-    """(friction, whether there is none) of two geoms that may touch, wherever their bodies are; None of others."""
+def rubbing(model: Any, pairs: Mapping[tuple[int, int], int], a: int, b: int) -> Rubbing | None:
+    """(friction, whether there is none) of two geoms that may touch, wherever their bodies are; None of others.
+
+    pairs: those of the file, see `listed`.
+    """
     if contacts_disabled(model):
         return None
-    pair = listed(model).get((min(a, b), max(a, b)))
+    pair = pairs.get((min(a, b), max(a, b)))
     if pair is not None:
         return float(model.pair_friction[pair, 0]), int(model.pair_dim[pair]) == 1
-    return mixed(model, a, b) if meet(model, a, b) and not excluded(model, a, b) else None
+    return _mixed(model, a, b) if _meet(model, a, b) and not _excluded(model, a, b) else None
 
 
-def mixed(model: Any, a: int, b: int) -> tuple[float, bool]:
+def _mixed(model: Any, a: int, b: int) -> Rubbing:
     """(friction, whether there is none) of two geoms: the larger ones, or those of the geom with priority."""
     own, other = int(model.geom_priority[a]), int(model.geom_priority[b])
     first = [x for x, wins in ((a, own >= other), (b, other >= own)) if wins]
@@ -144,15 +149,11 @@ def mixed(model: Any, a: int, b: int) -> tuple[float, bool]:
 
 
 def _contact(
-    model: Any, pair: tuple[int, int], group: GeomGroup, ball: tuple[Floats, float], name: str, choices: LoaderChoices
+    plane: Pose, rubbed: Rubbing, group: GeomGroup, ball: tuple[Floats, float], name: str, choices: LoaderChoices
 ) -> Contact:
     """One ball of a geom against a plane."""
-    g, p = pair
     chosen, law = choices.friction, choices.law
-    plane = plane_pose(model, p)
     normal = plane.rotation[:, 2]
-    rubbed = rubbing(model, g, p)
-    assert rubbed is not None
     friction, slippery = rubbed
     return Contact(
         group.name,

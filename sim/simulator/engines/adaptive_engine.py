@@ -71,7 +71,6 @@ class Substeps(NamedTuple):
     starts: Floats  # (n, nx) nodes where the sub-steps begin
     lengths: Vector  # (n,) [s]
     orders: Integers  # (n,)
-    error: float  # estimated, over the one allowed
 
 
 class AdaptiveEngine(PythonLoopEngine):
@@ -129,23 +128,22 @@ class AdaptiveEngine(PythonLoopEngine):
         goal, end = self._goal(settings), self.settings.time_step
         line = line._replace(u=u, wrench=wrench)
         line.x[:], line.clock[Clock.BEGUN] = x, 0.0
-        data_tables, rows, status, taken = self._scratch.tables(2), [], int(Status.SOLVED), 0
+        data_tables, rows, status = self._scratch.tables(2), [], int(Status.SOLVED)
         for _ in pieces(settings, 2):
             status = int(go_on(models, data_tables, settings, goal, errors, line))
             n = int(line.taken[0])
             rows.append((line.starts[:n].copy(), line.lengths[:n].copy(), line.orders[:n].copy()))
             if status != Status.SOLVED or line.clock[Clock.TIME] >= end:
                 break
-            taken += n
-            if taken > _MOST:
+            if line.report[StepReport.PARTS] > _MOST:
                 status = int(Status.MAX_ITERATIONS)
                 break
         line.report[StepReport.STATUS], line.report[StepReport.WORST] = status, -1.0
+        line.report[StepReport.ERROR] = line.clock[Clock.ERROR] / end if status == Status.SOLVED else 0.0
         contacts = self._kept.contacts = line.contacts.copy()
         parts = rows[0] if len(rows) == 1 else [np.concatenate(column) for column in zip(*rows, strict=True)]
         starts, lengths, orders = parts
-        error = float(line.clock[Clock.ERROR]) / end
-        return Substeps(status, line.x.copy(), line.report.copy(), contacts, starts, lengths, orders, error)
+        return Substeps(status, line.x.copy(), line.report.copy(), contacts, starts, lengths, orders)
 
     def _goal(self, settings: Vector) -> Vector:
         """(8,) what sub-steps have to reach, see sim/integrators/adaptive.py."""
@@ -368,10 +366,9 @@ class AdaptiveEngine(PythonLoopEngine):
         goal, (A, B) = self._goal(settings), self.no_predictions[:2]
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
         contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
-        parts, estimates = np.ones(steps, dtype=np.int64), np.zeros(steps)
         xs[0], line.clock[Clock.BEGUN], knot = x, 0.0, 0
         line = line._replace(wrench=np.zeros_like(external[:1]))
-        path = SubstepMotion(us, external, xs, reports, contacts, parts, estimates)
+        path = SubstepMotion(us, external, xs, reports, contacts)
         try:
             for _ in pieces(settings, steps + 1):
                 knot = int(roll_substeps(models, data_tables, settings, goal, errors, line, path, knot))
@@ -379,8 +376,6 @@ class AdaptiveEngine(PythonLoopEngine):
                     break
         except KeyboardInterrupt:
             raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B)) from None
-        finally:
-            reports[:, StepReport.PARTS], reports[:, StepReport.ERROR] = parts, estimates
         self._kept.contacts = line.contacts.copy()
         return Rolled(knot, xs, reports, contacts, A, B)
 
@@ -401,8 +396,7 @@ class AdaptiveEngine(PythonLoopEngine):
                 refuse(reports[t : t + 1], 1, A[t : t + 1], B[t : t + 1])
             if reports[t, StepReport.STATUS] != Status.SOLVED:
                 break
-            xs[t + 1], contacts[t] = path.x, path.contacts
-            reports[t, StepReport.PARTS], reports[t, StepReport.ERROR], knot = len(path.lengths), path.error, t + 1
+            xs[t + 1], contacts[t], knot = path.x, path.contacts, t + 1
         return Rolled(knot, xs, reports, contacts, A, B)
 
     def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Vector) -> Floats:

@@ -27,11 +27,11 @@ from sim.model.model import Model
 from sim.model.record_columns import StepReport
 from sim.simulator.engines.division import DIVISIBLE
 from sim.simulator.engines.engine import (
-    REPORT,
     DividedStep,
     Engine,
     Floats,
     Rolled,
+    add_report,
     chained,
     contacts_of_parts,
     knot_inputs,
@@ -73,13 +73,6 @@ def _rows(motion: MotionBuffers, first: int, count: int) -> MotionBuffers:
         motion.A[first:last],
         motion.B[first:last],
     )
-
-
-def _write(divided: DividedStep, report: Vector) -> None:
-    """The report of a divided step; where it is that of all steps of a motion, with the largest loss of momentum."""
-    lost = report[StepReport.LOST]
-    report[:REPORT] = divided.report()
-    report[StepReport.LOST] = max(lost, report[StepReport.LOST])
 
 
 def _divisible(status: Floats | Integers) -> list[int]:
@@ -300,7 +293,7 @@ class DividingEngine(Engine):
             return False
         motion.xs[knot + 1] = divided.x
         self._ended.parts = divided.engine
-        _write(divided, report)
+        add_report(report, divided.report())
         if len(motion.contacts):
             motion.contacts[knot] = divided.contacts()
         if derivatives:
@@ -322,7 +315,7 @@ class DividingEngine(Engine):
         if divided is None:
             return False
         motion.xs[t + 1] = divided.x
-        _write(divided, report)
+        add_report(report, divided.report())
         report[StepReport.EARLIER] = total + report[StepReport.ITERATIONS]
         for array in data.carry:  # the next step does not continue the attempt that failed
             array[...] = 0

@@ -32,6 +32,7 @@ from solvers.types import Cube, Floats, Integers, Vector
 
 # numbers of a step, in loops that follow a law one more; and of one of its contacts or limits
 REPORT, CONTACT, CONE, BOUND = int(StepReport.EARLIER), 11, 12, 2
+_LARGEST = [int(StepReport.LOST), int(StepReport.ERROR)]  # of several steps, the largest
 _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 
@@ -94,6 +95,21 @@ class Rolled(NamedTuple):
     def parts(self) -> Integers:
         """(T,) steps that each was divided into, 1 for whole ones."""
         return np.maximum(self.reports[:, StepReport.PARTS], 1.0).astype(np.int64)
+
+    def summary(self) -> Vector:
+        """(9,) report of the last step that was tried, with the largest loss and error of the solved ones."""
+        if not len(self.reports):
+            return np.zeros(REPORT)
+        out = self.reports[min(self.solved_steps, len(self.reports) - 1)].copy()
+        out[_LARGEST] = self.reports[: self.solved_steps, _LARGEST].max(axis=0, initial=0.0)
+        return np.asarray(out)
+
+
+def add_report(total: Vector, report: Vector) -> None:
+    """total = the report (9,) of the steps that come next, with the largest loss and error of all steps so far."""
+    before = total[_LARGEST]
+    total[:REPORT] = report
+    total[_LARGEST] = np.maximum(before, report[_LARGEST])
 
 
 def finite_rows(array: Floats) -> NDArray[np.bool_]:

@@ -6,21 +6,10 @@ import numpy as np
 
 from sim.integrators.feedback import FeedbackLaw, Path
 from sim.model.record_columns import StepReport
-from sim.simulator.engines.engine import REPORT, Floats, Rolled, interrupted, knot_inputs
+from sim.simulator.engines.engine import REPORT, Floats, add_report, interrupted, knot_inputs
 from sim.simulator.engines.high_order_engine import HighOrderEngine
 from sim.simulator.results import Interrupted
 from solvers.types import Cube, Integers, Vector
-
-_LARGEST = [int(StepReport.LOST), int(StepReport.ERROR)]
-
-
-def _summary(rolled: Rolled) -> Vector:
-    """(9,) report of the last step that was tried, with the largest loss and error of the solved ones."""
-    if not len(rolled.reports):
-        return np.zeros(REPORT)
-    out = rolled.reports[min(rolled.solved_steps, len(rolled.reports) - 1)].copy()
-    out[_LARGEST] = rolled.reports[: rolled.solved_steps, _LARGEST].max(axis=0, initial=0.0)
-    return np.asarray(out)
 
 
 class PythonLoopEngine(HighOrderEngine):
@@ -44,7 +33,7 @@ class PythonLoopEngine(HighOrderEngine):
                 if isinstance(stop, Interrupted):
                     knots[i], xs[i] = stop.result.solved_steps, stop.result.xs
                 raise Interrupted((xs, reports, knots)) from None
-            reports[i] = _summary(rolled)
+            reports[i] = rolled.summary()
         return xs, reports, knots
 
     def roll_feedback(
@@ -71,9 +60,7 @@ class PythonLoopEngine(HighOrderEngine):
             except KeyboardInterrupt:
                 interrupted(path.report[None], 0)
                 raise Interrupted((t, path)) from None
-            before = path.report[_LARGEST]
-            path.report[:REPORT] = _summary(rolled)
-            path.report[_LARGEST] = np.maximum(before, path.report[_LARGEST])
+            add_report(path.report, rolled.summary())
             if rolled.solved_steps < substeps:
                 return t, path
             total += rolled.reports[:, StepReport.ITERATIONS].sum()
