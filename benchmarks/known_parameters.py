@@ -21,6 +21,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from command import deliver, number, parser, progress
+from cube import HALF
+from cube import cube as tossed_cube
 from urdf_zoo import package_files
 
 import dojo_opt as dojo
@@ -30,7 +32,6 @@ NOISE = (1e-4, 1e-3, 1e-2)  # [m, rad]
 RATES = 10.0  # times the noise: that of velocities
 WITHIN, DISHONEST = 3.0, 5.0  # standard deviations
 MISSED = 0.25  # share of the fits that may miss the truth
-HALF, STEP = 0.0524, 1.0 / 148.0  # of the cube [m], [s]
 HEADER = ("case", "noise", "seed", "status", "deviations off", "largest error [%]", "rms", "iterations", "time [s]")
 
 
@@ -73,10 +74,7 @@ def quadruped(rng: np.random.Generator) -> KnownCase:
 def cube(rng: np.random.Generator) -> KnownCase:
     """A cube is tossed as in ContactNets, and tumbles."""
     truth = {"friction:*": 0.18, "restitution:*": 0.125, "inertia:cube[xx]": 8.1e-4}
-    places = HALF * np.array(list(product((-1.0, 1.0), repeat=3)))
-    corners = [dojo.Contact("cube", tuple(place), friction=0.3, restitution=0.05) for place in places]
-    body = dojo.Body("cube", 0.37, (6.5e-4, 8.1e-4, 8.1e-4))
-    guess = dojo.Simulator(dojo.Mechanism([body], [dojo.Joint("floating", None, "cube")], corners), time_step=STEP)
+    guess = tossed_cube(0.3, 0.05, HALF).replace(kappa=None).with_parameters({"inertia:cube[xx]": 6.5e-4})
     real, motions = guess.with_parameters(truth), []
     for _ in range(4):
         x = real.neutral()
