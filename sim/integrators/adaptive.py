@@ -210,6 +210,7 @@ def attempt(
 ) -> int:  # fmt: skip
     """One attempt at the next sub-step, of order 8, or in contact; the Status."""
     clock = line.clock
+    line.report[StepReport.STATUS] = _SOLVED  # the steps that it tries write theirs, with their worst contact
     rest = goal[AccuracyGoal.END] - clock[Clock.TIME]
     reach = 0.9 * stand(models, data_tables, line, goal) if goal[AccuracyGoal.TREE] > 0.0 else 0.0
     long = min(clock[Clock.LONG], rest, reach)

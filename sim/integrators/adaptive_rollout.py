@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.integrators.adaptive import attempt
-from sim.integrators.substeps import AccuracyGoal, Clock, Embedded, SubstepState, begin_substeps
+from sim.integrators.substeps import AccuracyGoal, Clock, Embedded, SubstepState, begin_substeps, end_report
 from sim.model.interruptible_loops import is_due, note_deadline
 from sim.model.layout import data_view
 from sim.model.record_columns import StepReport
@@ -44,8 +44,8 @@ def _begin(line: SubstepState, path: SubstepMotion, end: float, t: int) -> None:
 @kernel
 def _end(line: SubstepState, path: SubstepMotion, end: float, t: int, status: int) -> None:
     """The results of step t."""
+    end_report(line, status)
     copy_vector(line.report, path.reports[t])
-    path.reports[t, StepReport.STATUS], path.reports[t, StepReport.WORST] = status, -1.0
     if status == _SOLVED:
         copy_vector(line.x, path.xs[t + 1])
         copy(line.contacts, path.contacts[t])
@@ -78,7 +78,7 @@ def roll_substeps(
             effort, line.taken[0] = line.report[StepReport.ITERATIONS], 0
             status = attempt(models, data_tables, settings, goal, embedded, line)
             if line.report[StepReport.PARTS] > goal[AccuracyGoal.MOST]:
-                status = _MAX_ITERATIONS
+                status, line.report[StepReport.STATUS] = _MAX_ITERATIONS, _SOLVED
             if status != _SOLVED:
                 _end(line, path, end, t, status)
                 return t

@@ -11,7 +11,10 @@ from solvers.codes import Code
 from solvers.compiler import kernel
 from solvers.dense import clear, copy_vector
 from solvers.rotation import three
+from solvers.status import Status
 from solvers.types import Cube, Integers, Matrix, Vector
+
+_SOLVED = int(Status.SOLVED)
 
 
 class Clock(Code):
@@ -130,6 +133,14 @@ def keep(line: SubstepState, h: float, order: int) -> None:
     if order != 8:
         line.clock[Clock.READY] = 0.0
         add_contacts(line)
+
+
+@kernel
+def end_report(line: SubstepState, status: int) -> None:
+    """The report of a step with this Status: its worst contact is that of the sub-step that failed with it."""
+    if status == _SOLVED or int(line.report[StepReport.STATUS]) != status:
+        line.report[StepReport.WORST] = -1.0
+    line.report[StepReport.STATUS] = status
 
 
 @kernel

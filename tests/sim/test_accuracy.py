@@ -17,7 +17,7 @@ from sim.integrators.slip_stop import friction_turn
 from sim.integrators.substep_lengths import lengthen, lengthen_kink, note_miss, shorten, shorten_unsolved, stalls
 from sim.integrators.substeps import Clock
 from sim.mechanism.mobility import largest_mobility
-from sim.model.record_columns import ContactRow
+from sim.model.record_columns import ContactRow, StepReport
 from sim.simulator.engines.adaptive_engine import AdaptiveEngine
 from support.linkage import plain_fourbar
 from support.scenes import ball, block
@@ -172,6 +172,21 @@ def test_an_input_acts_at_second_order_in_contact() -> None:
     u[0] = 1.0
     found = sim.rollout(placed(sim, 0.1, 0.0), u[None], duration=0.4, throw=True).x[-1]
     assert abs(found[0] - 0.5 * 0.4**2 / 1.4) < 3.0 * 0.4 * 1e-5
+
+
+def test_a_step_that_fails_names_its_worst_contact() -> None:
+    """Alike by itself, in a motion, and in the derivatives of sub-steps that were solved with more iterations."""
+    hasty, patient = (dojo.Simulator(models.hopper(), accuracy=1e-3, max_iterations=most) for most in (1, 50))
+    x, held = hasty.neutral(), (np.zeros(hasty.nu), engine(hasty).no_wrenches)
+    for found in (hasty.step(x), hasty.rollout(x, steps=1)):
+        assert found.status == dojo.Status.MAX_ITERATIONS
+        assert "Contact 'heel' is worst" in found.message
+    path = engine(patient).take(x, *held)
+    assert path.report[StepReport.WORST] == -1
+    A, _, report = engine(hasty).slopes(path, held)
+    assert report[StepReport.STATUS] == dojo.Status.MAX_ITERATIONS
+    assert report[StepReport.WORST] >= 0
+    assert np.isnan(A).all()
 
 
 def replayed(sim: dojo.Simulator, x: Floats, u: Floats, parts: tuple[Floats, NDArray[np.int64]]) -> Floats:

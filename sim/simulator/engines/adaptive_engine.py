@@ -24,7 +24,7 @@ from sim.integrators.hamilton_gradient import Slopes, empty_slopes
 from sim.integrators.node_slopes import node_slopes
 from sim.integrators.node_step import begin_work, mean_of_node, node_at
 from sim.integrators.rollout import Linearized, MotionBuffers, linearize, roll
-from sim.integrators.substeps import Clock, Embedded, SubstepState
+from sim.integrators.substeps import Clock, Embedded, SubstepState, end_report
 from sim.integrators.tableau import embedded
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.servos import limited_servos
@@ -58,7 +58,8 @@ _DIVISIONS = {4: (1, 2), 6: tuple(range(1, PARTS + 1))}  # of extrapolated steps
 _NUDGE = 1e-3  # of states and inputs, in differences
 
 Held = tuple[Vector, Cube]  # input (nu,) and external wrenches (1 or 0, nbody, 6) of a step
-Conversion = Callable[[Vector, Held, float], Vector]  # between a node and the mean state of a step of a length
+# between a node and the mean state of a step of a length: (Status, state)
+Conversion = Callable[[Vector, Held, float], tuple[int, Vector]]
 
 
 class Substeps(NamedTuple):
@@ -136,9 +137,9 @@ class AdaptiveEngine(PythonLoopEngine):
             if status != Status.SOLVED or line.clock[Clock.TIME] >= end:
                 break
             if line.report[StepReport.PARTS] > _MOST:
-                status = int(Status.MAX_ITERATIONS)
+                status, line.report[StepReport.STATUS] = int(Status.MAX_ITERATIONS), Status.SOLVED
                 break
-        line.report[StepReport.STATUS], line.report[StepReport.WORST] = status, -1.0
+        end_report(line, status)
         line.report[StepReport.ERROR] = line.clock[Clock.ERROR] / end if status == Status.SOLVED else 0.0
         contacts = self._kept.contacts = line.contacts.copy()
         parts = rows[0] if len(rows) == 1 else [np.concatenate(column) for column in zip(*rows, strict=True)]
@@ -189,28 +190,35 @@ class AdaptiveEngine(PythonLoopEngine):
     def _short(self, x: Vector, held: Held, h: float, kappa: float | None, parts: int) -> Vector:
         """The node one step of order 2 after x (nx,).   parts: as in `part_of` of node_step.py."""
         (u, wrench), xs = held, np.zeros((2, self.nx))
-        xs[0] = self._mean(x, held, h)
+        xs[0] = self._mean(x, held, h)[1]
         contacts = np.zeros((1, self.sizes.ncontact, CONTACT))
         line = MotionBuffers(xs, u[None], wrench, np.zeros((1, REPORT)), contacts, *self.no_predictions[:2])
         model, data = self._second.step_table(), self._scratch.table()
         if roll(model, data, self._part_settings(h, kappa, parts), line, 0, None, None) < 1:
             return np.full(self.nx, np.nan)
-        return self._node(xs[1], held, h)
+        return self._node(xs[1], held, h)[1]
 
     def part_slopes(
         self, x: Vector, held: Held, h: float, order: int, kappa: float | None = None
     ) -> tuple[Vector, Floats, Floats, Vector]:
-        """(node after a sub-step, its derivatives by x and by the input, report)."""
+        """(node after a sub-step, its derivatives by x and by the input, report).
+
+        The report is that of the part with the largest error, or of the first that is not solved; then do not use the
+        others.
+        """
         if order == 8:
             return self._long(x, held, h, True)
         if order == 2:
             return self._equal_slopes(x, held, h, 2, kappa)
         found = [self._equal_slopes(x, held, h, n, kappa) for n in _DIVISIONS[order]]
+        worst = max((report for *_, report in found), key=_least_exact)
+        if worst[StepReport.STATUS] != Status.SOLVED:
+            return *found[0][:3], worst
         ends = np.stack([end for end, *_ in found])
         shares = np.split(self._combined_slopes(ends), len(ends), axis=1)
         by_x = sum((C @ A for C, (_, A, _, _) in zip(shares, found, strict=True)), np.zeros((self.ndx, self.ndx)))
         by_u = sum((C @ B for C, (_, _, B, _) in zip(shares, found, strict=True)), np.zeros((self.ndx, self.nu)))
-        return self._combined(ends), by_x, by_u, max((report for *_, report in found), key=_least_exact)
+        return self._combined(ends), by_x, by_u, worst
 
     def _combined_slopes(self, ends: Floats) -> Floats:
         """Derivatives (ndx, 3 ndx) of the extrapolated node by those it is combined of, by differences."""
@@ -233,12 +241,19 @@ class AdaptiveEngine(PythonLoopEngine):
         h, reports = h / parts, np.zeros((1, REPORT))
         settings, worst = self._part_settings(h, kappa, 2 if parts == 1 else 1), np.zeros(REPORT)
         for _ in range(parts):
-            mean, x_next = self._mean(x, held, h), np.zeros((1, self.nx))
+            status, mean = self._mean(x, held, h)
+            if status != Status.SOLVED:
+                return x, by_x, by_u, _refused(status)
+            x_next = np.zeros((1, self.nx))
             line = Linearized(mean[None], u[None], wrench, A, B, x_next, reports)
             linearize(model, data, settings, (0, 0, 1), 1, line)
             worst = max(worst, reports[0].copy(), key=_least_exact)
+            if worst[StepReport.STATUS] != Status.SOLVED:
+                return x, by_x, by_u, worst
             C, D = self._mean_slopes(x, held, h, mean)
-            x = self._node(x_next[0], held, h)
+            status, x = self._node(x_next[0], held, h)
+            if status != Status.SOLVED:
+                return x, by_x, by_u, _refused(status)
             E, F = self._end_slopes(x_next[0], held, h, x)
             by_u = E @ (A[0] @ (C @ by_u + D) + B[0]) + F
             by_x = E @ A[0] @ C @ by_x
@@ -260,19 +275,19 @@ class AdaptiveEngine(PythonLoopEngine):
             xs[1] = np.nan
         return xs[1], A, B, reports[0]
 
-    def _mean(self, x: Vector, held: Held, h: float) -> Vector:
-        """The mean state of the node x before a step of length h; NaN where there is none."""
+    def _mean(self, x: Vector, held: Held, h: float) -> tuple[int, Vector]:
+        """(Status, mean state of the node x before a step of length h); NaN where there is none."""
         (u, wrench), mean, data = held, np.zeros(self.nx), self._scratch.table()
         begin_work(data, wrench)
-        status = mean_of_node(self._second.step_table(), data, h, u, x, mean)
-        return mean if status == Status.SOLVED else np.full(self.nx, np.nan)
+        status = int(mean_of_node(self._second.step_table(), data, h, u, x, mean))
+        return status, mean if status == Status.SOLVED else np.full(self.nx, np.nan)
 
-    def _node(self, mean: Vector, held: Held, h: float) -> Vector:
-        """The node at the end of a step of length h to the mean state."""
+    def _node(self, mean: Vector, held: Held, h: float) -> tuple[int, Vector]:
+        """(Status, node at the end of a step of length h to the mean state); NaN where there is none."""
         (u, wrench), x, data = held, np.zeros(self.nx), self._scratch.table()
         begin_work(data, wrench)
-        status = node_at(self._second.step_table(), data, h, u, mean, x)
-        return x if status == Status.SOLVED else np.full(self.nx, np.nan)
+        status = int(node_at(self._second.step_table(), data, h, u, mean, x))
+        return status, x if status == Status.SOLVED else np.full(self.nx, np.nan)
 
     def _node_terms(self, x: Vector, held: Held) -> tuple[Slopes, Floats]:
         """Derivatives of M(q) v and of the forces of inputs and wrenches, at the node x."""
@@ -323,25 +338,29 @@ class AdaptiveEngine(PythonLoopEngine):
 
         Loops and gears are closed by projections, whose derivatives have second derivatives of the closures.
         """
-        (u, wrench), end = held, convert(x, held, h)
+        (u, wrench), end = held, convert(x, held, h)[1]
 
         def moved(change: Floats) -> Floats:
             start = self.states.integrate(x[None], change[None, : self.ndx])[0]
-            to = convert(start, (u + change[self.ndx :], wrench), h)
+            _, to = convert(start, (u + change[self.ndx :], wrench), h)
             return np.asarray(self.states.difference(end[None], to[None])[0])
 
         both = central_differences(moved, self.ndx + self.nu, _NUDGE)
         return both[:, : self.ndx], both[:, self.ndx :]
 
-    def slopes(self, path: Substeps, held: Held, kappa: float | None = None) -> tuple[Floats, Floats, float]:
-        """(A, B, accuracy of them) of a step: the products of those of its sub-steps, whose lengths are held."""
-        A, B, accuracy = np.eye(self.ndx), np.zeros((self.ndx, self.nu)), 0.0
+    def slopes(self, path: Substeps, held: Held, kappa: float | None = None) -> tuple[Floats, Floats, Vector]:
+        """(A, B, report) of a step: the products of those of its sub-steps, whose lengths are held.
+
+        The report (9,) is that of the sub-step with the largest error, or of the first without derivatives.
+        """
+        A, B, worst = np.eye(self.ndx), np.zeros((self.ndx, self.nu)), np.zeros(REPORT)
         for x, h, order in zip(path.starts, path.lengths, path.orders, strict=True):
             _, dx, du, report = self.part_slopes(x, held, h, int(order), kappa)
-            A, B, accuracy = dx @ A, dx @ B + du, max(accuracy, report[StepReport.ACCURACY])
-            if report[StepReport.STATUS] != Status.SOLVED:
-                return np.full_like(A, np.nan), np.full_like(B, np.nan), accuracy
-        return A, B, accuracy
+            worst = max(worst, report, key=_least_exact)
+            if worst[StepReport.STATUS] != Status.SOLVED:
+                return np.full_like(A, np.nan), np.full_like(B, np.nan), worst
+            A, B = dx @ A, dx @ B + du
+        return A, B, worst
 
     # -- motions -------------------------------------------------------------------------------------------------------
 
@@ -392,8 +411,12 @@ class AdaptiveEngine(PythonLoopEngine):
             path = self.take(xs[t], *held, kappa)
             reports[t] = path.report
             if path.status == Status.SOLVED:
-                A[t], B[t], reports[t, StepReport.ACCURACY] = self.slopes(path, held, kappa)
-                refuse(reports[t : t + 1], 1, A[t : t + 1], B[t : t + 1])
+                A[t], B[t], found = self.slopes(path, held, kappa)
+                reports[t, StepReport.ACCURACY] = found[StepReport.ACCURACY]
+                if found[StepReport.STATUS] == Status.SOLVED:
+                    refuse(reports[t : t + 1], 1, A[t : t + 1], B[t : t + 1])
+                else:
+                    reports[t], reports[t, StepReport.PARTS] = found, len(path.lengths)
             if reports[t, StepReport.STATUS] != Status.SOLVED:
                 break
             xs[t + 1], contacts[t], knot = path.x, path.contacts, t + 1
@@ -434,8 +457,16 @@ class AdaptiveEngine(PythonLoopEngine):
 
 
 def _least_exact(report: Vector) -> tuple[bool, float]:
-    """Order of reports of derivatives: unsolved ones last, then those with a larger error."""
-    return bool(report[StepReport.STATUS] != Status.SOLVED), float(report[StepReport.ACCURACY])
+    """Order of reports of derivatives: those with a larger error later, unsolved ones last, alike."""
+    unsolved = bool(report[StepReport.STATUS] != Status.SOLVED)
+    return unsolved, 0.0 if unsolved else float(report[StepReport.ACCURACY])
+
+
+def _refused(status: int) -> Vector:
+    """(9,) report of a conversion between a node and a mean state that failed."""
+    report = np.zeros(REPORT)
+    report[StepReport.STATUS], report[StepReport.WORST] = status, -1.0
+    return report
 
 
 def _lightest(model: Model) -> float:
