@@ -17,7 +17,7 @@ from sim.solve.inequalities import (
 )
 from sim.solve.merit import residuals
 from sim.solve.prediction import predict, predictable
-from sim.solve.trial_velocity import INFEASIBLE, set_trial_velocity
+from sim.solve.trial_velocity import INFEASIBLE, move_trial_velocity, set_trial_velocity
 from solvers.compiler import inlined, kernel
 from solvers.types import Vector
 
@@ -159,7 +159,10 @@ def warm_or_resumed(
 def at_kappa(
     model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], velocity: Vector
 ) -> KnownStart:
-    """At the guess with the impulses kappa / gap, where they all but balance."""
+    """At the guess with the impulses kappa / gap, where they all but balance.
+
+    Active features are those at the incoming velocity, whatever the guess: a step has one solution, with every guess.
+    """
     q, v, u = inputs
     h = options.h
     kappa = options.kappa
@@ -170,7 +173,7 @@ def at_kappa(
     placed = True  # most guess the incoming velocity: there already
     for d in range(v.shape[0]):
         placed = placed and velocity[d] == v[d]
-    if not placed and not set_trial_velocity(model, data, h, q, velocity, 1.0):
+    if not placed and not move_trial_velocity(model, data, h, q, velocity):
         return KnownStart(False, kappa, INFEASIBLE, 1.0, False)
     start_inequalities(model, data, h, kappa, 0.0)
     hard = residuals(model, data, h, q, v, u)

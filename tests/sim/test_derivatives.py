@@ -201,6 +201,31 @@ def test_trajectory_linearization_agrees_with_single_steps(rng):
         np.testing.assert_allclose(chained.A[k], expected, rtol=0, atol=1e-8 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize(
+    ("shape", "kappa", "seed"),
+    [(dojo.Box(0.3, 0.2, 0.1), 1e-3, 2), (dojo.Capsule(0.08, 0.3), 0.03, 7)],
+    ids=["box", "capsule"],
+)
+def test_the_next_state_as_a_guess_leads_to_the_same_step(shape, kappa, seed):
+    """Features of shapes that are active depend on the state, and not on where the solver starts: with those at the
+    next state a step of the box ended .2 m/s elsewhere, and the gradient of its motion was off by half.
+    """
+    obstacle = dojo.Collision("a", shape_b=dojo.Box(1, 1, 0.2))
+    scene = dojo.Mechanism(
+        [dojo.Body("a", 1.0, shape=shape)], [dojo.Joint("floating", None, "a")], collisions=[obstacle]
+    )
+    sim = dojo.Simulator(scene, time_step=0.02, kappa=kappa, tolerance=1e-10)
+    draw = np.random.default_rng(seed)
+    x0 = np.r_[0.0, 0.0, 0.4, 1.0, 0.0, 0.0, 0.0, np.zeros(6)]
+    turned = 0.3 * draw.standard_normal(6) * [0.1, 0.1, 0.2, 1, 1, 1]
+    motion = sim.rollout(sim.integrate(x0, np.r_[turned, 2.0 * draw.standard_normal(6)]), np.zeros((8, 0)))
+    found = sim.linearize_trajectory(motion.x, motion.u)
+    np.testing.assert_allclose(sim.difference(found.x_next, motion.x[1:]), 0.0, atol=1e-9)
+    for t in range(8):
+        A, _ = sim.linearize(motion.x[t])
+        np.testing.assert_allclose(found.A[t], A, rtol=0, atol=1e-6 * np.abs(A).max())
+
+
 def test_difference_takes_the_new_state_first(rng):
     """difference(x1, x0) is the dx with integrate(x0, dx) = x1."""
     sim = dojo.Simulator(chain("spherical", 2))
