@@ -126,7 +126,7 @@ class _ProblemEpisode:
     def reset(self, rng: np.random.Generator) -> Vector:
         """Back to the start, under another perturbation when there is a sampler."""
         if self._sampler is not None:
-            self.plant = self._plant.perturbed(self._sampler(rng))
+            self.plant = self._plant.perturbed(self._sampler(rng).over(self._plant.perturbation))
         self.plant.reset()
         self._knot = 0
         self._xs[:] = self.plant.x
@@ -138,7 +138,8 @@ class _ProblemEpisode:
         if t >= self.steps:
             raise RuntimeError("Environment.step: the episode is over, or has not begun; call reset()")
         us, plant = self._us, self.plant
-        us[t] = self._middle + self._half * np.clip(_numbers(action, us.shape[1]), -self.edge, self.edge)
+        limited = np.minimum(np.maximum(_numbers(action, us.shape[1]), -self.edge), self.edge)  # faster than np.clip
+        us[t] = self._middle + self._half * limited
         message = plant.hold(us[t], self._substeps)
         self._knot = t + 1
         self._xs[t + 1] = plant.x

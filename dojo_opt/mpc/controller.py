@@ -15,7 +15,7 @@ from dojo_opt.mpc.delay import Delay, Prediction
 from dojo_opt.mpc.foot_shear import FootShear
 from dojo_opt.mpc.ground_estimate import Ground
 from dojo_opt.mpc.measurement import Measurement
-from dojo_opt.mpc.moving_reference import References
+from dojo_opt.mpc.moving_reference import References, own_reference
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.mpc.receding_horizon import shift_multipliers, tail
 from dojo_opt.mpc.rescue import SCALES, Starts
@@ -79,7 +79,7 @@ class MPC:
             raise TypeError(f"MPC(problem): expected a Problem, got {problem!r}")
         checks.keywords("MPC(...)", settings, MPCSettings.__dataclass_fields__)
         self.settings = MPCSettings(**settings)
-        self._again = partial(MPC, problem, iterations, reference=reference, plan=plan, **settings)
+        self._again = partial(_another, problem, iterations, reference=reference, plan=plan, **settings)
         changed: dict[str, Any] = {} if self.settings.friction is None else {"friction": self.settings.friction}
         if self.settings.shrinkage:
             changed["mechanism"] = shrunk(problem.sim.mechanism, self.settings.shrinkage)
@@ -118,7 +118,7 @@ class MPC:
         return self._again, ()
 
     def fresh(self) -> MPC:
-        """A controller made from the same arguments, without plan, measurements and log.
+        """A controller made from the same arguments, without plan, measurements and log, for another robot.
 
         Returns:
             The new controller.
@@ -145,7 +145,8 @@ class MPC:
         return monte_carlo(self, plant, sampler, duration, **settings)
 
     def reset(self) -> None:
-        """Forget plan, measurements and log."""
+        """Forget plan, measurements and log, and where references were anchored."""
+        self.references.reset()
         self.log: list[Tick] = []
         self._fallbacks = 0  # ticks in a row without a new plan
         self.policy: Policy | None = None  # in force
@@ -406,3 +407,8 @@ class MPC:
 def _near(there: Iterate, guess: Iterate) -> bool:
     """Whether a rollout is still near the guess that it began from."""
     return there.merit - guess.merit <= (_LOST - 1.0) * abs(guess.merit)
+
+
+def _another(problem: Problem, iterations: int, *, reference: Any, **arguments: Any) -> MPC:
+    """A controller whose reference is its own."""
+    return MPC(problem, iterations, reference=own_reference(reference), **arguments)

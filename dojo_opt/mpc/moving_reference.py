@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping
+from types import MethodType
 from typing import Any
 
 import numpy as np
@@ -20,7 +22,7 @@ Moving = Callable[[Any], ArrayLike]  # times (n,) [s] -> rows (n, nx) or (n, nu)
 
 _ROUNDING = 1e-9  # laps: times are sums of floating-point steps
 
-__all__ = ["AnchoredReference", "References", "SampledReference"]
+__all__ = ["AnchoredReference", "References", "SampledReference", "own_reference"]
 
 
 def _check_space(call: str, sim: Any) -> None:
@@ -154,7 +156,7 @@ class AnchoredReference:
         if np.size(anchored):
             self._on[chosen_components("AnchoredReference(anchored=...)", anchored, sim)] = True
         self._sim = sim
-        self.anchor(0.0, self.begin)
+        self.reset()
 
     def anchor(self, time: float, x: Vector) -> None:
         """Begin anew.
@@ -166,6 +168,10 @@ class AnchoredReference:
         self._t0, sim = time, self._sim
         off = np.where(self._on, sim.difference(np.asarray(x), self.begin), 0.0)
         self._from = sim.integrate(self.begin, off)
+
+    def reset(self) -> None:
+        """Forget where the robot was measured."""
+        self.anchor(0.0, self.begin)
 
     def __call__(self, times: ArrayLike) -> Matrix:
         """The target at given times.
@@ -181,13 +187,45 @@ class AnchoredReference:
         return self._sim.integrate(self._from, share * self._step)
 
 
+def _owner(function: Any) -> Any:
+    """The object that a method belongs to; any other object itself."""
+    return function.__self__ if isinstance(function, MethodType) else function
+
+
+def _moves(owner: Any) -> bool:
+    """Whether an object remembers where the robot was."""
+    return hasattr(owner, "anchor") and not isinstance(owner, type)
+
+
+def own_reference(given: Any) -> Any:
+    """The same reference for another controller.
+
+    Args:
+        given: as of `References`.
+
+    Returns:
+        The same, with a copy of each object that is anchored.
+    """
+    copies: dict[int, Any] = {}
+
+    def own(value: Any) -> Any:
+        owner = _owner(value)
+        if not _moves(owner):
+            return value
+        copied = copies.setdefault(id(owner), copy.copy(owner))
+        return MethodType(value.__func__, copied) if isinstance(value, MethodType) else copied
+
+    return {key: own(value) for key, value in given.items()} if isinstance(given, Mapping) else own(given)
+
+
 class References:
     """The costs of a problem whose references move, and the functions that move them.
 
     A function takes times (n,) [s] and returns rows (n, nx) or (n, nu). A trajectory is an array of rows one knot
     apart, or an object with `x` (n, nx) and `time` (n,), such as a plan. Both start at time zero. If a function has a
     method anchor(time, x), as `AnchoredReference` has, it is called with the beginning of each horizon and the state
-    there.
+    there; a method reset() is called when the controller begins anew. Controllers that are made from another one, as
+    by `MPC.fresh`, have a copy of such an object (copy.copy), so `anchor` assigns attributes and writes into none.
 
     Args:
         problem: the problem; the references of its terms are overwritten.
@@ -220,6 +258,12 @@ class References:
         self._call_checked(0.0)
         self._begin = np.nan  # [s] of the first knot
         self.plane = GroundPlane()  # at the last move
+
+    def reset(self) -> None:
+        """Have objects that are anchored forget where they were."""
+        for owner in {id(owner): owner for _, function in self._moving if _moves(owner := _owner(function))}.values():
+            if hasattr(owner, "reset"):
+                owner.reset()
 
     @property
     def tracked(self) -> Integers | None:

@@ -125,7 +125,11 @@ def ilqr(
     plan = solver.solve(controls, states, warm_start)
     if not plan.success:
         return plan
-    return refine(problem, plan, options, lambda finer, last: Solver(finer, options).solve(warm_start=last))
+
+    def solve_again(finer: Problem, last: Plan, left: Options) -> Plan:
+        return Solver(finer, left).solve(warm_start=last)
+
+    return refine(problem, plan, options, solve_again)
 
 
 class _Attempt(NamedTuple):

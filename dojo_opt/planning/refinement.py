@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -19,7 +20,7 @@ __all__ = ["coordinate_error", "refine", "replay_error"]
 
 _MOST = 32  # parts of a time step
 
-Solve = Callable[[Problem, Plan], Plan]  # of a problem, from a plan
+Solve = Callable[[Problem, Plan, Options], Plan]  # of a problem, from a plan
 
 
 def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan:
@@ -35,16 +36,17 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
     Args:
         problem: the problem, with its own time steps.
         plan: its solved plan.
-        options: of `ilqr`, which print.
+        options: of `ilqr`; their limits are those of all solves and replays together.
         solve: solves a problem with shorter steps, from a plan.
 
     Returns:
-        The last plan, with the iterations of all; ACCURACY_NOT_REACHED if the replay is still too far off, INFEASIBLE
-        if the first plan is not refined.
+        The last plan, with the iterations and the time of all; ACCURACY_NOT_REACHED if the replay is still too far off,
+        INFEASIBLE if the first plan is not refined, MAX_ITERATIONS or TIME_LIMIT if nothing is left for a solve.
 
     Raises:
         Interrupted: after Ctrl-C during a replay; its `result` is the plan so far.
     """
+    began = time.perf_counter() - plan.seconds
     plans, count, asked = [plan], problem.refinement, problem.refined_accuracy
     if count == 1 and asked is not None and problem.refined_constraints:
         count = 2  # these are constraints of a refined problem
@@ -52,20 +54,33 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
         if count > 1:
             if len(plans) == 1 and (missed := _missed(problem, plan, options)) is not None:
                 return missed
+            left = _left(options, plans, began)
+            if isinstance(left, Status):
+                return _ended(_joined(plans, began, options), left)
             options.say(f"Refinement: every time step divided by {count}:")
-            plans.append(solve(problem.refined(count), plans[-1]))
+            plans.append(solve(problem.refined(count), plans[-1], left))
         if asked is None or not plans[-1].success:
-            return _joined(plans, options)
+            return _joined(plans, began, options)
         try:
             apart = replay_error(plans[-1])
         except KeyboardInterrupt:
-            raise Interrupted(_ended(_joined(plans, options), Status.INTERRUPTED)) from None
+            raise Interrupted(_ended(_joined(plans, began, options), Status.INTERRUPTED)) from None
         options.say(f"Replay with an accuracy of {REPLAY_ACCURACY:g}: {apart:.1e} from the plan, asked {asked:g}")
         if apart <= asked:
-            return _joined(plans, options)
+            return _joined(plans, began, options)
         if 2 * count > _MOST:
-            return _ended(_joined(plans, options), Status.ACCURACY_NOT_REACHED, f" {apart:.1e} apart, asked {asked:g}.")
+            detail = f" {apart:.1e} apart, asked {asked:g}."
+            return _ended(_joined(plans, began, options), Status.ACCURACY_NOT_REACHED, detail)
         count *= 2
+
+
+def _left(options: Options, plans: list[Plan], began: float) -> Options | Status:
+    """The options with what is left of their limits; the status of the limit that is reached, if one is."""
+    iterations = options.max_iterations - sum(plan.nit for plan in plans)
+    seconds = options.time_limit - (time.perf_counter() - began)
+    if iterations < 1:
+        return Status.MAX_ITERATIONS
+    return replace(options, max_iterations=iterations, time_limit=seconds) if seconds > 0.0 else Status.TIME_LIMIT
 
 
 def _missed(problem: Problem, plan: Plan, options: Options) -> Plan | None:
@@ -100,15 +115,15 @@ def coordinate_error(plan: Plan, replay: FeedbackRollout) -> float:
 
 def _ended(plan: Plan, status: Status, detail: str = "") -> Plan:
     """The plan with another end."""
-    message = MESSAGES[status] if status == Status.INTERRUPTED else "The replay does not agree with the plan:"
+    message = MESSAGES[status] if status != Status.ACCURACY_NOT_REACHED else "The replay does not agree with the plan:"
     return replace(plan, success=False, status=status, message=message + detail)
 
 
-def _joined(plans: list[Plan], options: Options) -> Plan:
-    """The last plan, with the iterations, records and time of all."""
+def _joined(plans: list[Plan], began: float, options: Options) -> Plan:
+    """The last plan, with the iterations and records of all, and the time since the first began, replays included."""
+    seconds = time.perf_counter() - began
     if len(plans) == 1:
-        return plans[0]
-    seconds = sum(plan.seconds for plan in plans)
+        return replace(plans[0], seconds=seconds)
     history = [record for plan in plans for record in plan.history]
     counts = " + ".join(str(plan.nit) for plan in plans)
     options.say(f"{counts} iterations, {1e3 * seconds:.1f} ms in all")

@@ -192,6 +192,10 @@ def closed_loop(
 def steps_of(call: str, plant: Plant, duration: float) -> int:
     """Steps of the plant in a duration [s], whose record fits the memory."""
     steps = round(checks.number(call, duration, above=0.0) / plant.nominal.time_step)
+    if not steps:
+        raise ValueError(
+            f"{call}: expected a step of the plant, {plant.nominal.time_step:g} s, or more, got {duration}"
+        )
     numbers = plant.nominal.nx + plant.nominal.nu + 11 * plant.nominal.ncontact
     check_room(call, steps, _RECORD + 8.0 * numbers, "run it in parts")
     return steps

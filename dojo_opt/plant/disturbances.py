@@ -50,7 +50,8 @@ class Disturbances:
     def __post_init__(self) -> None:
         call = "Disturbances"
         whole_number(f"{call}(nv)", self.nv)
-        checks.number(f"{call}(velocity=...)", self.velocity, at_least=0.0)
+        if checks.number(f"{call}(velocity=...)", self.velocity, at_least=0.0) and self.nv < 2:
+            raise ValueError(f"{call}(velocity=...): expected a robot with nv >= 2, got nv = {self.nv}")
         for name in ("payload_inertia", "delay"):
             checks.number(f"{call}({name}=...)", getattr(self, name), at_least=0.0)
         noise = checks.spread(f"{call}(noise=...)", self.noise, 2 * self.nv)
@@ -61,6 +62,10 @@ class Disturbances:
                 low, high = checks.vector(f"{call}({name}=...)", given, 2)
                 if not low <= high:
                     raise ValueError(f"{call}({name}=...): expected (low, high) with low <= high, got {given!r}")
+                if low < 0.0 and name in ("push", "payload", "friction"):
+                    raise ValueError(f"{call}({name}=...): expected numbers >= 0, got {given!r}")
+        if np.abs(self.slope).max() >= 0.5 * np.pi:
+            raise ValueError(f"{call}(slope=...): expected less than a right angle, got {self.slope!r} rad")
 
     def __call__(self, rng: np.random.Generator) -> Perturbation:
         """Draw one perturbation.
@@ -77,7 +82,8 @@ class Disturbances:
         within = [lo + (hi - lo) * r for (lo, hi), r in zip(self._ranges(), parts, strict=True)]
         push, push_time, payload, slope = within
         offset = np.zeros(2 * self.nv)
-        offset[self.nv : self.nv + 2] = self.velocity * (2.0 * np.array([along, across]) - 1.0)
+        if self.velocity:
+            offset[self.nv : self.nv + 2] = self.velocity * (2.0 * np.array([along, across]) - 1.0)
         angle = 2.0 * np.pi * heading
         impulse = push * np.array([np.cos(angle), np.sin(angle), 0.0])
         friction = None if self.friction is None else self.friction[0] + (self.friction[1] - self.friction[0]) * grip

@@ -133,7 +133,7 @@ def monte_carlo(
 
     Args:
         controller: an `MPC`, or a function of (time, x) without memory.
-        plant: the plant; each run perturbs a copy of it.
+        plant: the plant; each run perturbs a copy of it, see `Perturbation.over` for one that is perturbed already.
         sampler: generator -> Perturbation, such as `Disturbances`; with an executor that uses processes, a function or
             object that they can import.
         duration: length of each run [s].
@@ -186,6 +186,7 @@ def _run(
         raise TypeError(f"monte_carlo(sampler): expected it to return a Perturbation, got {perturbation!r}")
     control_step, components = settings
     own = controller.fresh() if hasattr(controller, "fresh") else copy.copy(controller)
+    perturbation = perturbation.over(plant.perturbation)
     loop = closed_loop(own, plant.perturbed(perturbation), duration, control_step=control_step)
     return MonteCarloRun(
         survived=loop.survived,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,13 +12,19 @@ from numpy.typing import ArrayLike, NDArray
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.input import Input
-from sim.mechanism.joint import require_floating_base
+from sim.mechanism.joint import WORLD, require_floating_base
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.moved_scene import moved_coordinates, moved_obstacle, moved_visual, turned_velocities
+from sim.mechanism.shapes import rotation_matrix
 from sim.mechanism.short_repr import short_repr
 from sim.mechanism.terrain import Terrain
-from sim.model.state_columns import BaseState
 from sim.simulator.contact_settings import with_contacts
-from solvers.types import Matrix, Vector
+from solvers.types import Vector
+
+_TOGETHER = [  # fields that say one thing
+    ("payload", "payload_body", "payload_inertia"),
+    ("slope", "slope_heading", "ground_height", "terrain"),
+]
 
 __all__ = ["Perturbation", "Push"]
 
@@ -60,7 +66,7 @@ class Perturbation:
         payload_inertia: added to the inertia of that body: a number, or (3,) principal moments [kg m^2] (default 0).
         friction: coefficient of friction of all contacts (default None: that of the model).
         damping: factor of the dampers of all joints (default 1).
-        slope: angle of the ground [rad] (default 0).
+        slope: angle of the ground, and of the obstacles that stand on it [rad] (default 0).
         slope_heading: direction in which the ground rises, from x to y [rad] (default 0).
         ground_height: height of the ground [m] (default 0).
         terrain: ground under all contacts (default None: that of the model).
@@ -98,6 +104,8 @@ class Perturbation:
         for name in ("noise", "payload_inertia"):
             if np.any(_array(f"{call}({name}=...)", getattr(self, name)) < 0.0):
                 raise ValueError(f"{call}({name}=...): expected numbers >= 0, got {getattr(self, name)!r}")
+        if (shape := np.shape(self.payload_inertia)) not in ((), (1,), (3,)):
+            raise ValueError(f"{call}(payload_inertia=...): expected a number, or three, got shape {shape}")
         _array(f"{call}(offset=...)", self.offset)
         if self.control_limits is not None:
             _check_limits(f"{call}(control_limits=...)", self.control_limits)
@@ -115,6 +123,23 @@ class Perturbation:
         given = (self.pushes,) if isinstance(self.pushes, Push) else self.pushes
         pushes = checks.items(f"{call}(pushes=...)", given, Push)
         object.__setattr__(self, "pushes", pushes)
+
+    def over(self, other: Perturbation) -> Perturbation:
+        """This perturbation of a plant that is perturbed already.
+
+        What this one leaves at its default is that of the other. Payload with its body and inertia, and the ground with
+        its slope, heading, height and terrain, are taken as a whole. The seed is that of this one.
+
+        Args:
+            other: the perturbation of the plant.
+
+        Returns:
+            Both together.
+        """
+        given = {f.name for f in fields(self) if _differs(getattr(self, f.name), f.default)}
+        alone = {f.name for f in fields(self)}.difference(*_TOGETHER, ["seed"])
+        kept = [group for group in (*_TOGETHER, *((name,) for name in alone)) if given.isdisjoint(group)]
+        return replace(self, **{name: getattr(other, name) for group in kept for name in group})
 
     @property
     def normal(self) -> Vector:
@@ -165,16 +190,22 @@ class Perturbation:
         contacts: Any = mechanism.contacts
         if self.slope and any(c.terrain is not None for c in contacts):
             raise ValueError("Perturbation(slope=...): expected contacts with half-spaces, got contacts on terrain")
+        collisions, scenery = mechanism.collisions, mechanism.scenery
         if self.slope or self.ground_height:
-            turn = _rotation(self.slope, self.slope_heading)
+            point, quat = self._place
+            turn = rotation_matrix(quat)
+            turned = [turn @ np.asarray(c.normal) for c in contacts]
             contacts = [
-                replace(c, normal=turn @ np.asarray(c.normal), height=c.height + self.ground_height) for c in contacts
+                replace(c, normal=n, height=c.height + float(n @ point)) for c, n in zip(contacts, turned, strict=True)
             ]
+            collisions = [moved_obstacle(c, point, quat) for c in collisions]
+            scenery = [moved_visual(v, point, quat) for v in scenery]
         inputs = list(mechanism.inputs or ())
         for name in self.pushed(mechanism):
             for axis, force in zip("xyz", np.eye(3), strict=True):
                 inputs.append(Input(body=name, force=force, name=f"push {name} {axis}"))
-        changed = replace(mechanism, bodies=bodies, joints=joints, contacts=contacts, inputs=inputs)
+        parts: dict[str, Any] = {"bodies": bodies, "joints": joints, "contacts": contacts, "inputs": inputs}
+        changed = replace(mechanism, **parts, collisions=collisions, scenery=scenery)
         changed = changed if self.terrain is None else changed.with_terrain(self.terrain)
         return changed if self.friction is None else with_contacts(changed, "friction", self.friction)
 
@@ -205,30 +236,39 @@ class Perturbation:
         """The state of a robot on level ground, moved and turned with the ground: the same feet touch it.
 
         Args:
-            mechanism: mechanism of the robot.
+            mechanism: mechanism of the robot, and of objects around it.
             x: (nx,) state on level ground.
 
         Returns:
             (nx,) state; x itself on level ground at height zero.
 
         Raises:
-            ValueError: the ground is moved, and the robot has no floating base.
+            ValueError: the ground is moved, and a body hangs on the world by a joint that is not floating.
         """
         changed = [name for name in ("slope", "ground_height", "terrain") if getattr(self, name)]
-        if changed:
-            require_floating_base(f"Perturbation({changed[0]}=...)", mechanism.joints[0])
+        for joint in mechanism.joints:
+            if changed and joint.parent == WORLD:
+                require_floating_base(f"Perturbation({changed[0]}=...)", joint)
         if not (self.slope or self.ground_height):
             return x
-        turn = _rotation(self.slope, self.slope_heading)
-        axis = np.array([np.sin(self.slope_heading), -np.cos(self.slope_heading), 0.0])
+        point, quat = self._place
+        q, v = x[: mechanism.nq], x[mechanism.nq :]
+        moved = moved_coordinates(mechanism.joints, q, point, quat)
+        return np.concatenate([moved, turned_velocities(mechanism.joints, v, quat)])
+
+    @property
+    def _place(self) -> tuple[Vector, Vector]:
+        """Where the ground is: (3,) point [m] that was the origin, (4,) quaternion that turns level ground."""
         half = 0.5 * self.slope
-        out, v = x.copy(), mechanism.nq
-        out[:3] = turn @ x[:3] + self.ground_height * turn[:, 2]
-        out[BaseState.QUATERNION] = _product(
-            np.concatenate([[np.cos(half)], np.sin(half) * axis]), x[BaseState.QUATERNION]
-        )
-        out[v : v + 3] = turn @ x[v : v + 3]
-        return out
+        axis = np.array([np.sin(self.slope_heading), -np.cos(self.slope_heading), 0.0])
+        return self.ground_height * self.normal, np.concatenate([[np.cos(half)], np.sin(half) * axis])
+
+
+def _differs(value: Any, default: Any) -> bool:
+    """Whether the value of a field is not its default, or its default written out."""
+    if default is None:
+        return value is not None
+    return bool(np.any(np.asarray(value, dtype=object)) if default == () else np.any(np.asarray(value) != default))
 
 
 def _array(call: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -246,19 +286,3 @@ def _check_limits(call: str, limits: Any) -> None:
         raise ValueError(f"{call}: expected (lower, upper), got {limits!r}") from None
     if not np.all(lo <= hi):
         raise ValueError(f"{call}: expected lower <= upper, got {limits!r}")
-
-
-def _rotation(slope: float, heading: float) -> Matrix:
-    """Turns level ground into ground that rises by `slope` towards `heading`."""
-    c, s, u, w = np.cos(slope), np.sin(slope), np.cos(heading), np.sin(heading)
-    along, across, up = np.array([u, w, 0.0]), np.array([-w, u, 0.0]), np.array([0.0, 0.0, 1.0])
-    new = c * along + s * up, across, c * up - s * along
-    return np.asarray(np.outer(new[0], along) + np.outer(new[1], across) + np.outer(new[2], up))
-
-
-def _product(a: Vector, b: Vector) -> Vector:
-    """Hamilton product of two quaternions."""
-    out = np.empty(4)
-    out[0] = a[0] * b[0] - a[1:] @ b[1:]
-    out[1:] = a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
-    return out

@@ -170,6 +170,16 @@ class SteeredGait(CommandedGait):
         self._function, self._now = command, 0.0
         super().__init__(sim, make, command(0.0))
 
+    def reset(self) -> None:
+        """Begin anew, at the origin with the command of time zero."""
+        command, self._now = self._asked(0.0), 0.0
+        if self._time != 0.0 or np.any(command != self.command):
+            self.begin(command)
+
+    def _asked(self, time: float) -> Vector:
+        """The command (3,) of a time."""
+        return checks.array("legged_mpc(velocity=function)", self._function(time), (3,))
+
     def anchor(self, time: float, x: Vector) -> None:
         """Take the command of a time.
 
@@ -178,7 +188,7 @@ class SteeredGait(CommandedGait):
             x: (nx,) state there, which is not needed.
         """
         del x
-        command = checks.array("legged_mpc(velocity=function)", self._function(time), (3,))
+        command = self._asked(time)
         if time < self._now:
             self.begin(command)
         elif np.abs(command - self.command).max() > _SAME:

@@ -73,8 +73,13 @@ class Lead:
     def __init__(self, pose: Vector, velocity: ArrayLike, lead: float) -> None:
         self.velocity = checks.array("Lead(velocity)", velocity, (3,))
         self.lead = checks.number("Lead(lead)", lead, above=0.0)
-        self._pose, self._time = pose.copy(), np.inf
-        self._begin(pose)
+        self._pose = pose.copy()
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, where the robot is measured next."""
+        self._time = np.inf
+        self._begin(self._pose)
 
     def _begin(self, x: Vector) -> None:
         """Begin where the base of the state x (nx,) is."""

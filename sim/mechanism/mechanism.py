@@ -25,11 +25,12 @@ from sim.mechanism.input import Input
 from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.joint_coordinates import coordinate_limits, coordinates, joint_places
 from sim.mechanism.loop_joints import carried
+from sim.mechanism.moved_scene import moved_coordinates, moved_joint, moved_obstacle, moved_visual
 from sim.mechanism.naming import name_contacts, name_inputs
 from sim.mechanism.renamed import renamed
 from sim.mechanism.self_collisions import self_collisions
 from sim.mechanism.shape_contacts import shape_contacts
-from sim.mechanism.shapes import Solid, Sphere, rotation_matrix
+from sim.mechanism.shapes import Solid, Sphere
 from sim.mechanism.terrain import Terrain
 from sim.mechanism.tree import check_axes, check_loops, check_masses, sort_tree
 from sim.mechanism.visual import Visual
@@ -382,12 +383,14 @@ def _added(mech: Mechanism, other: Mechanism, pose: ArrayLike, prefix: str, name
         raise ValueError(f"{call}(other): {mech.name!r} has the gravity {mech.gravity}, {other.name!r} {other.gravity}")
     prefix = checks.name_or(f"{call}(prefix=...)", prefix, "")
     point, quat = _placed(f"{call}(pose)", pose)
-    neutral = np.concatenate([np.asarray(mech.neutral), _moved_neutral(other, point, quat)])
+    neutral = np.concatenate(
+        [np.asarray(mech.neutral), moved_coordinates(other.joints, np.asarray(other.neutral), point, quat)]
+    )
     parts = _renamed(other, prefix)
     _refuse_clashes(call, mech, parts, other.name)
-    joints = [_moved_joint(j, point, quat) for j in parts["joints"]]
-    loops = [_moved_joint(j, point, quat) for j in parts["loops"]]
-    collisions = [_moved_obstacle(c, point, quat) for c in parts["collisions"]]
+    joints = [moved_joint(j, point, quat) for j in parts["joints"]]
+    loops = [moved_joint(j, point, quat) for j in parts["loops"]]
+    collisions = [moved_obstacle(c, point, quat) for c in parts["collisions"]]
     carrier, report = _with_report(mech, other, prefix)
     given: dict[str, Any] = {
         "bodies": [*mech.bodies, *parts["bodies"]],
@@ -400,7 +403,7 @@ def _added(mech: Mechanism, other: Mechanism, pose: ArrayLike, prefix: str, name
         "collisions": [*mech.collisions, *collisions],
         "loops": [*mech.loops, *loops],
         "gears": [*mech.gears, *parts["gears"]],
-        "scenery": [*mech.scenery, *(_moved_visual(v, point, quat) for v in other.scenery)],
+        "scenery": [*mech.scenery, *(moved_visual(v, point, quat) for v in other.scenery)],
     }
     return Mechanism(**given) if report is None else replace(carrier, **{**given, "report": report})
 
@@ -437,13 +440,6 @@ def _placed(call: str, pose: ArrayLike) -> tuple[Floats, Floats]:
     return given[:3], np.asarray(quat)
 
 
-def _product(a: ArrayLike, b: ArrayLike) -> Floats:
-    """Hamilton product of two quaternions."""
-    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
-    scalar = a[0] * b[0] - a[1:] @ b[1:]
-    return np.concatenate([[scalar], a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])])
-
-
 def _renamed(mech: Mechanism, prefix: str) -> dict[str, list[Any]]:
     """The parts of a mechanism with the prefix before every name."""
     names = {
@@ -475,46 +471,6 @@ def _refuse_clashes(call: str, mech: Mechanism, parts: dict[str, list[Any]], oth
                     f"{call}(other): both have a {singular[field]} {part.name!r}; "
                     f"give a prefix=... for the names of {other!r}"
                 )
-
-
-def _moved_joint(joint: Joint, point: Floats, quat: Floats) -> Joint:
-    """A joint with the world moved; of one that floats, the coordinates are moved instead."""
-    if joint.parent != WORLD or (joint.kind == "floating" and not joint.close):
-        return joint
-    place = point + rotation_matrix(quat) @ np.asarray(joint.parent_point)
-    return replace(joint, parent_point=place, orientation=_product(quat, joint.orientation))
-
-
-def _moved_neutral(mech: Mechanism, point: Floats, quat: Floats) -> Floats:
-    """The neutral coordinates, those of floating roots moved: q' = F^-1 T F q, F the frame of the joint."""
-    q = np.array(mech.neutral, dtype=np.float64)
-    for joint in mech.joints:
-        if joint.parent != WORLD or joint.kind != "floating":
-            continue
-        at = mech.q_slice(joint.name)
-        frame, origin = np.asarray(joint.orientation), np.asarray(joint.parent_point)
-        back = frame * (1.0, -1.0, -1.0, -1.0)
-        place = rotation_matrix(quat) @ (origin + rotation_matrix(frame) @ q[at][:3]) + point
-        q[at.start : at.start + 3] = rotation_matrix(back) @ (place - origin)
-        q[at.start + 3 : at.stop] = _product(back, _product(quat, _product(frame, q[at][3:])))
-    return q
-
-
-def _moved_obstacle(collision: Collision, point: Floats, quat: Floats) -> Collision:
-    """An obstacle moves with the scene it comes with."""
-    shape = collision.shape_b
-    if collision.b != WORLD or shape is None:
-        return collision
-    center = point + rotation_matrix(quat) @ np.asarray(shape.center)
-    return replace(collision, shape_b=replace(shape, center=center, orientation=_product(quat, shape.orientation)))
-
-
-def _moved_visual(visual: Visual, point: Floats, quat: Floats) -> Visual:
-    """The pictures of the world move with the scene that they belong to."""
-    part: Any = visual if visual.shape is None else visual.shape
-    center = point + rotation_matrix(quat) @ np.asarray(part.center)
-    moved = replace(part, center=center, orientation=_product(quat, part.orientation))
-    return moved if visual.shape is None else replace(visual, shape=moved)
 
 
 def _with_obstacle(mech: Mechanism, shape: Solid, bodies: Sequence[str] | None, name: str, **options: Any) -> Mechanism:

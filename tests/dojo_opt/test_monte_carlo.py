@@ -1,6 +1,7 @@
 """Monte Carlo studies: their disturbances, their interval, and the same outcomes wherever they run."""
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 
 import numpy as np
@@ -64,6 +65,19 @@ def test_monte_carlo_is_the_same_with_threads_and_again():
         _same(study, _study(pool))
     for one, two in zip(_study(runs=3).outcomes, study.outcomes, strict=False):
         np.testing.assert_array_equal(one.x, two.x)
+
+
+def test_runs_perturb_a_plant_that_is_perturbed_already():
+    """What is drawn takes the place of what the plant has, field by field."""
+    plant = Plant(HOPPER, payload=1.0, payload_body="foot", delay=0.01, control_limits=(-1.0, 1.0), slope=0.1)
+    sampler = dojo.Disturbances(7, velocity=0.1, push=(1.0, 1.0), delay=0.02)
+    (run,) = dojo.monte_carlo(_hold, plant, sampler, 0.05, runs=1, seed=3).outcomes
+    drawn = run.perturbation
+    assert (drawn.payload, drawn.payload_body, drawn.delay, drawn.slope) == (1.0, "foot", 0.02, 0.1)
+    assert drawn.control_limits == (-1.0, 1.0) and len(drawn.pushes) == 1 and np.any(drawn.offset)
+    whole = dojo.Perturbation(payload=2.0, ground_height=0.3).over(plant.perturbation)
+    assert (whole.payload, whole.payload_body, whole.slope, whole.ground_height) == (2.0, None, 0.0, 0.3)
+    assert dojo.Perturbation(seed=5).over(plant.perturbation) == replace(plant.perturbation, seed=5)
 
 
 @pytest.mark.slow

@@ -1,7 +1,10 @@
 """Plant and perturbation: pushes, payload, slope, friction, delay, noise, limits; closed loops."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import dojo_opt as dojo
 from dojo_opt.mpc.ground_estimate import Ground
@@ -71,6 +74,37 @@ def test_start_on_a_slope_touches_as_on_level_ground():
     plant = Plant(sim, slope=0.2, slope_heading=0.7, ground_height=0.3)
     flat = gaps(sim, sim.neutral())
     np.testing.assert_allclose(gaps(plant.simulator, plant.x), flat, atol=1e-12)
+
+
+@pytest.mark.parametrize("about_z", [0.0, 1.2])
+def test_obstacles_and_all_that_floats_move_with_the_ground(about_z):
+    """Two balls roll on tilted obstacles as they do on level ones under gravity that is tilted the other way."""
+    frame = (np.cos(0.5 * about_z), 0.0, 0.0, np.sin(0.5 * about_z))
+    shelf = dojo.Box(2.0, 2.0, 0.4, center=(3.0, 0.0, 0.0))
+    scene = dojo.Mechanism(
+        [dojo.Body(name, 1.0, shape=dojo.Sphere(0.1)) for name in "ab"],
+        [dojo.Joint("floating", None, name, orientation=frame) for name in "ab"],
+        collisions=[dojo.Collision("a", shape_b=dojo.HalfSpace()), dojo.Collision("b", shape_b=shelf)],
+        scenery=[dojo.Visual(shelf)],
+    )
+    turn = Rotation.from_rotvec(0.3 * np.array([np.sin(0.5), -np.cos(0.5), 0.0])).as_matrix()
+    axes = Rotation.from_rotvec([0.0, 0.0, about_z]).as_matrix()
+    sim = dojo.Simulator(scene, time_step=5e-3, kappa=1e-6, tolerance=1e-12)
+    level = sim.replace(mechanism=replace(scene, gravity=turn.T @ [0.0, 0.0, -9.81]))
+    x = sim.neutral()
+    x[:3], x[7:10] = axes.T @ [0.0, 0.0, 0.1], axes.T @ [3.0, 0.0, 0.3]
+    x[14:17] = x[20:23] = axes.T @ [0.5, 0.2, 0.0]
+    plant = Plant(sim, x, slope=0.3, slope_heading=0.5, ground_height=0.2)
+    still = np.zeros((20, 0))
+    flat, tilted = level.rollout(x, still, throw=True).x, plant.simulator.rollout(plant.x, still, throw=True).x
+    for place, velocity in ((0, 14), (7, 20)):
+        at, v = (axes @ flat[:, first : first + 3].T for first in (place, velocity))
+        expected = turn @ at + (0.2 * turn[:, 2])[:, None]
+        np.testing.assert_allclose(axes @ tilted[:, place : place + 3].T, expected, atol=1e-9)
+        np.testing.assert_allclose(axes @ tilted[:, velocity : velocity + 3].T, turn @ v, atol=1e-8)
+    assert np.abs(flat[-1, :2] - flat[0, :2]).max() > 0.02
+    moved = plant.simulator.mechanism
+    np.testing.assert_allclose(moved.scenery[0].shape.center, moved.collisions[1].shape_b.center)
 
 
 def test_delay_holds_commands_back():
@@ -181,6 +215,11 @@ def test_error_is_measured_from_the_reference():
         (lambda: Plant(HOPPER, None, Perturbation(), payload=1.0), "either it or its fields"),
         (lambda: dojo.closed_loop(lambda t, x: np.zeros(2), Plant(HOPPER), 0.01), "controller's u"),
         (lambda: dojo.closed_loop(lambda t, x: np.zeros(3), Plant(HOPPER), 0.1, control_step=0.007), "multiple"),
+        (lambda: dojo.closed_loop(lambda t, x: np.zeros(3), Plant(HOPPER), 0.002), r"a step of the plant, 0\.005 s"),
+        (lambda: Plant(HOPPER, payload_inertia=(1.0, 2.0)), r"a number, or three, got shape \(2,\)"),
+        (lambda: dojo.Disturbances(1, velocity=0.1), "nv >= 2, got nv = 1"),
+        (lambda: dojo.Disturbances(7, payload=(-1.0, 1.0)), r"payload=\.\.\.\): expected numbers >= 0"),
+        (lambda: dojo.Disturbances(7, slope=(0.0, 2.0)), "less than a right angle"),
     ],
 )
 def test_mistakes_are_named(make, message):

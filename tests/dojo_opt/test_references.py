@@ -1,5 +1,6 @@
 """Moving references, and the new references at the end of a horizon that moves on."""
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -55,6 +56,40 @@ def test_sampled_velocities_over_the_step_of_a_model():
 def test_references_are_checked_at_the_border(reference, message):
     with pytest.raises(ValueError, match=message):
         dojo.MPC(standing_problem(), reference=reference)
+
+
+class _Follower:
+    """A reference that stands where the robot was first measured."""
+
+    def __init__(self):
+        self.reset()
+
+    def reset(self):
+        self.place = np.inf
+
+    def anchor(self, time, x):
+        self.place = min(self.place, x[0])
+
+    def __call__(self, times):
+        return np.tile(np.r_[min(self.place, 9.0), HOPPER.neutral()[1:]], (len(times), 1))
+
+    def inputs(self, times):
+        return np.full((len(times), 3), min(self.place, 9.0))
+
+
+def test_controllers_have_references_of_their_own_and_begin_anew():
+    """A controller forgets where its reference was anchored; a fresh one, or a copy, does not share it."""
+    mine = _Follower()
+    mpc = dojo.MPC(standing_problem(), reference={0: mine, 1: mine.inputs})
+    other, copied = mpc.fresh(), copy.copy(mpc)
+    x = HOPPER.neutral()
+    for place, controller in ((2.0, mpc), (3.0, other), (4.0, copied)):
+        controller(0.0, np.r_[place, x[1:]])
+        assert {term.reference[0, 0] for term in controller.problem.costs[:2]} == {place}
+    assert mine.place == 2.0
+    mpc.reset()
+    mpc(7.0, np.r_[5.0, x[1:]])
+    assert mpc.problem.costs[1].reference[0, 0] == mine.place == 5.0
 
 
 def test_references_move_with_time_and_with_the_ground():

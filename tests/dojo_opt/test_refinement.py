@@ -1,5 +1,6 @@
 """Refinement by accuracy: time steps are divided until the replay of a plan agrees with it."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -56,6 +57,17 @@ def test_a_replay_that_stays_apart_is_no_success(monkeypatch):
     assert not plan.success and plan.status == dojo.Status.ACCURACY_NOT_REACHED
     assert plan.substeps == 2 and plan.message.startswith("The replay does not agree with the plan: ")
     assert plan.message.endswith(" apart, asked 0.001.")
+
+
+def test_limits_are_those_of_all_solves_together(monkeypatch):
+    first = dojo.ilqr(hop())
+    plan = dojo.ilqr(asked(0.015), max_iterations=first.nit + 2)
+    assert (plan.status, plan.nit) == (dojo.Status.MAX_ITERATIONS, first.nit + 2) and plan.substeps == 2
+    none = dojo.ilqr(asked(0.015), max_iterations=first.nit)
+    assert (none.status, none.nit, none.substeps) == (dojo.Status.MAX_ITERATIONS, first.nit, 1)
+    monkeypatch.setattr(refinement, "replay_error", lambda plan: time.sleep(0.2) or 1.0)
+    late = dojo.ilqr(asked(0.015), time_limit=0.2)
+    assert late.status == dojo.Status.TIME_LIMIT and not late.success and late.seconds >= 0.2
 
 
 def test_ctrl_c_during_a_replay_leaves_the_plan(monkeypatch):

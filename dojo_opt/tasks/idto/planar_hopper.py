@@ -77,16 +77,18 @@ class _Goal:
     """A pose at the goal, at most `_LEAD` ahead of where the robot is measured."""
 
     def __init__(self, pose: Vector, goal: float) -> None:
-        self._pose, self._goal = pose.copy(), goal
+        self._pose, self._goal, self._ahead = pose, goal, pose[0]
 
     def anchor(self, time: float, x: Vector) -> None:
         """Move on; x: (nx,) state at the beginning of the horizon."""
         del time
-        self._pose[0] = x[0] + np.clip(self._goal - x[0], -_LEAD, _LEAD)
+        self._ahead = x[0] + np.clip(self._goal - x[0], -_LEAD, _LEAD)
 
     def __call__(self, times: ArrayLike) -> Matrix:
         """(n, nx) states at times (n,) [s], all the same."""
-        return np.tile(self._pose, (np.size(times), 1))
+        states = np.tile(self._pose, (np.size(times), 1))
+        states[:, 0] = self._ahead
+        return states
 
 
 def hopper(**settings: Any) -> SuiteTask:
