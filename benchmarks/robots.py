@@ -92,10 +92,7 @@ def loaded(robot: TestedRobot) -> Any:
 
 def replayed(plan: Any) -> Any:
     """The plan under its gains at a fifth of its time step."""
-    sim, parts = plan.problem.sim, 5 * plan.problem.substeps
-    fine = sim.replace(time_step=sim.time_step / 5)
-    limits = plan.problem.control_limits
-    return fine.rollout_feedback(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=parts, limits=limits)
+    return plan.replay(time_step=plan.time_step / 5)
 
 
 def walked(robot: TestedRobot, task: str) -> list[Cell]:

@@ -34,7 +34,7 @@ problem = dojo.Problem(
 )
 plan = dojo.ilqr(problem, verbose=True)
 gains = dojo.tracking_gains(problem, plan)
-fine = sim.replace(time_step=sim.time_step / 5)
+fine = sim.replace(time_step=sim.time_step / 5, kappa=sim.kappa / 5)  # contacts as stiff as those of the gains
 replay = fine.rollout_feedback(problem.start, plan.u, xs=plan.x, Ks=gains, substeps=5)
 
 feet = Feet(sim)

@@ -21,12 +21,11 @@ def upright(x):
     return 1.0 - 2.0 * (x[:, 4] ** 2 + x[:, 5] ** 2)
 
 
-fine = problem.sim.replace(time_step=problem.knot_time / 5)
-limits = problem.control_limits
-replay = fine.rollout_feedback(problem.start, plan.u, xs=plan.x, Ks=plan.K, substeps=5, limits=limits)
+replay = plan.replay(time_step=problem.knot_time / 5)
 traveled, drift = plan.x[-1, 0] - plan.x[0, 0], np.abs(replay.x[-1, :3] - plan.x[-1, :3]).max()
 
-print(f"{plan.nit} iterations, {traveled:.3f} m, largest torque {np.abs(plan.u).max():.1f} N m of {limits[1][0]:.1f}")
+limit = problem.control_limits[1][0]
+print(f"{plan.nit} iterations, {traveled:.3f} m, largest torque {np.abs(plan.u).max():.1f} N m of {limit:.1f}")
 print(
     f"upright {upright(plan.x).min():.4f}; at a fifth of the time step {upright(replay.x).min():.4f}, {drift:.4f} m off"
 )

@@ -160,32 +160,59 @@ class Plan:
         x, fun = np.concatenate(cycles), n * self.fun
         return replace(self, x=x, u=u, K=K, k=k, stride=n * self.stride, fun=fun, multipliers=[], penalties=[])
 
-    def replay(self, *, accuracy: float = 1e-5, kappa: float | None = None) -> FeedbackRollout:
-        """The plan under its own gains, each knot simulated to an accuracy, its input held.
+    def replay(
+        self, *, accuracy: float | None = None, kappa: float | None = None, time_step: float | None = None
+    ) -> FeedbackRollout:
+        """The plan under its own gains, each knot simulated to an accuracy or with another time step, its input held.
 
-        Impacts happen at their own times, not at those of the plan's steps. States of such a simulator have the
-        velocities of nodes, so that of the first state is converted. The gains compare the others with the plan's mean
-        velocities, for which they were made.
+        To an accuracy, impacts happen at their own times, not at those of the plan's steps. States of such a simulator
+        have the velocities of nodes, so that of the first state is converted. The gains compare the others with the
+        plan's mean velocities, for which they were made.
+
+        With a time step, kappa keeps its ratio to it. The force of a contact is kappa/(gap h): with the kappa of the
+        plan a step of a fifth would have contacts that are five times as soft, for which its gains were not made.
 
         Args:
-            accuracy: error of the joint coordinates per second of motion [m/s, rad/s], see `Simulator`.
+            accuracy: error of the joint coordinates per second of motion [m/s, rad/s], see `Simulator` (default None:
+                1e-5 without a time step).
             kappa: central-path parameter [N s m] (default None: that of the plan's simulator, or less if the accuracy
-                needs it).
+                needs it; with a time step, in proportion to it).
+            time_step: time step of the replay, of which a knot is a whole number [s] (default None: an accuracy).
 
         Returns:
-            FeedbackRollout with the solved knots, one state per knot, with velocities at the nodes.
+            FeedbackRollout with the solved knots, one state per knot; with an accuracy, with velocities at the nodes.
 
         Raises:
-            ValueError: for a plan without a simulator, or an accuracy that its mechanism does not have.
+            ValueError: for a plan without a simulator, an accuracy that its mechanism does not have, a time step beside
+                an accuracy, or one that does not divide a knot.
         """
-        sim, problem = self.simulator, self.problem
+        sim, problem, steps = self.simulator, self.problem, 1
         if sim is None:
             raise ValueError("Plan.replay: expected a plan with its simulator")
-        smoothing = {} if kappa is None else {"kappa": kappa}
-        exact = sim.replace(time_step=self.time_step * self.substeps, order=2, accuracy=accuracy, **smoothing)
         limits = sim.mechanism.input_limits if problem is None else problem.control_limits
-        found = exact.rollout_feedback(self._start(sim), self.u, xs=self.x, Ks=self.K, limits=limits)
+        smoothing = {} if kappa is None else {"kappa": kappa}
+        if time_step is None:
+            accuracy = 1e-5 if accuracy is None else accuracy
+            shot = sim.replace(time_step=self.time_step * self.substeps, order=2, accuracy=accuracy, **smoothing)
+            start = self._start(sim)
+        else:
+            steps = self._steps_per_knot(time_step, accuracy)
+            smoothing = smoothing or {"kappa": sim.kappa * time_step / self.time_step}
+            shot, start = sim.replace(time_step=time_step, **smoothing), self.x[0]
+        found = shot.rollout_feedback(start, self.u, xs=self.x, Ks=self.K, substeps=steps, limits=limits)
         return cast(FeedbackRollout, found)
+
+    def _steps_per_knot(self, time_step: float, accuracy: float | None) -> int:
+        """Steps per knot of a replay with a time step, which is checked."""
+        call = "Plan.replay(time_step=...)"
+        h = checks.number(call, time_step, above=0.0)
+        if accuracy is not None or self.simulator.accuracy is not None:
+            raise ValueError(f"{call}: expected no accuracy beside it, neither here nor of the plan's simulator")
+        knot = self.time_step * self.substeps
+        steps = round(knot / h)
+        if steps < 1 or abs(steps * h - knot) > 1e-9 * knot:
+            raise ValueError(f"{call}: expected a whole part of the knot of {knot:g} s, got {h:g}")
+        return steps
 
     def _start(self, sim: Simulator) -> Vector:
         """(nx,) the first state, with the velocity at its node: the mean of those over the steps before and after.

@@ -48,6 +48,24 @@ def test_replays_of_robots_that_begin_on_the_ground_begin_at_rest():
     assert np.abs(shot.x[:, :3] - plan.x[:, :3]).max() < 2e-3
 
 
+def test_replays_with_shorter_steps_keep_the_stiffness_of_contacts():
+    """With the kappa of the plan an arm lost its box: contacts were ten times as soft as those of its gains."""
+    box = dojo.Body("box", 0.5, shape=dojo.Box(0.1, 0.1, 0.1))
+    plan = ilqr(problems.push(dojo.models.panda(gripper=False), box, (0.2, 0.0)))
+    sim, h = plan.simulator, plan.time_step / 10
+    off, soft = (
+        np.abs(sim.difference(plan.x, plan.replay(time_step=h, kappa=kappa).x)[:, : sim.nv]).max()
+        for kappa in (None, sim.kappa)
+    )
+    assert off < 3e-3 < 3e-2 < soft
+    same = plan.replay(time_step=plan.time_step)
+    assert np.abs(same.x - plan.x).max() < 1e-5
+    with pytest.raises(ValueError, match="whole part of the knot"):
+        plan.replay(time_step=0.7 * plan.time_step)
+    with pytest.raises(ValueError, match="no accuracy beside it"):
+        plan.replay(time_step=h, accuracy=1e-4)
+
+
 def test_hop_to_random_targets():
     targets = np.random.default_rng(42).uniform(-0.6, 0.6, size=(10, 2))
     plans = [ilqr(problems.hop(target=target)) for target in targets]
