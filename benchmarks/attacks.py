@@ -1,7 +1,8 @@
 """Random mechanisms in random states: count the failures of steps, motions and derivatives.
 
-    python benchmarks/attacks.py             2000 steps, 10,000 motions, 4000 crowds, 300 derivatives, 1000 files
-    python benchmarks/attacks.py --quick     40, 60, 40, 10 and 40
+    python benchmarks/attacks.py             2000 steps, 10,000 motions, 4000 crowds, 300 derivatives, 500 gradients,
+                                             1000 files
+    python benchmarks/attacks.py --quick     40, 60, 40, 10, 10 and 40
     python benchmarks/attacks.py --only motions --first 5000 --count 2000
 
 steps          one step of any mechanism (random_mechanisms.py), kappa default or 1e-4: no exception, every number
@@ -14,6 +15,8 @@ crowds         the same of trees of any joints whose bodies collide with one ano
                are not judged
 derivatives    d(next state)/d(state) of a step at kappa 1e-4 against central differences on the manifold, where those
                of two step sizes agree
+gradients      `linearize_trajectory` of a motion whose bodies collide, and the gradient of its end by `vjp`: next
+               states, derivatives and gradient are those of its steps, one after the other
 files          a URDF and an MJCF file, mutated at random (tests/support/robot_texts.py): refused by an error that names
                the call, or a robot that takes a step, with numbers that are finite. A step may be refused
 """
@@ -40,6 +43,7 @@ from support.robot_texts import MJCF, URDF, mutated
 
 TIME_STEPS = (0.01, 0.02, 0.05)
 SECONDS = 0.3
+MOTION = 8  # steps of a motion that is linearized
 GAIN = 0.1  # of the kinetic energy, or of LEAST
 LEAST = 1e-3  # [J]
 PASSIVE = Recipe(kinds=COMMON, passive=True, contacts=16)
@@ -156,16 +160,34 @@ def derivative_case(seed: int) -> tuple[str, float]:
     return "compared", float(np.abs(found.A @ direction - fine).max() / size)
 
 
+def gradient_case(seed: int) -> tuple[str, float]:
+    """("compared", largest relative error of the linearization of a motion), or why there is none."""
+    rng = np.random.default_rng([seed, 6])
+    kappa = float(rng.choice([1e-6, 1e-4, 1e-2]))
+    sim = dojo.Simulator(random_mechanism(rng, CROWDED), time_step=0.01, kappa=kappa, tolerance=1e-10)
+    motion = sim.rollout(random_state(sim, rng), np.zeros((MOTION, sim.nu)))
+    if not motion.success:
+        return "step not solved", 0.0
+    steps = [sim.linearize(x, u) for x, u in zip(motion.x, motion.u, strict=False)]
+    whole = sim.linearize_trajectory(motion.x, motion.u)
+    cost = np.zeros((MOTION + 1, sim.ndx))
+    cost[-1] = rng.normal(size=sim.ndx)
+    adjoint, expected, error = sim.vjp(motion, cost, wrt=("state",)), cost[-1], 0.0
+    if not (whole.success and adjoint.success and all(step.success for step in steps)):
+        return "refused", 0.0
+    for k, step in reversed(list(enumerate(steps))):
+        expected = step.A.T @ expected
+        error = max(error, float(np.abs(whole.A[k] - step.A).max() / (1.0 + np.abs(step.A).max())))
+    error = max(error, float(np.abs(sim.difference(whole.x_next, motion.x[1:])).max()))
+    return "compared", max(error, float(np.abs(adjoint["state"] - expected).max() / (1.0 + np.abs(expected).max())))
+
+
 def attack(args: argparse.Namespace) -> Report:
     """Run all sections."""
-    sizes = {"steps": 2000, "motions": 10_000, "crowds": 4000, "derivatives": 300, "files": 1000}
-    if args.quick:
-        sizes = {"steps": 40, "motions": 60, "crowds": 40, "derivatives": 10, "files": 40}
     report = Report("Attacks with random mechanisms", "")
-    sections = {"steps": steps, "motions": motions, "crowds": crowds, "derivatives": derivatives, "files": files}
-    for name, section in sections.items():
+    for name, (section, whole, quick) in SECTIONS.items():
         if args.only in (None, name):
-            section(report, range(args.first, args.first + (args.count or sizes[name])))
+            section(report, range(args.first, args.first + (args.count or (quick if args.quick else whole))))
     return report
 
 
@@ -238,6 +260,20 @@ def derivatives(report: Report, seeds: range) -> None:
     ]
 
 
+def gradients(report: Report, seeds: range) -> None:
+    """Of motions, against those of their steps."""
+    named = [(f"gradient {seed}", (seed,)) for seed in seeds]
+    cases = [gradient_case(*case) for case in progress()(named, "gradients")]
+    known = [error for end, error in cases if end == "compared"]
+    wrong = [seed for seed, (_, error) in zip(seeds, cases, strict=True) if error > WRONG]
+    report.rows += [
+        number("gradients: of motions of eight steps", len(known)),
+        number("gradients: refused", sum(end == "refused" for end, _ in cases)),
+        number("gradients: wrong", len(wrong), 0, note=shown(wrong)),
+        number("gradients: largest error", max(known, default=0.0)),
+    ]
+
+
 def file_case(seed: int) -> str:
     """Outcome of a mutated file: refused, the name of the status of a step, or of a failure."""
     rng = np.random.default_rng([seed, 4])
@@ -273,10 +309,20 @@ def files(report: Report, seeds: range) -> None:
     report.tables.append(Table("Files", ("ended", "files"), [list(end) for end in ends.most_common()]))
 
 
+SECTIONS = {  # with the numbers of cases, whole and quick
+    "steps": (steps, 2000, 40),
+    "motions": (motions, 10_000, 60),
+    "crowds": (crowds, 4000, 40),
+    "derivatives": (derivatives, 300, 10),
+    "gradients": (gradients, 500, 10),
+    "files": (files, 1000, 40),
+}
+
+
 def main(argv: list[str] | None = None) -> int:
     """Print or write the report; the exit status is 1 after any failure."""
     arguments = parser(__doc__)
-    arguments.add_argument("--only", choices=("steps", "motions", "crowds", "derivatives", "files"), help="one section")
+    arguments.add_argument("--only", choices=tuple(SECTIONS), help="one section")
     arguments.add_argument("--first", type=int, default=0, help="first seed")
     arguments.add_argument("--count", type=int, help="cases of each section")
     with warnings.catch_warnings():
