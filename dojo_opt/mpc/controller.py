@@ -104,6 +104,11 @@ class MPC:
         self._servo = None if servo is None or isinstance(servo, Mechanism) else Servo(self.sim, servo)
         terms = (t for t in self.problem.costs if isinstance(t, StateTerm) and t.knots[0] == 0)
         self._tracking = next(terms, None)  # whose error is logged
+        if plan is not None and not isinstance(plan, Plan):
+            raise TypeError(f"MPC(plan=...): expected a Plan, got {checks.shown(plan)}")
+        shape = (problem.horizon, self.sim.nu)
+        if plan is not None and (plan.u.shape != shape or plan.x.shape[1] != self.sim.nx):
+            raise ValueError(f"MPC(plan=...): expected inputs of shape {shape}, got {plan.u.shape}, of its robot")
         self._first = plan
         self._ground = Ground(self.sim, self.settings.kappa if self.settings.learn_ground == "slope" else None)
         self.estimator: ParameterEstimator | None = None  # of the parameters that `adapt` names
@@ -245,9 +250,6 @@ class MPC:
         self.problem.start = self._delay.ahead(now, self._measured)
         self.references.move(now + self.settings.delay, x=self.problem.start)
         plan = self._first or Solver(self.problem, self.settings.first).solve()
-        shape = (self.problem.horizon, self.sim.nu)
-        if plan.u.shape != shape:
-            raise ValueError(f"MPC(plan=...): expected inputs of shape {shape}, got {plan.u.shape}")
         self._solver.reset(plan.multipliers)
         self.policy = self._policy(now, plan.x, plan.u, plan.K)
         self._next = None

@@ -79,7 +79,7 @@ class SampledReference:
         Returns:
             (n, nx) states, or (n, width) numbers.
         """
-        t = np.asarray(times, dtype=np.float64)
+        t = np.atleast_1d(np.asarray(times, dtype=np.float64))
         first, last = self.time[0], self.time[-1]
         laps = np.zeros(len(t))
         if self.cycle is not None:
@@ -299,7 +299,7 @@ class References:
                 function.anchor(time, x)
             term.reference[:] = function(time + self._h * term.knots)
             if self.plane != GroundPlane() and isinstance(term, StateTerm):
-                term.reference[:] = self.plane.carry(term.reference, self._sim.nq)
+                term.reference[:] = self.plane.carry(term.reference, self._sim.mechanism)
 
     def rows(self, kind: type[StateTerm] | type[PickTerm], begin: float, count: int) -> Matrix | None:
         """Rows of the first reference of a kind, one knot apart.

@@ -15,17 +15,18 @@ from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import Tick
 from sim import drawn
 from sim.mechanism import checks
+from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory_limit import check_room
 from sim.mechanism.short_repr import short_table
 from sim.simulator.engines.engine import CONTACT
 from sim.simulator.results import Contacts, Interrupted, contacts_of
 from sim.simulator.simulator import Simulator
 from solvers.status import MESSAGES, Status
-from solvers.types import Integers, Matrix, Vector
+from solvers.types import Floats, Integers, Matrix, Vector
 
 Controller = Callable[[float, Vector], ArrayLike]
 
-__all__ = ["ClosedLoop", "closed_loop", "steps_of"]
+__all__ = ["ClosedLoop", "closed_loop", "coordinate_numbers", "steps_of"]
 
 _LEVEL, _SOLVED = GroundPlane(), Status.SOLVED
 _RECORD = 500.0  # bytes of the objects that keep a step
@@ -88,13 +89,8 @@ class ClosedLoop:
         """
         if self.reference is None:
             raise ValueError("ClosedLoop.error: no reference was given; use closed_loop(reference=...)")
-        sim, call = self.simulator, "closed_loop(reference=...)"
-        if not callable(self.reference):
-            raise TypeError(f"{call}: expected a function of the times (n,), got {checks.shown(self.reference)}")
-        states = checks.floats(call, self.reference(self.time))
-        if states.shape not in ((sim.nx,), self.x.shape):
-            raise ValueError(f"{call}: expected states of shape {self.x.shape}, got {states.shape}")
-        return sim.difference(self.x, checks.array(call, states, states.shape))[:, : sim.nv]
+        states = _checked_states(self.reference, self.time, self.simulator)
+        return self.simulator.difference(self.x, states)[:, : self.simulator.nv]
 
     def rms(self, components: Any = None) -> float:
         """Root mean square of the distance from the reference.
@@ -109,13 +105,13 @@ class ClosedLoop:
             The root mean square [m, rad].
 
         Raises:
-            ValueError: the run has no reference, or a name is unknown.
+            ValueError: the run has no reference, a name is unknown, or a component is a velocity.
         """
         error = self.error()
-        chosen = self.tracked
-        if components is not None or chosen is None:
-            chosen = chosen_components("ClosedLoop.rms(components)", components, self.simulator)
-        return float(np.sqrt(np.mean(np.sum(error[:, chosen[chosen < error.shape[1]]] ** 2, axis=1))))
+        chosen = np.arange(error.shape[1]) if self.tracked is None else self.tracked
+        if components is not None:
+            chosen = coordinate_numbers("ClosedLoop.rms(components)", components, self.simulator)
+        return float(np.sqrt(np.mean(np.sum(error[:, chosen] ** 2, axis=1))))
 
     def by_coordinate(self) -> dict[str, float]:
         """Root mean square of the distance from the reference, by coordinate.
@@ -174,6 +170,8 @@ def closed_loop(
         raise ValueError(
             f"closed_loop(control_step=...): expected a multiple of the plant's step {h:g} s, got {control_step}"
         )
+    if reference is not None:
+        _checked_states(reference, np.zeros(2), plant.nominal)
     plant.reset()
     if hasattr(controller, "reset"):
         controller.reset()
@@ -187,6 +185,25 @@ def closed_loop(
         run.survived, run.message = False, MESSAGES[Status.INTERRUPTED]
         raise Interrupted(_closed_loop(run, controller, plant, reference)) from None
     return _closed_loop(run, controller, plant, reference)
+
+
+def coordinate_numbers(call: str, components: Any, sim: Simulator) -> Integers:
+    """Numbers below nv, from numbers or names."""
+    chosen = chosen_components(call, components, sim)
+    if np.any(chosen >= sim.nv):
+        raise ValueError(f"{call}: expected coordinates, got velocities among {checks.shown(components)}")
+    return chosen
+
+
+def _checked_states(reference: Any, times: Vector, sim: Simulator) -> Floats:
+    """The states (n, nx), or one (nx,), that a function returns for times (n,) [s]."""
+    call = "closed_loop(reference=...)"
+    if not callable(reference):
+        raise TypeError(f"{call}: expected a function of the times (n,), got {checks.shown(reference)}")
+    states = checks.floats(call, reference(times))
+    if states.shape not in ((sim.nx,), (times.size, sim.nx)):
+        raise ValueError(f"{call}: expected states of shape ({times.size}, {sim.nx}), got {states.shape}")
+    return checks.array(call, states, states.shape)
 
 
 def steps_of(call: str, plant: Plant, duration: float) -> int:
@@ -207,7 +224,7 @@ def _closed_loop(run: _LoopRecord, controller: Controller, plant: Plant, referen
     own, tracked = getattr(controller, "references", None), None
     if reference is None and own is not None and own.state is not None:
         times = h * np.arange(float(len(run.planes)))
-        reference, tracked = OnPlanes(own.state, times, run.planes, plant.nominal.nq), own.tracked
+        reference, tracked = OnPlanes(own.state, times, run.planes, plant.nominal.mechanism), own.tracked
     return ClosedLoop(
         simulator=plant.simulator,
         time=h * np.arange(count + 1.0),
@@ -236,8 +253,8 @@ def _first(reservations: list[str]) -> list[str]:
 class OnPlanes:
     """States over time, carried onto the ground that was learnt until then."""
 
-    def __init__(self, level: Any, time: Vector, planes: Sequence[GroundPlane], nq: int) -> None:
-        self._level, self._time, self._planes, self._nq = level, time, planes, nq
+    def __init__(self, level: Any, time: Vector, planes: Sequence[GroundPlane], mechanism: Mechanism) -> None:
+        self._level, self._time, self._planes, self._mechanism = level, time, planes, mechanism
 
     def __call__(self, times: ArrayLike) -> Matrix:
         """(n, nx) at the times (n,) [s]."""
@@ -246,7 +263,7 @@ class OnPlanes:
         planes = [self._planes[k] for k in at]
         for plane in set(planes) - {GroundPlane()}:
             rows = np.array([other == plane for other in planes])
-            x[rows] = plane.carry(x[rows], self._nq)
+            x[rows] = plane.carry(x[rows], self._mechanism)
         return x
 
 

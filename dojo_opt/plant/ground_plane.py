@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.rising_bases import rising_bases
 from sim.model.state_columns import BaseState
 from solvers.types import Matrix, Vector
 
@@ -35,23 +38,26 @@ class GroundPlane(NamedTuple):
         """Whether it does not slope."""
         return self.slope == (0.0, 0.0)
 
-    def carry(self, x: ArrayLike, nq: int) -> Matrix:
+    def carry(self, x: ArrayLike, mechanism: Mechanism) -> Matrix:
         """States of a robot on the ground z = 0, carried onto the plane: turned with it above the same x and y.
 
-        On a level plane the third coordinate is raised, whatever the base; only a floating base can be turned.
+        On a level plane the base is raised; one that cannot rise stays where it is. Only a floating base is turned.
 
         Args:
-            x: (n, nx) states, their velocities behind nq coordinates.
-            nq: number of coordinates.
+            x: (n, nx) states.
+            mechanism: the robot; its first base is carried.
 
         Returns:
             (n, nx) states.
         """
-        out = np.array(x, dtype=np.float64)
+        out, nq = np.array(x, dtype=np.float64), mechanism.nq
+        if self.level:
+            bases = rising_bases(mechanism.joints, mechanism.bodies, np.asarray(mechanism.neutral))
+            for _, places, rates in islice(bases, 1):
+                out[:, places] += self.height * rates
+            return out
         n = self.normal
         out[:, 2] = self.height + out[:, :2] @ np.asarray(self.slope) + out[:, 2] / n[2]
-        if self.level:
-            return out
         turn = _upright(n)
         out[:, BaseState.QUATERNION] = _product(turn, out[:, BaseState.QUATERNION])
         out[:, nq : nq + 3] = _turned(turn, out[:, nq : nq + 3])

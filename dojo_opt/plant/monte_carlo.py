@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dojo_opt.planning.executors import check_executor, results_in_order
-from dojo_opt.plant.closed_loop import closed_loop, steps_of
+from dojo_opt.plant.closed_loop import closed_loop, coordinate_numbers, steps_of
 from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import Tick, milliseconds
@@ -161,6 +161,8 @@ def monte_carlo(
     check_executor("monte_carlo", executor)
     whole_number("monte_carlo(seed=...)", seed, 0)
     steps_of("monte_carlo(duration)", plant, duration)
+    if components is not None:
+        coordinate_numbers("monte_carlo(components=...)", components, plant.nominal)
     count = room_for("monte_carlo(runs=...)", runs, _RUN + 8.0 * plant.nominal.nx)
     children = np.random.SeedSequence(seed).spawn(count)
     tasks = [(controller, plant, sampler, float(duration), (control_step, components), child) for child in children]

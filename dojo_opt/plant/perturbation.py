@@ -194,6 +194,7 @@ class Perturbation:
         if self.slope or self.ground_height:
             point, quat = self._place
             turn = rotation_matrix(quat)
+            turn[:, 2] = self.normal  # to the last bit, for ground that is turned in place
             turned = [turn @ np.asarray(c.normal) for c in contacts]
             contacts = [
                 replace(c, normal=n, height=c.height + float(n @ point)) for c, n in zip(contacts, turned, strict=True)

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import drawn
 from sim.mechanism import checks
-from sim.mechanism.axes import upward_rates
 from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision, shape_by_shape
 from sim.mechanism.contact import Contact
@@ -28,6 +27,7 @@ from sim.mechanism.loop_joints import carried
 from sim.mechanism.moved_scene import moved_coordinates, moved_joint, moved_obstacle, moved_visual
 from sim.mechanism.naming import name_contacts, name_inputs
 from sim.mechanism.renamed import renamed
+from sim.mechanism.rising_bases import rising_bases
 from sim.mechanism.self_collisions import self_collisions
 from sim.mechanism.shape_contacts import shape_contacts
 from sim.mechanism.shapes import Solid, Sphere
@@ -523,17 +523,8 @@ def _standing(mech: Mechanism) -> Floats:
     """Neutral coordinates with every base that can rise as high as its lowest contact touches the ground."""
     q = np.array(mech.neutral, dtype=np.float64)
     at = body_poses(mech.joints, q)
-    frames = {WORLD}  # the world, and bodies without mass between it and a base
-    light = {body.name for body in mech.bodies if body.mass == 0.0}
-    for joint in mech.joints:
-        if joint.parent not in frames:
-            continue
-        climb = upward_rates(joint, at[joint.parent].rotation if joint.parent in at else np.eye(3))
-        place = mech.q_slice(joint.name).start + np.flatnonzero(climb)
-        if not len(place) or np.isfinite([bound[place] for bound in mech.coordinate_limits]).any():
-            frames |= light & {joint.child}
-            continue
-        hanging = {joint.child}
+    for base, place, rates in rising_bases(mech.joints, mech.bodies, q):
+        hanging = {base}
         for other in mech.joints:
             if other.parent in hanging:
                 hanging.add(other.child)
@@ -544,5 +535,5 @@ def _standing(mech: Mechanism) -> Floats:
             if c.body in hanging and slope > 0.0:
                 rises.append((_CLEAR - float(c.gap(center))) / slope)
         if rises:
-            q[place] += max(rises) * climb[climb != 0.0]
+            q[place] += max(rises) * rates
     return q

@@ -50,13 +50,15 @@ def test_references_are_carried_as_a_plant_is(robot):
     x = robot.neutral()[None]
     x[0, robot.nq] = 0.5
     plane = GroundPlane(0.0, RISE)
-    carried, there = plane.carry(x, robot.nq)[0], Plant(robot, slope=SLOPE, slope_heading=HEADING).x
+    carried, there = plane.carry(x, robot.mechanism)[0], Plant(robot, slope=SLOPE, slope_heading=HEADING).x
     np.testing.assert_allclose(plane.normal, dojo.Perturbation(slope=SLOPE, slope_heading=HEADING).normal, atol=1e-12)
     np.testing.assert_allclose(carried[3:7], there[3:7], atol=1e-12)
     np.testing.assert_allclose(plane.normal @ (carried[:3] - there[:3]), 0.0, atol=1e-12)
     np.testing.assert_allclose(plane.normal @ carried[robot.nq : robot.nq + 3], 0.0, atol=1e-12)
-    raised = GroundPlane(0.3).carry(x, robot.nq)
-    np.testing.assert_allclose(raised - x, 0.3 * (np.arange(robot.nx) == 2)[None], atol=1e-15)
+    for other, rises in ((robot.mechanism, 2), (dojo.models.halfcheetah(), 1), (dojo.models.panda(), None)):
+        level = np.r_[other.neutral, np.zeros(other.nv)][None]
+        moved = GroundPlane(0.3).carry(level, other) - level
+        np.testing.assert_allclose(moved, 0.3 * (np.arange(other.nq + other.nv) == rises)[None], atol=1e-15)
 
 
 def test_the_slope_is_learnt_from_feet_that_stand(robot):

@@ -189,9 +189,10 @@ def test_first_plan_can_be_given_and_has_to_fit():
     mpc = dojo.MPC(problem, plan=plan)
     mpc(0.0, problem.start)
     np.testing.assert_array_equal(mpc.policy.u, plan.u)
-    wrong = dojo.MPC(standing_problem(horizon=5), plan=plan)
     with pytest.raises(ValueError, match=r"MPC\(plan=...\): expected inputs of shape \(5, 3\), got \(8, 3\)"):
-        wrong(0.0, problem.start)
+        dojo.MPC(standing_problem(horizon=5), plan=plan)
+    with pytest.raises(TypeError, match=r"MPC\(plan=...\): expected a Plan"):
+        dojo.MPC(problem, plan="a")
 
 
 def test_limits_hold_for_feedback_too():
