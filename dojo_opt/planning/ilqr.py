@@ -24,7 +24,7 @@ from dojo_opt.planning.executors import check_executor
 from dojo_opt.planning.ilqr_search import Search
 from dojo_opt.planning.ilqr_start import FreeStart, at_rest, fitting_stage, periodic_gains
 from dojo_opt.planning.iterate import Iterate, Iteration
-from dojo_opt.planning.multi_start import multi_start
+from dojo_opt.planning.multi_start import multi_start, of_problem
 from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import RENAMED, Options, Stage
 from dojo_opt.planning.overload import overload
@@ -119,17 +119,17 @@ def ilqr(
     if checks.whole_number("ilqr(starts=...)", starts) > 1:
         guess = (controls, states, warm_start)
         return multi_start(ilqr, problem, guess, {"options": options}, starts, seed, executor)
-    solver = Solver(problem, options)
     if problem.refinement != 1:
         problem.refined(problem.refinement)  # which refuses a wrong one before any work
-    plan = solver.solve(controls, states, warm_start)
-    if not plan.success:
-        return plan
+    with problem.exclusive() as own:
+        plan = Solver(own, options).solve(controls, states, warm_start)
+        if plan.success:
+            plan = refine(own, plan, options, _solve_again)
+    return plan if own is problem else of_problem(plan, problem)
 
-    def solve_again(finer: Problem, last: Plan, left: Options) -> Plan:
-        return Solver(finer, left).solve(warm_start=last)
 
-    return refine(problem, plan, options, solve_again)
+def _solve_again(finer: Problem, last: Plan, left: Options) -> Plan:
+    return Solver(finer, left).solve(warm_start=last)
 
 
 class _Attempt(NamedTuple):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,9 @@ from solvers.types import Matrix, Vector
 __all__ = ["REPLAY_ACCURACY", "Problem"]
 
 REPLAY_ACCURACY = 1e-5  # [m/s, rad/s] of the replay that `refined_accuracy` compares a plan with
+
+_IN_USE: set[int] = set()  # problems whose terms are written into at the moment, by id
+_IN_USE_LOCK = Lock()
 
 
 def _check_simulator(call: str, sim: Any) -> None:
@@ -239,6 +244,24 @@ class Problem:
         own.bind()
         return own
 
+    @contextmanager
+    def exclusive(self) -> Iterator[Problem]:
+        """This problem; for a second user at the same time, such as another thread, one with terms of its own.
+
+        Yields:
+            The problem whose terms may be written into.
+        """
+        with _IN_USE_LOCK:
+            free = id(self) not in _IN_USE
+            _IN_USE.add(id(self))
+        if not free:
+            yield self.with_own_terms(self.sim, fixed_start=False)
+            return
+        try:
+            yield self
+        finally:
+            _IN_USE.discard(id(self))
+
     def bind(self) -> None:
         """Make the terms of `specs` anew, with arrays and compiled functions of their own.
 
@@ -318,7 +341,8 @@ class Problem:
             ValueError: for a wrong shape, or a number that is not finite.
         """
         xs, us = self._motion("Problem.cost", xs, us)
-        return sum(term.value(xs, us) for term in self.costs)
+        with self.exclusive() as own:
+            return sum(term.value(xs, us) for term in own.costs)
 
     def violation(self, xs: Matrix, us: Matrix) -> float:
         """Largest violation of a constraint along a trajectory.
@@ -334,4 +358,5 @@ class Problem:
             ValueError: for a wrong shape, or a number that is not finite.
         """
         xs, us = self._motion("Problem.violation", xs, us)
-        return largest_violation(self.constraints, xs, us)
+        with self.exclusive() as own:
+            return largest_violation(own.constraints, xs, us)

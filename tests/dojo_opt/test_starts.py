@@ -42,3 +42,24 @@ def test_starts_are_checked():
     for wrong, error in (({"starts": 0}, ValueError), ({"seed": -1}, ValueError), ({"executor": 3}, TypeError)):
         with pytest.raises(error, match="ilqr"):
             dojo.ilqr(swing(), **wrong)
+
+
+def test_a_problem_may_be_planned_and_judged_while_it_is_planned():
+    """As by other threads: every plan is that of a problem of its own."""
+    problem = dojo.problems.hop()
+    push = problem.controls0 + [1.0, -1.0, 3.0]
+    first, second = dojo.ilqr(problem), dojo.ilqr(problem, push)
+    inside = []
+
+    def plan_again(record):
+        if record["iteration"] == 5:
+            inside.append(dojo.ilqr(problem, push))
+            assert problem.cost(second.x, second.u) == second.fun
+
+    again = dojo.ilqr(problem, callback=plan_again)
+    for one, other in ((again, first), (inside[0], second)):
+        np.testing.assert_array_equal(one.x, other.x)
+        assert (one.fun, one.violation, one.nit, one.problem) == (other.fun, other.violation, other.nit, problem)
+    with ThreadPoolExecutor(4) as pool:
+        for found in pool.map(lambda guess: dojo.ilqr(problem, guess), [push] * 4):
+            np.testing.assert_array_equal(found.x, second.x)
