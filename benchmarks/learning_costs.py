@@ -23,7 +23,6 @@ import numpy as np
 from command import deliver, parser
 
 import dojo_opt as dojo
-from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy_rollout import PolicyRollout
 from dojo_opt.learn.registration import task_of
 from dojo_opt.learn.task import Task
@@ -39,7 +38,7 @@ STEPS = {
     "Walker2d": (0.004, 2, None),
 }
 PARTS = (
-    "simulation", "models", "observations and rewards", "networks of the rollout", "gradient of the return", "critic",
+    "simulation", "models", "observations and rewards", "actions", "gradient of the return", "critic",
     "values", "all",
 )  # fmt: skip
 
@@ -126,7 +125,7 @@ def epoch(name: str, epochs: int) -> list[Cell]:
     calls = (
         (dojo.Simulator, "step_batch", "simulation"), (dojo.Simulator, "with_parameters", "models"),
         (Task, "observe", "observations and rewards"), (Task, "rewards", "observations and rewards"),
-        (Network, "forward", "networks of the rollout"), (PolicyRollout, "gradient", "gradient of the return"),
+        (PolicyRollout, "act", "actions"), (PolicyRollout, "gradient", "gradient of the return"),
         (module.ShacTraining, "fit_critic", "critic"), (module.ShacTraining, "values", "values"),
     )  # fmt: skip
 

@@ -29,7 +29,7 @@ class DiscountedSum:
         steps, rows = after.shape
         self.roll, self.after, self.gamma = roll, after, gamma
         ends = roll.terminated.ravel()
-        survival, slopes = roll.task.survives(roll.after.reshape(steps * rows, -1), ends)
+        survival, slopes = roll.task.survives(roll.after.reshape(steps * rows, -1), ends, slopes=True)
         self.survival, self.slopes = survival.reshape(steps, rows), slopes.reshape(steps, rows, -1)
         self.last = roll.cut.copy()
         self.last[-1] = True

@@ -4,13 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from math import exp, tanh
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.learn.network_rows import BLOCK, backward_rows, forward_rows, pack, parts, shape_of, unpack
+from dojo_opt.learn.network_rows import (
+    Packed,
+    backward_rows,
+    forward_rows,
+    in_blocks,
+    parts,
+    places,
+    shape_of,
+    turned_places,
+    weight_rows,
+)
 from sim.mechanism import checks
 from sim.mechanism.memory_limit import check_room
 from solvers.compiler import kernel
@@ -70,12 +81,12 @@ class Network:
     @property
     def count(self) -> int:
         """Number of weights."""
-        return sum(n * m + m for n, m in zip(self.sizes[:-1], self.sizes[1:], strict=True))
+        return sum(n * m + m for n, m in pairwise(self.sizes))
 
     def start(self, rng: np.random.Generator, last: float = 1.0) -> Floats:
         """Orthogonal weights with gain sqrt(2), `last` in the last layer, and zero offsets (Saxe 2014)."""
         out = []
-        for k, (n, m) in enumerate(zip(self.sizes[:-1], self.sizes[1:], strict=True)):
+        for k, (n, m) in enumerate(pairwise(self.sizes)):
             square = np.linalg.qr(rng.standard_normal((max(n, m), max(n, m))))[0]
             gain = last if k == len(self.sizes) - 2 else np.sqrt(2.0)
             out += [gain * square[:n, :m].ravel(), np.zeros(m)]
@@ -84,7 +95,7 @@ class Network:
     def layers(self, weights: Floats) -> list[tuple[Floats, Floats]]:
         """(W (..., inputs, outputs), b (..., outputs)) of every layer, views of weights (..., count)."""
         out, first = [], 0
-        for n, m in zip(self.sizes[:-1], self.sizes[1:], strict=True):
+        for n, m in pairwise(self.sizes):
             mid, last = first + n * m, first + n * m + m
             out.append((weights[..., first:mid].reshape(*weights.shape[:-1], n, m), weights[..., mid:last]))
             first = last
@@ -97,34 +108,69 @@ class Network:
         """
         if weights.ndim == 2:
             return self._by_row(weights, x), np.zeros((0, 0))
-        layers = self._rows(len(x))
+        layers = self.rows(len(x))
         layers[: len(x), : self.sizes[0]] = x
-        forward_rows(self._shape, pack(self.layers(weights)), number_of(self.activation), layers)
-        return self._outputs(layers, len(x)), layers
+        forward_rows(self.packed(weights), layers)
+        return self.outputs(layers, len(x)), layers
 
     def backward(self, weights: Floats, kept: Floats, g: Floats, out: Floats | None = None) -> Floats:
         """Gradient by x (n, inputs) from that by the outputs, g (n, m); adds that by the weights to `out`.
 
         kept: values of all layers, as `forward` returns them for the weights (count,).
         """
-        slopes, turned = self._rows(len(g)), pack([(W.T, np.zeros(len(W))) for W, _ in self.layers(weights)])
-        self._outputs(slopes, len(g))[:] = g
-        count = sum((n + 1) * whole(m) for n, m in zip(self.sizes[:-1], self.sizes[1:], strict=True))
-        sums = np.empty((0 if out is None else parts(len(slopes)), count))
-        backward_rows(self._shape, turned, number_of(self.activation), kept, slopes, sums)
+        slopes = self.rows(len(g))
+        self.outputs(slopes, len(g))[:] = g
+        sums = self.sums(0 if out is None else parts(len(slopes)))
+        backward_rows(self.packed(weights), kept, slopes, sums)
         if out is not None:
-            unpack(sums.sum(axis=0), self.layers(out))
+            out += sums.sum(axis=0)[self.places]
         return slopes[: len(g), : self.sizes[0]]
+
+    def packed(self, weights: Floats) -> Packed:
+        """The network with these weights (count,), for kernels."""
+        (chosen, there), numbers = self._turned, np.zeros(self._room)
+        numbers[self.places] = weights
+        turned = np.zeros(sum((m + 1) * whole(n) for n, m in pairwise(self.sizes)))
+        turned[there] = weights[chosen]
+        return Packed(self._shape, numbers[None], turned[None], number_of(self.activation))
+
+    def sums(self, count: int) -> Floats:
+        """Zeros for gradients by packed weights."""
+        return np.zeros((count, self._room))
 
     @cached_property
     def _shape(self) -> IntegerMatrix:
         return shape_of(self.sizes)
 
-    def _rows(self, count: int) -> Floats:
-        """Zeros for the layers of so many rows; see network_rows.py."""
-        return np.zeros((-(-count // BLOCK) * BLOCK, sum(whole(size) for size in self.sizes)))
+    @cached_property
+    def places(self) -> Integers:
+        """(count,) places of weights among packed ones."""
+        return places(self.sizes)
 
-    def _outputs(self, layers: Floats, count: int) -> Floats:
+    @cached_property
+    def weight_rows(self) -> IntegerMatrix:
+        """Rows of packed weights; see network_rows.py."""
+        return weight_rows(self.sizes)
+
+    @cached_property
+    def _turned(self) -> tuple[Integers, Integers]:
+        return turned_places(self.sizes)
+
+    @cached_property
+    def _room(self) -> int:
+        """Number of packed weights."""
+        return sum((n + 1) * whole(m) for n, m in pairwise(self.sizes))
+
+    @cached_property
+    def width(self) -> int:
+        """Numbers of a row of all layers."""
+        return sum(whole(size) for size in self.sizes)
+
+    def rows(self, count: int) -> Floats:
+        """Zeros for the layers of so many rows; see network_rows.py."""
+        return np.zeros((in_blocks(count), self.width))
+
+    def outputs(self, layers: Floats, count: int) -> Floats:
         """The outputs (count, m) in there."""
         first = layers.shape[1] - whole(self.sizes[-1])
         return layers[:count, first : first + self.sizes[-1]]

@@ -11,22 +11,37 @@ each layer: its size, and its width, which is whole(size).
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import exp
+from typing import NamedTuple
 
 import numpy as np
 
 from solvers.compiler import kernel, parallel_kernel, prange
-from solvers.lanes import LANES, load, spread, store, whole
-from solvers.types import Floats, IntegerMatrix, Matrix
+from solvers.lanes import LANES, load, store, whole
+from solvers.types import IntegerMatrix, Integers, Matrix
 
-__all__ = ["BLOCK", "backward_rows", "forward_rows", "pack", "parts", "shape_of", "unpack"]
+__all__ = [
+    "BLOCK", "FIRST", "PART", "SIZE", "STRIDE", "TURNED", "WIDTH", "Packed", "backward", "backward_rows", "forward",
+    "forward_rows", "in_blocks", "parts", "places", "shape_of", "turned_places", "weight_rows",
+]  # fmt: skip
 
 Span = tuple[int, int]
 
 PART = 16
 BLOCK = 4  # rows at a time: while one product is under way, others begin
-SIZE, WIDTH = 0, 1  # columns of `shape`
+SIZE, WIDTH = 0, 1  # columns of `shape`, and of `weight_rows`
+FIRST, TURNED, STRIDE = 2, 3, 4  # further columns of `weight_rows`
 _TANH = 0
+
+
+class Packed(NamedTuple):
+    """A network with its weights, as kernels take it."""
+
+    shape: IntegerMatrix  # (1 + layers, 2)
+    weights: Matrix  # (1, packed weights)
+    turned: Matrix  # (1, ...) those of layers (W^T, 0)
+    activation: int
 
 
 def shape_of(sizes: tuple[int, ...]) -> IntegerMatrix:
@@ -39,23 +54,35 @@ def parts(rows: int) -> int:
     return -(-rows // PART)
 
 
-def pack(layers: list[tuple[Floats, Floats]]) -> Floats:
-    """Packed weights of layers (W, b)."""
-    blocks = [np.zeros((len(W) + 1, whole(len(b)))) for W, b in layers]
-    for block, (W, b) in zip(blocks, layers, strict=True):
-        block[:-1, : len(b)], block[-1, : len(b)] = W, b
-    return np.concatenate([block.ravel() for block in blocks])[None]
+def in_blocks(rows: int) -> int:
+    """Number of rows, filled up to whole blocks."""
+    return -(-rows // BLOCK) * BLOCK
 
 
-def unpack(packed: Floats, layers: list[tuple[Floats, Floats]]) -> None:
-    """Add packed weights (count,) to layers (W, b)."""
-    first = 0
-    for W, b in layers:
-        width = whole(len(b))
-        block = packed[first : first + (len(W) + 1) * width].reshape(-1, width)
-        W += block[:-1, : len(b)]
-        b += block[-1, : len(b)]
-        first += block.size
+def weight_rows(sizes: tuple[int, ...]) -> IntegerMatrix:
+    """(rows of all W and b, 5) of packed weights: numbers, width, first place, that in `turned` of the first one and
+    steps between them there, 0 for b.
+    """
+    found, first, turned = [], 0, 0
+    for n, m in pairwise(sizes):
+        for i in range(n + 1):
+            there = (turned + i, whole(n)) if i < n else (0, 0)
+            found.append((m, whole(m), first + i * whole(m), *there))
+        first, turned = first + (n + 1) * whole(m), turned + (m + 1) * whole(n)
+    return np.array(found, dtype=np.int64)
+
+
+def places(sizes: tuple[int, ...]) -> Integers:
+    """(count,) places of weights among packed ones."""
+    return np.concatenate([first + np.arange(m) for m, _, first, *_ in weight_rows(sizes)])
+
+
+def turned_places(sizes: tuple[int, ...]) -> tuple[Integers, Integers]:
+    """Which weights are those of matrices, and their places in `turned`."""
+    rows = weight_rows(sizes)
+    inside = np.repeat(rows[:, STRIDE] > 0, rows[:, SIZE])
+    there = np.concatenate([at + step * np.arange(m) for m, _, _, at, step in rows if step > 0])
+    return np.flatnonzero(inside), there
 
 
 @kernel
@@ -90,15 +117,15 @@ def _activate(activation: int, layers: Matrix, columns: Span, rows: Span) -> Non
 
 
 @kernel
-def _forward(shape: IntegerMatrix, w: Matrix, activation: int, layers: Matrix, rows: Span) -> None:
-    """The outputs of all layers, of rows."""
-    first, x = 0, 0
+def forward(net: Packed, layers: Matrix, rows: Span) -> None:
+    """The outputs of all layers, of rows, from the inputs in `layers`."""
+    shape, first, x = net.shape, 0, 0
     for k in range(shape.shape[0] - 1):
         n, width = shape[k, SIZE], shape[k + 1, WIDTH]
         y = x + shape[k, WIDTH]
-        _affine(w, first, n, layers, (x, y, y + width), rows)
+        _affine(net.weights, first, n, layers, (x, y, y + width), rows)
         if k < shape.shape[0] - 2:
-            _activate(activation, layers, (y, y + shape[k + 1, SIZE]), rows)
+            _activate(net.activation, layers, (y, y + shape[k + 1, SIZE]), rows)
         first += (n + 1) * width
         x = y
 
@@ -107,21 +134,33 @@ def _forward(shape: IntegerMatrix, w: Matrix, activation: int, layers: Matrix, r
 def _by_weights(
     sums: Matrix, at: tuple[int, int], n: int, layers: Matrix, g: Matrix, places: tuple[int, int, int], rows: Span
 ) -> None:
-    """sums[p, first :] = gradient by W and b of a layer, added up over rows.
+    """sums[p, first :] += gradient by W and b of a layer, of rows; four rows of W at a time.
 
     at: (p, first);  g: gradient by y;  n, places: as for `_affine`.
     """
     p, first = at
     x, y, width = places[0], places[1], places[2] - places[1]
     for c in range(0, width, LANES):
-        for i in range(n):
-            s = spread(0.0)
-            for r in range(rows[0], rows[1], BLOCK):
-                a = layers[r, x + i] * load(g, r, y + c) + layers[r + 1, x + i] * load(g, r + 1, y + c)
-                b = layers[r + 2, x + i] * load(g, r + 2, y + c) + layers[r + 3, x + i] * load(g, r + 3, y + c)
-                s = s + (a + b)
+        for i in range(0, n - 3, 4):
+            k = first + i * width + c
+            a, b = load(sums, p, k), load(sums, p, k + width)
+            d, e = load(sums, p, k + 2 * width), load(sums, p, k + 3 * width)
+            for r in range(rows[0], rows[1]):
+                v = load(g, r, y + c)
+                a = a + layers[r, x + i] * v
+                b = b + layers[r, x + i + 1] * v
+                d = d + layers[r, x + i + 2] * v
+                e = e + layers[r, x + i + 3] * v
+            store(sums, p, k, a)
+            store(sums, p, k + width, b)
+            store(sums, p, k + 2 * width, d)
+            store(sums, p, k + 3 * width, e)
+        for i in range(n - n % 4, n):
+            s = load(sums, p, first + i * width + c)
+            for r in range(rows[0], rows[1]):
+                s = s + layers[r, x + i] * load(g, r, y + c)
             store(sums, p, first + i * width + c, s)
-        s = spread(0.0)
+        s = load(sums, p, first + n * width + c)
         for r in range(rows[0], rows[1]):
             s = s + load(g, r, y + c)
         store(sums, p, first + n * width + c, s)
@@ -140,11 +179,12 @@ def _slope(activation: int, layers: Matrix, g: Matrix, columns: Span, rows: Span
 
 
 @kernel
-def _backward(
-    shape: IntegerMatrix, w: Matrix, activation: int, layers: Matrix, g: Matrix, sums: Matrix, p: int, rows: Span
-) -> None:
-    """Gradients by all layers and by x, from that by the outputs; sums[p] where there are sums.   w: transposed."""
-    here, first = w.shape[1], sums.shape[1]
+def backward(net: Packed, layers: Matrix, g: Matrix, sums: Matrix, p: int, rows: Span, by_inputs: bool) -> None:
+    """Gradients by all layers, and by the inputs if asked for, from that by the outputs; those by the weights are added
+    to sums[p], if there are sums.
+    """
+    shape = net.shape
+    here, first = net.turned.shape[1], net.weights.shape[1]
     x = g.shape[1] - shape[shape.shape[0] - 1, WIDTH]
     for k in range(shape.shape[0] - 2, -1, -1):
         n, m, width = shape[k, SIZE], shape[k + 1, SIZE], shape[k + 1, WIDTH]
@@ -153,26 +193,27 @@ def _backward(
         first -= (n + 1) * width
         if sums.shape[0] > 0:
             _by_weights(sums, (p, first), n, layers, g, (x, y, y + width), rows)
-        _affine(w, here, m, g, (y, x, y), rows)
+        if k > 0 or by_inputs:
+            _affine(net.turned, here, m, g, (y, x, y), rows)
         if k > 0:
-            _slope(activation, layers, g, (x, x + n), rows)
+            _slope(net.activation, layers, g, (x, x + n), rows)
 
 
 @parallel_kernel
-def forward_rows(shape: IntegerMatrix, w: Matrix, activation: int, layers: Matrix) -> None:
-    """The outputs of all layers, from the inputs in `layers`.   w: packed weights."""
+def forward_rows(net: Packed, layers: Matrix) -> None:
+    """The outputs of all layers, from the inputs in `layers`."""
     n = layers.shape[0]
     for p in prange((n + PART - 1) // PART):
-        _forward(shape, w, activation, layers, (p * PART, min(p * PART + PART, n)))
+        forward(net, layers, (p * PART, min(p * PART + PART, n)))
 
 
 @parallel_kernel
-def backward_rows(shape: IntegerMatrix, w: Matrix, activation: int, layers: Matrix, g: Matrix, sums: Matrix) -> None:
+def backward_rows(net: Packed, layers: Matrix, g: Matrix, sums: Matrix) -> None:
     """Gradients by all columns of `layers` in g, from those by the outputs in it.
 
-    w: packed layers (W^T, 0).
-    sums: (parts, packed weights) gradients by the weights of each part, out; without rows where they are not asked for.
+    sums: (parts, packed weights) zeros, to which the gradients by the weights of each part are added; without rows
+    where they are not asked for.
     """
     n = layers.shape[0]
     for p in prange((n + PART - 1) // PART):
-        _backward(shape, w, activation, layers, g, sums, p, (p * PART, min(p * PART + PART, n)))
+        backward(net, layers, g, sums, p, (p * PART, min(p * PART + PART, n)), True)

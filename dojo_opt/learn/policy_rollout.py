@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from dojo_opt.learn.action_delay import ActionDelay
+from dojo_opt.learn.costate_sweep import Sweep, SweepLimits, sweep_rows
 from dojo_opt.learn.network import Network
+from dojo_opt.learn.network_rows import forward_rows, parts
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.randomization import Drawn, Randomization, draw_pushes
 from dojo_opt.learn.task import Task
@@ -19,7 +22,6 @@ from solvers.types import Flags, Floats
 __all__ = ["Noise", "PolicyGradient", "PolicyRollout", "roll_policy_batch"]
 
 _SPAN = 10.0  # as in policy.py
-_STEEP = 1.5  # outputs that are squashed to actions beyond 0.9
 
 
 @dataclass(frozen=True)
@@ -92,9 +94,10 @@ class PolicyRollout:
         policy: a policy with a task.
         steps: T.
         rows: n.
+        slopes: whether to keep derivatives, for `gradient` (default False).
     """
 
-    def __init__(self, policy: LearnedPolicy, steps: int, rows: int) -> None:
+    def __init__(self, policy: LearnedPolicy, steps: int, rows: int, slopes: bool = False) -> None:
         assert policy.task is not None
         self.policy, self.task = policy, policy.task
         sim = self.task.sim
@@ -105,42 +108,34 @@ class PolicyRollout:
         self.actions, self.rewards = np.zeros((steps, rows, sim.nu)), np.zeros((steps, rows))
         self.applied, self.decided_in = np.zeros((steps, rows, sim.nu)), np.zeros((steps, rows), dtype=np.int64)
         self.terminated, self.unsolved, self.cut = (np.zeros((steps, rows), dtype=np.bool_) for _ in range(3))
-        self._slopes: list[tuple[Floats, ...]] = []
-        self._inside: list[Flags] = []
-        self._kept: list[Floats] = []
+        self.slopes, self._packed = slopes, policy.network.packed(policy.weights)
+        kept, no, ndx, nu = steps if slopes else 0, self.task.observations, sim.ndx, sim.nu
+        self.rates, self.by_reward = np.zeros((kept, rows, no, ndx)), np.zeros((kept, rows, 2 * ndx + nu))
+        self.A, self.B = np.zeros((kept, rows, ndx, ndx)), np.zeros((kept, rows, ndx, nu))
+        self._inside = np.zeros((kept, rows, no), dtype=np.bool_)
+        self._layers = np.zeros((kept, *policy.network.rows(rows).shape))
 
-    def act(self, t: int, noise: Noise | None, slopes: bool) -> Floats:
+    def act(self, t: int, noise: Noise | None) -> None:
         """Choose the actions (n, nu) of step t.
 
         Args:
             t: number of the step.
             noise: of the rollout, or None.
-            slopes: whether to compute the derivatives.
-
-        Returns:
-            (n, no, ndx) derivatives of the observations by the states, or none.
         """
-        policy = self.policy
-        self.observations[t], rates = self.task.observe(self.x[t], slopes)
+        policy, network = self.policy, self.policy.network
+        self.observations[t], rates = self.task.observe(self.x[t], self.slopes)
         scaled = (self.observations[t] - policy.mean) / policy.deviation
         if noise is not None:
             scaled = scaled + noise.observations[t]
-        y, kept = policy.network.forward(policy.weights, np.clip(scaled, -_SPAN, _SPAN))
+        layers = self._layers[t] if self.slopes else network.rows(len(scaled))
+        layers[: len(scaled), : scaled.shape[1]] = np.clip(scaled, -_SPAN, _SPAN)
+        forward_rows(self._packed, layers)
+        y = network.outputs(layers, len(scaled))
         if noise is not None:
             y = y + noise.actions[t]
         self.outputs[t], self.actions[t] = y, policy.squashed(y)
-        if slopes:
-            self._inside.append(np.abs(scaled) < _SPAN)
-            self._kept.append(kept)
-        return rates
-
-    def keep(self, *slopes: Floats) -> None:
-        """Keep the derivatives of a step: observation, A, B, reward.
-
-        Args:
-            *slopes: of the observations, A, B, of the rewards.
-        """
-        self._slopes.append(slopes)
+        if self.slopes:
+            self.rates[t], self._inside[t] = rates, np.abs(scaled) < _SPAN
 
     def gradient(
         self, weights: Floats, ends: Floats | None = None, limit: float = np.inf, saturation: float = 0.0
@@ -160,33 +155,26 @@ class PolicyRollout:
         Returns:
             The gradient, by the weights and by the first states.
         """
-        policy, ndx, nu = self.policy, self.task.sim.ndx, self.task.sim.nu
-        rows = self.x.shape[1]
-        costate, out, clipped, largest = np.zeros((rows, ndx)), np.zeros(policy.network.count), 0, 0.0
-        half, by_decided = 0.5 * (self.task.high - self.task.low), np.zeros_like(self.actions)
-        for t in range(len(self.actions) - 1, -1, -1):
-            rates, A, B, reward = self._slopes[t]
-            costate[self.cut[t]] = 0.0
-            scale = np.where(self.unsolved[t], 0.0, weights[t])[:, None]
-            after = costate + scale * reward[:, ndx + nu :]
-            if ends is not None:
-                after += ends[t]
-            by_applied = half * np.matmul(after[:, None], B)[:, 0] + scale * reward[:, ndx : ndx + nu]
-            known = np.flatnonzero(self.decided_in[t] >= 0)
-            by_decided[self.decided_in[t, known], known] += by_applied[known]
-            costate = np.matmul(after[:, None], A)[:, 0] + scale * reward[:, :ndx]
-            a = self.actions[t]
-            by_output = by_decided[t] * (np.abs(a) < 1.0 if policy.linear else 1.0 - a**2)
-            y = self.outputs[t]
-            by_output = by_output - 2.0 * saturation * np.sign(y) * np.maximum(np.abs(y) - _STEEP, 0.0)
-            by_scaled = policy.network.backward(policy.weights, self._kept[t], by_output, out)
-            costate += np.matmul((by_scaled * self._inside[t] / policy.deviation)[:, None], rates)[:, 0]
-            length = np.sqrt(np.einsum("ni,ni->n", costate, costate))
-            largest = max(largest, float(length.max(initial=0.0)))
-            long = length > limit
-            clipped += int(long.sum())
-            costate[long] *= (limit / length[long])[:, None]
-        return PolicyGradient(out, costate, clipped, largest)
+        policy, (steps, rows), flat = self.policy, weights.shape, (len(weights) * weights.shape[1], -1)
+        ndx, sums = self.task.sim.ndx, policy.network.sums(parts(rows))
+        costates, half = np.zeros((rows, ndx)), 0.5 * (self.task.high - self.task.low)
+
+        def cubes(array: Any) -> Any:
+            return array.reshape(steps * rows, *array.shape[2:])
+
+        sweep = Sweep(
+            np.ascontiguousarray(weights).ravel(),
+            np.zeros((0, ndx)) if ends is None else np.ascontiguousarray(ends).reshape(flat),
+            self.cut.ravel(), self.unsolved.ravel(), self.decided_in.ravel(),
+            cubes(self.A), cubes(self.B), cubes(self.rates), cubes(self.by_reward),
+            cubes(self.outputs), cubes(self.actions), cubes(self._inside),
+            self._layers, half, policy.deviation, np.zeros((steps * rows, self.task.sim.nu)), costates,
+            np.zeros((rows, ndx)), policy.network.rows(rows), sums,
+            np.zeros(len(sums), dtype=np.int64), np.zeros(len(sums)),
+        )  # fmt: skip
+        sweep_rows(self._packed, sweep, SweepLimits(float(limit), float(saturation), policy.linear))
+        by_weights = sums.sum(axis=0)[policy.network.places]
+        return PolicyGradient(by_weights, costates, int(sweep.clipped.sum()), float(sweep.largest.max(initial=0.0)))
 
 
 def roll_policy_batch(
@@ -225,14 +213,14 @@ def roll_policy_batch(
     if task is None:
         raise ValueError("roll_policy_batch(policy): expected a policy with a task")
     model = Drawn.of(task) if drawn is None else drawn
-    out = PolicyRollout(policy, steps, len(starts))
+    out = PolicyRollout(policy, steps, len(starts), slopes)
     lags = ActionDelay(model.delay, len(starts), task.sim.nu) if delays is None else delays
     lags.begin()
     out.x[0] = starts
     one_pass = slopes and kappa_grad is None
     impulses = model.sim.row_impulses(len(starts))
     for t in range(steps):
-        rates = out.act(t, noise, slopes)
+        out.act(t, noise)
         out.applied[t], out.decided_in[t] = lags.apply(t, out.actions[t], model.delay)
         x, inputs = out.x[t], task.inputs(out.applied[t])
         found = model.step(x, inputs, one_pass, impulses=impulses)
@@ -246,14 +234,15 @@ def roll_policy_batch(
         out.rewards[t] += task.survival * ~out.terminated[t]
         out.rewards[t, unsolved] = 0.0
         if slopes:
-            out.keep(rates, A, B, by_reward)
+            out.A[t], out.B[t], out.by_reward[t] = A, B, by_reward
         if noise is not None and noise.pushes is not None:
             out.x[t + 1, :, task.sim.nq : task.sim.nx] += noise.pushes[t]
         out.cut[t] = unsolved
         if restart is not None:
             out.cut[t] |= restart(t, out.terminated[t], unsolved, out.x[t + 1])
-        lags.forget(out.cut[t])
-        impulses.forget(out.cut[t])
+        if out.cut[t].any():
+            lags.forget(out.cut[t])
+            impulses.forget(out.cut[t])
     return out
 
 

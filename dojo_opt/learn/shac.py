@@ -18,6 +18,7 @@ import numpy as np
 
 from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.common_options import check_common
+from dojo_opt.learn.critic_fit import fit_network
 from dojo_opt.learn.discounted_sum import DiscountedSum
 from dojo_opt.learn.epochs import learn
 from dojo_opt.learn.evaluation import evaluate
@@ -178,16 +179,19 @@ class ShacTraining(Training):
 
     # -- values --------------------------------------------------------------------------------------------------------
 
-    def values(self, weights: Floats, states: Floats, slopes: bool = False) -> tuple[Floats, Floats]:
-        """(V (n,) of states (n, nx), dV/dx (n, ndx) or none); the network gives V (1 - gamma)."""
-        observations, rates = self.task.observe(states, slopes)
-        out, kept = self.critic.forward(weights, self.policy.scaled(observations))
-        unit = 1.0 / max(1.0 - self.options.gamma, 1e-3)
-        if not slopes:
-            return unit * out[:, 0], np.zeros((0, 0))
-        inside = np.abs((observations - self.policy.mean) / self.policy.deviation) < 10.0
-        g = self.critic.backward(weights, kept, np.full((len(states), 1), unit)) * inside / self.policy.deviation
-        return unit * out[:, 0], np.matmul(g[:, None], rates)[:, 0]
+    def values(self, weights: Floats, states: Floats, chosen: Flags) -> tuple[Floats, Floats]:
+        """(V (n,) of states (n, nx), dV/dx (n, ndx) of the chosen ones, zeros elsewhere); the network gives
+        V (1 - gamma).
+        """
+        policy, task, unit = self.policy, self.task, 1.0 / max(1.0 - self.options.gamma, 1e-3)
+        out, _ = self.critic.forward(weights, policy.scaled(task.observe(states)[0]))
+        observations, rates = task.observe(states[chosen], slopes=True)
+        _, kept = self.critic.forward(weights, policy.scaled(observations))
+        inside = np.abs((observations - policy.mean) / policy.deviation) < 10.0
+        g = self.critic.backward(weights, kept, np.full((len(rates), 1), unit)) * inside / policy.deviation
+        slopes = np.zeros((len(states), task.sim.ndx))
+        slopes[chosen] = np.matmul(g[:, None], rates)[:, 0]
+        return unit * out[:, 0], slopes
 
     # -- one epoch -----------------------------------------------------------------------------------------------------
 
@@ -217,7 +221,9 @@ class ShacTraining(Training):
             kappa_grad=o.kappa_grad, delays=self.delays, restart=self.restart,
         )  # fmt: skip
         self._count(roll)
-        after, by_value = self.values(self.target, roll.after.reshape(o.horizon * n, -1), slopes=True)
+        last = roll.cut.copy()
+        last[-1] = True
+        after, by_value = self.values(self.target, roll.after.reshape(o.horizon * n, -1), last.ravel())
         after, by_value = after.reshape(o.horizon, n), by_value.reshape(o.horizon, n, -1)
         total = DiscountedSum(roll, after, o.gamma)
         length, share_clipped = self._improve(total, by_value, o.rate * (1.0 - share))
@@ -257,14 +263,10 @@ class ShacTraining(Training):
         solved = ~roll.unsolved.ravel()
         inputs = self.policy.scaled(roll.observations.reshape(-1, self.task.observations))[solved]
         goals = returns.ravel()[solved] * max(1.0 - o.gamma, 1e-3)
-        for _ in range(o.passes):
-            for rows in np.array_split(self.rng.permutation(len(goals)), o.batches):
-                out, kept = self.critic.forward(self.value, inputs[rows])
-                gradient = np.zeros(self.critic.count)
-                self.critic.backward(self.value, kept, 2.0 * (out - goals[rows, None]) / max(len(rows), 1), gradient)
-                gradient, length = clipped(gradient, o.norm)
-                if np.isfinite(length):
-                    self.critic_adam.step(self.value, gradient, o.critic_rate)
+        batches = [
+            rows for _ in range(o.passes) for rows in np.array_split(self.rng.permutation(len(goals)), o.batches)
+        ]
+        fit_network(self.critic, self.value, self.critic_adam, (inputs, goals), batches, o.critic_rate, o.norm)
         self.target += o.blend * (self.value - self.target)
 
     # -- results -------------------------------------------------------------------------------------------------------

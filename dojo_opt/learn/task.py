@@ -111,13 +111,13 @@ def _itself(function: Any) -> Any:
 def _survival_loop(probability: Callable[..., Any]) -> Any:
     @users_loop
     def evaluate(layout, xs, work, values, slopes):  # type: ignore[no-untyped-def]
-        """values[i] = s(x_i), slopes[i] = ds/dx by central differences on the manifold."""
-        nx = xs.shape[1]
+        """values[i] = s(x_i), and slopes[i] = ds/dx by central differences on the manifold, if it has rows."""
+        n, nx = layout.shape[0], xs.shape[1]
         for row in range(xs.shape[0]):
             for k in range(nx):
                 work[0, k] = xs[row, k]
             values[row] = probability(work[0, :nx])
-            for i in range(layout.shape[0]):
+            for i in range(n if slopes.shape[0] > 0 else 0):
                 step = _STEP * max(1.0, abs(xs[row, layout[i]])) if layout[i] >= 0 else _STEP
                 displace(layout, xs[row], i, step, work[0, :nx])
                 ahead = probability(work[0, :nx])
@@ -417,22 +417,23 @@ class Task:
         reward, over = compiled_call(three, self._judge_loop, np.array(x), np.array(action), end, observation)
         return observation, float(reward) + (0.0 if over else self.survival), bool(over)
 
-    def survives(self, xs: Floats, ends: Flags) -> tuple[Floats, Floats]:
-        """(probabilities (n,) that episodes go on, their derivatives (n, ndx)).
+    def survives(self, xs: Floats, ends: Flags, slopes: bool = False) -> tuple[Floats, Floats]:
+        """(probabilities (n,) that episodes go on, their derivatives (n, ndx), or none).
 
         Args:
             xs: (n, nx) states.
             ends: (n,) whether episodes end there.
+            slopes: whether to compute the derivatives (default False).
 
         Returns:
-            (n,) numbers from 0 to 1, and (n, ndx) derivatives: zero without `survival_probability`.
+            (n,) numbers from 0 to 1, and (n, ndx) derivatives: zero without `survival_probability`; or (0, ndx).
         """
         values: Floats = 1.0 - ends.astype(np.float64)
-        slopes = np.zeros((len(xs), self.sim.ndx))
+        out = np.zeros((len(xs) if slopes else 0, self.sim.ndx))
         if self.survival_probability is not None:
             loop, work = self._survival_loop, self._work.copy()
-            compiled_call("survival_probability", loop, self._layout, xs, work, values, slopes)
-        return values, slopes
+            compiled_call("survival_probability", loop, self._layout, xs, work, values, out)
+        return values, out
 
     def first(self, rng: np.random.Generator) -> Floats:
         """A first state, with a command where there is one.

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
+from dojo_opt.learn.critic_fit import fit_network
 from dojo_opt.learn.environment_names import TASKS
 from dojo_opt.learn.gymnasium_tasks import FUNCTIONS
-from dojo_opt.learn.network import Network
+from dojo_opt.learn.network import Adam, Network
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.task import compile_functions
 from dojo_opt.planning.knot_costs import KnotCosts
@@ -128,6 +129,8 @@ def _learning() -> None:
     network = Network((3, 4, 1), "tanh")
     weights, x = np.zeros(network.count), np.zeros((2, 3))
     network.backward(weights, network.forward(weights, x)[1], np.zeros((2, 1)), np.zeros(network.count))
+    samples = np.zeros((2, 3)), np.zeros(2)
+    fit_network(network, weights, Adam(network.count, (0.9, 0.9)), samples, [np.arange(2)], 1e-3, 1.0)
     LearnedPolicy(network, np.zeros(network.count), np.zeros(3), np.ones(3), None).action(np.zeros(3))
 
 
@@ -269,6 +272,9 @@ def _environments(batches: bool) -> None:
             compile_functions(
                 task.observation, task.reward, task.terminated, task.survival_probability, batches=batches
             )
+            if batches and name == "QuadrotorWaypoint":  # the sweep of gradients
+                few = {"epochs": 1, "environments": 2, "horizon": 2, "hidden": (4,), "evaluations": 1, "episodes": 1}
+                dojo.learn.shac(task, **few)
 
 
 def _mpc() -> None:

@@ -8,6 +8,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
 
+import numba
 import numpy as np
 import pytest
 
@@ -19,6 +20,7 @@ from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import Noise
 from dojo_opt.learn.randomization import Drawn, Models
+from solvers.compiler import threads
 
 
 def _task(steps=30, tolerance=1e-8):
@@ -92,6 +94,18 @@ def test_gradients_of_returns_are_those_of_central_differences(hidden, activatio
             e[row, j] = 1e-5
             np.testing.assert_allclose(found.states[row, j], (value(starts + e) - value(starts - e)) / 2e-5, **CLOSE)
     assert found.clipped == 0
+
+
+@pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="one thread")
+def test_an_epoch_has_the_same_bits_on_any_number_of_threads(task):
+    """More rows than a part of network_rows.py, and not a whole number of its blocks."""
+    options, found = {"epochs": 2, "environments": 35, "horizon": 4, "hidden": (6,), "episode": 6}, []
+    for count in (1, 2):
+        with threads(count):
+            run = dojo.learn.shac(task, **options, randomization=MODELS, evaluations=1, episodes=1)
+        found.append((run.state["weights"], run.state["value"], run.state["x"]))
+    for one, two in zip(*found, strict=True):
+        np.testing.assert_array_equal(one, two)
 
 
 def test_a_smooth_probability_of_survival_has_the_derivative_of_what_it_makes_less():

@@ -4,7 +4,8 @@ import numba
 import numpy as np
 import pytest
 
-from dojo_opt.learn.network import Network
+from dojo_opt.learn.critic_fit import fit_network
+from dojo_opt.learn.network import Adam, Network, clipped
 from solvers.compiler import threads
 
 
@@ -57,3 +58,23 @@ def test_bits_do_not_depend_on_the_number_of_threads(rng):
             results.append((y, network.backward(weights, kept, g, by_weights), by_weights))
     for one, two in zip(*results, strict=True):
         np.testing.assert_array_equal(one, two)
+
+
+def test_a_fit_is_that_of_its_formula_and_the_same_on_any_number_of_threads(rng):
+    network, results = Network((3, 9, 5, 1), "elu"), []
+    start, x, goals = rng.standard_normal(network.count), rng.standard_normal((70, 3)), rng.standard_normal(70)
+    batches = [rng.permutation(70)[:count] for count in (37, 33, 0, 1, 50)]
+    for count in (1, 2) if numba.config.NUMBA_NUM_THREADS > 1 else (1,):
+        weights, adam = start.copy(), Adam(network.count, (0.7, 0.95))
+        with threads(count):
+            fit_network(network, weights, adam, (x, goals), batches, 1e-2, 0.5)
+        results.append((weights, adam.moments))
+    for one, two in zip(results[0], results[-1], strict=True):
+        np.testing.assert_array_equal(one, two)
+    weights, adam = start.copy(), Adam(network.count, (0.7, 0.95))
+    for rows in filter(len, batches):
+        out, kept = plain(network, weights, x[rows])
+        gradient = plain_gradients(network, weights, kept, 2.0 * (out - goals[rows, None]) / len(rows))[1]
+        adam.step(weights, clipped(gradient, 0.5)[0], 1e-2)
+    np.testing.assert_allclose(results[0][0], weights, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(results[0][1], adam.moments, rtol=0, atol=1e-11)
