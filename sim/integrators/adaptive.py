@@ -19,6 +19,7 @@ from sim.dynamics.external_forces import set_external
 from sim.integrators.contact_events import NEVER
 from sim.integrators.halved_step import FAILED, LANDS, try_short
 from sim.integrators.hamilton import coordinate_rates
+from sim.integrators.impact_error import followed_error, jumps
 from sim.integrators.phases import NEAR, leave, omitted_impulses, report_apart
 from sim.integrators.runge_kutta import advance
 from sim.integrators.runge_kutta import begin as begin_node
@@ -136,6 +137,25 @@ def _go_beyond(clock: Vector, h: float, rest: float, shortest: float, status: in
 
 
 @kernel
+def _tell(
+    model_at: Table,
+    data_at: Table,
+    step: tuple[Vector, Vector, float],
+    line: SubstepState,
+    ratio: float,
+    scratch: Vector,
+) -> None:
+    """Adds the error of a step of order 2 that is kept; a large one of an impact is followed.   step: (goal, settings,
+    length).
+    """
+    clock, goal, h = line.clock, step[0], step[2]
+    accuracy, rest, error = goal[AccuracyGoal.ACCURACY], goal[AccuracyGoal.END] - clock[Clock.TIME], ratio * h
+    if jumps(clock) and error > _KINK:
+        error = min(error, followed_error(model_at, data_at, step, line, scratch) / accuracy)
+    clock[Clock.ERROR] += error + clock[Clock.PUSH] * rest / accuracy
+
+
+@kernel
 def take_short(
     models: Table, data_tables: Table, settings: Vector, goal: Vector, line: SubstepState, embedded: Embedded, h: float
 ) -> int:  # fmt: skip
@@ -154,9 +174,9 @@ def take_short(
             clock[Clock.KINKS] += ratio * h if ratio * h < _KINK else 0.0
         else:
             lengthen(clock, h, ratio, shortest)
+        _tell(models[1], data_tables[0], (goal, settings, h), line, ratio, embedded.rate)
         keep(line, h, int(clock[Clock.ORDER]))
         clock[Clock.WAIT] = max(0.0, clock[Clock.WAIT] - 1.0)
-        clock[Clock.ERROR] += ratio * h + clock[Clock.PUSH] * rest / goal[AccuracyGoal.ACCURACY]
         return _SOLVED
     if status == _NOT_FINITE or status == _CONTACT_SUNK:
         return status

@@ -10,8 +10,10 @@ from sim.contact.contact_report import report_contacts
 from sim.dynamics.state_manifold import configuration_difference
 from sim.integrators.contact_events import LANDED, NEVER, Landing, landing
 from sim.integrators.extrapolated_step import CLOSED, NOISE, extrapolate, raise_order
+from sim.integrators.impact_error import FEW, MANY, impact_errors, jumps
 from sim.integrators.node_step import (
     begin_part,
+    hands_on,
     mean_of_node,
     node_of_mean,
     part_of,
@@ -40,24 +42,12 @@ _OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes deeper ones, 
 _LITTLE, _WAIT = 0.01, 4.0  # least ratio of a step that is extrapolated; steps without that after one in vain
 _NEAR_START = 0.01  # share of the tolerance
 _SETTLES = 1.5  # times the length in which contacts settle: in shorter steps their gaps oscillate
-# iterations of a step that may be shorter, and of one that may be longer: at folds, the interior point would try all
-# its starts
-_FEW, _MANY = 40, 100
-_AHEAD = 1e-3  # [s] least length of the steps behind an impact whose velocities are compared
-
-
-@kernel
-def _hands_on(model: Model) -> bool:
-    """Whether steps start near others of the same node: not with loops, gears and pairs of bodies, where the whole step
-    and its halves might end in different solutions.
-    """
-    return model.loop_ntrans.shape[0] + model.gear_dof.shape[0] + model.pair_kind.shape[0] == 0
 
 
 @kernel
 def _share(model: Model) -> float:
     """Of the tolerance: a start near the solution ends just within it, one far away well within it."""
-    return _NEAR_START if _hands_on(model) else 1.0
+    return _NEAR_START if hands_on(model) else 1.0
 
 
 @kernel
@@ -77,10 +67,10 @@ def _guess_half(line: SubstepState, nq: int, part: int) -> None:
 def _two_halves(model_at: Table, data_at: Table, options: StepOptions, line: SubstepState) -> int:
     """line.trial = the node two steps after line.x, line.mean = its mean state, line.parts their contacts; Status.
 
-    Where _hands_on, they start near the undivided step, which is in line.whole and in the Data, with its forces.
+    Where hands_on, they start near the undivided step, which is in line.whole and in the Data, with its forces.
     """
     model, data, h = model_view(model_at), data_view(data_at), options.h
-    nq, near = data.theta1.shape[0], _hands_on(model)
+    nq, near = data.theta1.shape[0], hands_on(model)
     _guess_half(line, nq, 0)
     begin_part(data, line.wrench)
     status = mean_of_node(model_at, data_at, h, line.u, line.x, line.mean)
@@ -97,70 +87,26 @@ def _two_halves(model_at: Table, data_at: Table, options: StepOptions, line: Sub
 
 
 @kernel
-def _step_ahead(
-    model_at: Table, data_at: Table, options: StepOptions, line: SubstepState, x: Vector, out: Vector, again: bool
-) -> int:  # fmt: skip
-    """out = the mean state one step after the node x, in which the ground acts on both alike; the Status.
-
-    again: the step before was the same, to line.ahead, from a node nearby, which is a start to be tried first.
-    """
-    model, data = model_view(model_at), data_view(data_at)
-    begin_part(data, line.wrench)
-    status = mean_of_node(model_at, data_at, options.h, line.u, x, line.half)
-    if status != _SOLVED:
-        return status
-    nq = data.theta1.shape[0]
-    if again and _hands_on(model):
-        begin_part(data, line.wrench)
-        near = Guess(line.ahead[nq:], True)
-        if step_mean(model, data, options, line.u, line.half, near, out, line.report) == _SOLVED:
-            return _SOLVED
-    begin_part(data, line.wrench)
-    return step_mean(model, data, options, line.u, line.half, Guess(line.half[nq:], False), out, line.report)
-
-
-@kernel
-def _settle(model_at: Table, data_at: Table, options: StepOptions, line: SubstepState, x: Vector, k: int) -> None:
-    """line.settled[k] = the node one step after the node x; x itself where that step is not solved."""
-    model, data, out = model_view(model_at), data_view(data_at), line.settled[k]
-    status = _step_ahead(model_at, data_at, options, line, x, out, k > 0)
-    copy_vector(out, line.ahead)
-    if status != _SOLVED or node_of_mean(model, data, options.h, line.u, line.ahead, out) != _SOLVED:
-        copy_vector(x, out)
-
-
-@kernel
 def _difference(
-    model_at: Table, data_at: Table, steps: tuple[StepOptions, StepOptions], goal: Vector, line: SubstepState,
-    embedded: Embedded,
+    model_at: Table, data_at: Table, step: tuple[Vector, Vector, float], line: SubstepState, embedded: Embedded
 ) -> float:  # fmt: skip
-    """Largest e = |q - q'|/2 + |v - v'| t of the coordinates after a step and after its two halves [m, rad].
+    """Largest e = |q - q'|/2 of the coordinates after a step and after its two halves [m, rad]; with an impact, and the
+    errors that follow from its velocities (`impact_errors`). Without one these do not count: they are as different as
+    the gap of a contact is, over the length of the step.
 
     In contact without an impact, _PRESSED times that: errors of the velocity go on there, and grow where a body tips.
     _HELD times by loops and gears alone.
-
-    v, v': after an impact, as means of the last of two steps: the first, as short as the halves, ends the impact where
-    part of it is left, before contacts that it pressed open again; in the other one the ground has acted. Where that is
-    not solved, as an impact follows at once, they are those after the first one. Without an impact these do not count:
-    they are as different as the gap of a contact is, over the length of the step.
-    t: the rest of the step, at least half a second: the time over which an error of the velocity counts.
     """
     model, data = model_view(model_at), data_view(data_at)
-    nq, hits = data.theta1.shape[0], line.clock[Clock.HIT] > 0.0
-    one, other, presses = line.node, line.trial, data.active_count[0] > 0
+    nq, hits, presses = data.theta1.shape[0], jumps(line.clock), data.active_count[0] > 0
     if hits:
-        _settle(model_at, data_at, steps[0], line, one, 0)
-        _settle(model_at, data_at, steps[0], line, other, 1)
-        one, other = line.settled[0], line.settled[1]
-        if _step_ahead(model_at, data_at, steps[1], line, one, line.ahead, False) == _SOLVED:
-            if _step_ahead(model_at, data_at, steps[1], line, other, line.node, True) == _SOLVED:
-                one, other = line.ahead, line.node
+        impact_errors(model_at, data_at, step, line, embedded.rate)
     configuration_difference(model, line.whole[:nq], line.mean[:nq], embedded.distance)
     noise = NOISE if model.contact_body.shape[0] + model.limit_dof.shape[0] > 0 else CLOSED
-    error, time = 0.0, max(goal[AccuracyGoal.END] - line.clock[Clock.TIME], 0.5) if hits else 0.0
+    error = 0.0
     for d in range(embedded.distance.shape[0]):
-        moved, turned = 0.5 * abs(embedded.distance[d]), abs(one[nq + d] - other[nq + d])
-        error = max(error, max(moved - noise, 0.0) + time * turned)
+        moved, later = 0.5 * abs(embedded.distance[d]) - noise, embedded.rate[d] if hits else 0.0
+        error = max(error, max(moved, 0.0) + later)
     if presses:
         return error if hits else _PRESSED * error
     return _HELD * error if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0 else error
@@ -202,7 +148,7 @@ def _patient(model: Model, goal: Vector, settings: Vector, clock: Vector, h: flo
     if clock[Clock.ANY] > 0.0:
         return within(options, options.max_iterations, _share(model))
     shortest = h <= goal[AccuracyGoal.IMPACT] or clock[Clock.BEYOND] > 0.0
-    return within(options, _MANY if shortest else _FEW, _share(model))
+    return within(options, MANY if shortest else FEW, _share(model))
 
 
 @kernel
@@ -226,7 +172,9 @@ def _whole(model_at: Table, data_at: Table, options: StepOptions, line: SubstepS
 
 @kernel
 def _ends_before(goal: Vector, line: SubstepState, found: Landing, h: float) -> bool:
-    """Whether the step, of length h, has to end before a contact or limit that it reaches, and is cut there."""
+    """Whether the step, of length h, has to end before a contact or limit that it reaches, and is cut there; not where
+    any error is kept.
+    """
     clock = line.clock
     clock[Clock.HIT], clock[Clock.AHEAD] = 1.0 if found.hits else 0.0, found.ahead
     if found.longest < NEVER:
@@ -237,7 +185,7 @@ def _ends_before(goal: Vector, line: SubstepState, found: Landing, h: float) -> 
     if found.hits and h > clock[Clock.IMPACT] and clock[Clock.BEYOND] == 0.0:
         shorten_impact(clock, h, clock[Clock.IMPACT])
         return True
-    if found.error > LANDED * goal[AccuracyGoal.ACCURACY]:
+    if found.error > LANDED * goal[AccuracyGoal.ACCURACY] and clock[Clock.ANY] == 0.0:
         clock[Clock.CUT] = before_landing(h, found.ahead)
         return True
     return False
@@ -254,8 +202,7 @@ def _judged(
     model, data, clock = model_view(models[1]), data_view(data_tables[0]), line.clock
     goal, settings, h = step
     stop = stopping_error(model, line.parts, line.slips, h)
-    steps = part_of(goal, settings, 0.5 * h, 1), part_of(goal, settings, max(0.5 * h, _AHEAD), 1)
-    error = max(stop, _difference(models[1], data_tables[0], steps, goal, line, embedded))
+    error = max(stop, _difference(models[1], data_tables[0], step, line, embedded))
     allowed = goal[AccuracyGoal.ACCURACY] * h
     settles = data.active_count[0] > 0 and h < _SETTLES * goal[AccuracyGoal.SETTLED]
     if clock[Clock.HIT] + clock[Clock.BEYOND] == 0.0 and not settles:
@@ -279,7 +226,7 @@ def try_short(
         return status, FAILED
     report_contacts(model, data, h, line.parts[2])
     found = landing(model, data, options, goal[AccuracyGoal.ACCURACY], line.mean, line.slips)
-    clock[Clock.WARM] = h if _hands_on(model) and not found.hits else 0.0
+    clock[Clock.WARM] = h if hands_on(model) and not found.hits else 0.0
     status = node_of_mean(model, data, h, line.u, line.whole, line.node)
     if _ends_before(goal, line, found, h):
         return LANDS, FAILED

@@ -110,6 +110,14 @@ def node_of_mean(model: Model, data: Data, h: float, u: Vector, mean: Vector, x:
 
 
 @kernel
+def hands_on(model: Model) -> bool:
+    """Whether steps start near others of the same node: not with loops, gears and pairs of bodies, where the whole step
+    and its halves might end in different solutions.
+    """
+    return model.loop_ntrans.shape[0] + model.gear_dof.shape[0] + model.pair_kind.shape[0] == 0
+
+
+@kernel
 def part_of(goal: Vector, settings: Vector, h: float, parts: int) -> StepOptions:
     """Options of a step of length h: kappa in proportion to it, so that contacts press with the same force.
 

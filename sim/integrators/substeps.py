@@ -48,6 +48,7 @@ class Clock(Code):
     MISS = 25  # error of the last impact that was refused, in accuracies; 0: none since the last one kept
     STALLS = 26  # impacts refused in a row that were no more exact than the one before
     ROUGH = 27  # length of the step just tried over the longest of order 4, 0 where that is not known
+    ENDED = 28  # 1 where `settled` of a SubstepState are the nodes where the impact of the step just tried has ended
 
 
 class AccuracyGoal(Code):
@@ -76,7 +77,7 @@ class SubstepState(NamedTuple):
     node: Vector  # (nx,) scratch: the node after the undivided step
     ahead: Vector  # (nx,) scratch: mean state of a step from there
     settled: Matrix  # (2, nx) scratch: nodes a short step after that, and after the halves
-    clock: Vector  # (28,) in place
+    clock: Vector  # (29,) in place
     report: Vector  # (9,) in place; PARTS counts the sub-steps
     parts: Cube  # (3, ncontact, 11) scratch: contacts of both halves, and of the whole step
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the step

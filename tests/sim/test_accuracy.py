@@ -141,6 +141,17 @@ def test_an_impact_that_throws_off_what_rests_has_the_error_that_it_has() -> Non
     assert found.errors.max() < 10.0
 
 
+def test_an_impact_that_no_short_step_ends_has_the_error_that_it_has() -> None:
+    """A hopper falls; behind one of its impacts steps as short as that one have no solution. Two accuracies agree."""
+    mech, seconds = models.hopper(), 0.3
+    q, v = np.array([0.0, 1.26, 0.0, 0.0, 0.0, 0.0]), 0.5 * np.random.default_rng(2).normal(size=6)
+    coarse, fine = (dojo.Simulator(mech, accuracy=accuracy) for accuracy in (1e-4, 1e-5))
+    found, exact = (sim.rollout(sim.state_from_velocity(q, v), duration=seconds, throw=True) for sim in (coarse, fine))
+    assert np.abs(found.x[-1] - exact.x[-1])[:6].max() < 1e-4 * seconds
+    assert found.errors[0] < 10.0
+    assert exact.errors[0] < 100.0
+
+
 @pytest.mark.parametrize("name", ["hopper", "walker", "quadruped", "panda", "atlas"])
 def test_mobility_is_a_bound_and_near(name: str) -> None:
     """Of the diagonal of the inverse of the mass matrix, without translations of the base."""
