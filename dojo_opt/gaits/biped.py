@@ -81,7 +81,8 @@ def step(
     path = np.tile(feet.positions(start), (len(time), 1, 1))
     path[:, swung, 0] += length * over[:, None]
     path[:, swung, 2] += step_height * (4.0 * over * (1.0 - over))[:, None]
-    first, last = path[0, :, :2].mean(axis=0), path[-1, :, :2].mean(axis=0)
+    last = path[-1, :, :2].mean(axis=0)
+    first = path[0, :, :2].mean(axis=0) if after is None else _center(sim, start[None])[0]
     stance = path[0, ~swung, :2].mean(axis=0)
     goal = first + out[:, None] * (stance - first) + back[:, None] * (last - stance)
     x = np.tile(start, (len(time), 1))
@@ -128,6 +129,12 @@ def _end(sim: Simulator, after: Gait) -> Floats:
     return np.asarray(state)
 
 
+def _center(sim: Simulator, x: Floats) -> Floats:
+    """(n, 2) places of the centre of mass of states (n, nx), seen from above [m]."""
+    mass = np.array([body.mass for body in sim.mechanism.bodies])
+    return np.asarray(np.einsum("b,nbk->nk", mass / mass.sum(), sim.maximal(x)[..., :2]))
+
+
 def balanced(feet: Feet, x: Floats, path: Floats, goal: Floats) -> Floats:
     """Poses of the base near those of given states for which the centre of mass is where it should be.
 
@@ -144,11 +151,10 @@ def balanced(feet: Feet, x: Floats, path: Floats, goal: Floats) -> Floats:
         ValueError: a foot cannot reach its place.
     """
     sim = feet.sim
-    mass = np.array([body.mass for body in sim.mechanism.bodies])
     x = np.array(x)
     for _ in range(_CORRECTIONS):
         x = feet.place(x, path)
-        center = np.einsum("b,nbk->nk", mass / mass.sum(), sim.maximal(x)[..., :2])
+        center = _center(sim, x)
         if np.abs(goal - center).max() < _CLOSE:
             break
         x[:, :2] += goal - center

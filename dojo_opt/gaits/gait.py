@@ -9,6 +9,7 @@ import numpy as np
 from dojo_opt.gaits.equilibrium import least_pushes
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.static_motions import input_map
+from sim.mechanism import checks
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.memory_limit import check_room
@@ -23,6 +24,8 @@ __all__ = ["Gait"]
 _ALOFT = 100.0  # [m] where no foot feels the ground
 _FAR = 1e3  # [rad, m] where no joint feels its stops
 _LONGEST = 100_000  # time steps: half an hour at 20 ms, whose inverse kinematics take seconds
+_SAME = 1e-9  # share of a time step by which equal ones may differ
+_JOINED = 1e-3  # [m, rad] between the ends of two motions that follow one another
 _EVEN = 1e-4  # weight of small foot forces against the balance of the base
 
 
@@ -31,8 +34,9 @@ class Gait:
     """A motion along the time steps of a simulator. It is a reference: feet and base are consistent, but forces may not
     be.
 
-    The velocity of row t is that of the interval from t - 1 to t, as in every state. x[0] has that of the interval
-    before the motion, which for a periodic gait is the last one of a period.
+    The velocity of row t is that of the interval from t - 1 to t, as in every state of order 2. x[0] has that of the
+    interval before the motion, which for a periodic gait is the last one of a period. For a simulator whose states have
+    the velocity at the node, it is the mean of those of the intervals before and after the row.
 
     Attributes:
         name: name of the gait.
@@ -58,11 +62,30 @@ class Gait:
         """This motion, followed by another one that begins where this one ends.
 
         Args:
-            other: the motion that follows, of the same robot and time step.
+            other: the motion that follows, of the same robot and time step. Its first row is the last one of this
+                motion, up to velocities.
 
         Returns:
             A gait of both motions; its name and simulator are those of this one.
+
+        Raises:
+            TypeError: the other one is no Gait.
+            ValueError: another robot, other feet, another time step or kind of velocities, or another beginning.
         """
+        call = f"Gait.then({self.name} -> {getattr(other, 'name', other)})"
+        if not isinstance(other, Gait):
+            raise TypeError(f"Gait.then: expected a Gait, got {checks.shown(other)}")
+        mine, its = self.simulator, other.simulator
+        if mine.mechanism.joint_names != its.mechanism.joint_names or mine.nx != its.nx:
+            raise ValueError(f"{call}: expected a motion of {mine.mechanism.name!r}, got {its.mechanism.name!r}")
+        if self.foot_names != other.foot_names:
+            raise ValueError(f"{call}: expected the feet {self.foot_names}, got {other.foot_names}")
+        if abs(mine.time_step - its.time_step) > _SAME * mine.time_step or bool(mine.mean_over) != bool(its.mean_over):
+            raise ValueError(f"{call}: expected time steps of {mine.time_step:g} s, got {its.time_step:g} s")
+        off = np.abs(mine.difference(other.x[0], self.x[-1])[: mine.nv])
+        if off.max() > _JOINED:
+            name = mine.mechanism.dof_names[int(off.argmax())]
+            raise ValueError(f"{call}: it begins {off.max():.3g} m or rad from where this motion ends, in {name!r}")
         x, feet, contact = (np.concatenate([getattr(self, f), getattr(other, f)[1:]]) for f in ("x", "feet", "contact"))
         time = np.concatenate([self.time, self.time[-1] + other.time[1:]])
         return replace(self, time=time, x=x, feet=feet, contact=contact)
@@ -154,6 +177,11 @@ def check_length(call: str, sim: Simulator, steps: float, remedy: str) -> None:
     check_room(call, int(steps), 8.0 * (sim.nx + sim.ndx * (sim.ndx + sim.nu)), remedy, "time steps")
 
 
+def _at_nodes(means: Floats) -> Floats:
+    """(n, nv) velocities at the ends of intervals with the mean velocities `means`; the last is extrapolated."""
+    return np.concatenate([0.5 * (means[:-1] + means[1:]), 1.5 * means[-1:] - 0.5 * means[-2:-1]])
+
+
 def assemble(sim: Simulator, name: str, base: Floats, feet: Floats, contact: Flags, *, names: tuple[str, ...]) -> Gait:
     """Gait from the pose of the base (T + 2, 7) and the feet (T + 2, k, 3) at times -h, 0, ..., T h."""
     x = np.tile(sim.neutral(), (len(base), 1))
@@ -162,8 +190,8 @@ def assemble(sim: Simulator, name: str, base: Floats, feet: Floats, contact: Fla
         x = Feet(sim, names).place(x, feet)
     except ValueError as error:
         raise ValueError(f"{error}; move less far or fast, lift the feet less, or change the height") from error
-    steps = sim.difference(x[1:], x[:-1])[:, : sim.nv]
+    means = sim.difference(x[1:], x[:-1])[:, : sim.nv] / sim.time_step
     x = x[1:]
-    x[:, sim.nq :] = steps / sim.time_step
+    x[:, sim.nq :] = means if sim.mean_over else _at_nodes(means)
     time = sim.time_step * np.arange(len(x), dtype=np.float64)
     return Gait(name, sim, time, x, feet[1:], contact[1:], names)

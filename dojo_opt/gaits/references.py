@@ -352,12 +352,12 @@ def _periodic(
     call = f"gaits.{name}"
     checks.keywords(f"{call}(...)", unknown, _KEYWORDS)
     _check_legs(call, sim)
-    for name, value in (("lateral", lateral), ("heading_rate", heading_rate)):
-        checks.number(f"{call}({name}=...)", value)
+    for keyword, value in (("lateral", lateral), ("heading_rate", heading_rate)):
+        checks.number(f"{call}({keyword}=...)", value)
     if not 0.0 < checks.number(f"{call}(duty=...)", duty) < 1.0:
         raise ValueError(f"{call}(duty=...): expected a share of the period between 0 and 1, got {duty}")
-    for name, value in (("step_height", step_height), ("tilt", tilt)):
-        checks.number(f"{call}({name}=...)", value, at_least=0.0)
+    for keyword, value in (("step_height", step_height), ("tilt", tilt)):
+        checks.number(f"{call}({keyword}=...)", value, at_least=0.0)
     if height is not None:
         checks.number(f"{call}(height=...)", height)
     once = _whole(f"{call}(period=...)", period, sim.time_step)

@@ -54,7 +54,7 @@ class Prediction:
             return measured.state()
         self._fine.follow(self._sim)
         ends, h = [], self._fine.time_step
-        x = measured.over(h)
+        x = measured.of(self._fine)
         for k in range(self._steps):
             x = self._fine.step(x, command(now + (k + 0.5) * h, x), throw=True).x
             ends.append((now + (k + 1) * h, x))

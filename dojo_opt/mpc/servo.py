@@ -23,8 +23,8 @@ _CALL = "MPC(servo=...)"
 class Servo:
     """Servos that follow the plan, which does not know them: kp (q_plan - q) + kd (v_plan - v), added to the inputs.
 
-    The velocity of a state is the mean one over the interval before it, so that planned for a time is read half a step
-    of the model later.
+    The velocity of a state is the mean one over the interval before it, so that planned for a time is read half this
+    interval later.
 
     Args:
         sim: simulator of the model.
@@ -54,7 +54,7 @@ class Servo:
         """
         sim, at = self._sim, self._dof
         off = sim.difference(policy.state(time), x)[at]
-        ahead = policy.state(time + 0.5 * sim.time_step)[sim.nq + at]
+        ahead = policy.state(time + 0.5 * sim.mean_over)[sim.nq + at]
         return np.asarray(self.kp * off + self.kd * (ahead - x[sim.nq + at]))
 
 

@@ -49,7 +49,8 @@ class MPCSettings:
         feedforward: whether the planned inputs are applied, too; without them a servo is required (default True).
         time_limit: limit of the wall time of a tick, checked before each iteration [s] (default inf).
         mean_velocity: whether the velocity is computed from the coordinates one step of the model earlier (default
-            True); see `dojo_opt.mpc.measurement`.
+            True), unless the model has velocities at nodes (an order of 4 to 8, or an accuracy); see
+            `dojo_opt.mpc.measurement`.
         friction: coefficient of friction that plans assume (default None: that of the model). A value below that of the
             ground is safer.
         shrinkage: reduction of the radius of one sphere or capsule of every collision in the model of the plans [m]:

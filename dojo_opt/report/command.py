@@ -63,9 +63,16 @@ def report(
 
     Returns:
         The exit status: 1 when a study ended with an error or, with --strict, a bar was missed.
+
+    Raises:
+        ValueError: an option that does not belong to the study, or to no robot.
     """
     mechanism = None
-    if args.robot is not None:
+    if args.robot is None:
+        for option in ("fixed", "contacts"):
+            if getattr(args, option):
+                raise ValueError(f"report --{option}: it belongs to a ROBOT.urdf, which is missing")
+    else:
         mechanism = load_urdf(args.robot, floating=not args.fixed, contacts=touching(args.contacts))
     names = list(studies) if args.name == "all" else [args.name]
     if args.cold and "lean" not in names:

@@ -81,6 +81,13 @@ class StateSpace:
         return drawn(self.mechanism) + f"<p>{escape(repr(self))}</p>"
 
     @property
+    def mean_over(self) -> float:
+        """Interval before a state over which its velocity is the mean [s]: the time step; 0 with an order of 4 to 8 or
+        an accuracy, where it is the velocity at the node.
+        """
+        return self._states.mean_over
+
+    @property
     def second_order_reason(self) -> str:
         """The reason why all steps of a simulator of higher order are of order 2, such as a stiff spring; empty if they
         are not.

@@ -27,7 +27,9 @@ def sim():
 
 @pytest.fixture(scope="module", params=PERIODIC)
 def gait(request, sim):
-    return getattr(gaits, request.param)(sim, **PERIODIC[request.param])
+    made = getattr(gaits, request.param)(sim, **PERIODIC[request.param])
+    assert made.name == {"turn": "trot"}.get(request.param, request.param)
+    return made
 
 
 def test_every_row_is_a_state_reached_with_its_velocity(sim, gait):
@@ -38,6 +40,32 @@ def test_every_row_is_a_state_reached_with_its_velocity(sim, gait):
     )
     np.testing.assert_allclose(sim.difference(back, gait.x[:-1])[:, : sim.nv], 0.0, atol=1e-9)
     np.testing.assert_allclose(gait.time, h * np.arange(len(gait.x)), atol=1e-12)
+
+
+def test_velocities_are_at_the_rows_where_those_of_the_states_are(sim):
+    """Where the mean velocities of states of order 2 are half a step late."""
+    settings = {"speed": 0.3, "heading_rate": 1.0, "period": 0.4, "cycles": 1}
+    fine = gaits.trot(sim.replace(time_step=1e-3), **settings).x[::20, sim.nq :]
+    means, nodes = (gaits.trot(sim.replace(order=order), **settings).x[:, sim.nq :] for order in (2, 4))
+    late, off = (np.sqrt(np.mean((v - fine)[1:-1] ** 2)) for v in (means, nodes))
+    assert off < 0.4 * late, (off, late)  # feet that lift off have kinks
+
+
+def test_motions_follow_only_where_the_first_ends(sim):
+    stand = gaits.stand(sim, duration=0.1)
+    both = stand.then(gaits.jump(sim))
+    np.testing.assert_allclose(np.diff(both.time), sim.time_step, atol=1e-12)
+    biped = Simulator(models.atlas(), time_step=sim.time_step)
+    refused = {
+        "time steps of 0.02 s, got 0.01 s": gaits.stand(sim.replace(time_step=0.01), duration=0.1),
+        "of 'quadruped', got 'atlas'": gaits.stand(biped, duration=0.1),
+        r"stand -> trot\): it begins 0\..* from where this motion ends, in": gaits.trot(sim, speed=0.5, period=0.4),
+    }
+    for message, other in refused.items():
+        with pytest.raises(ValueError, match=message):
+            stand.then(other)
+    with pytest.raises(TypeError, match=r"Gait\.then: expected a Gait, got 3"):
+        stand.then(3)
 
 
 def test_feet_are_where_the_states_put_them(sim, gait):

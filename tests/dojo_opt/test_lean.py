@@ -120,6 +120,9 @@ def test_the_report_lists_cold_starts_on_request_the_worst_first(monkeypatch):
     assert not study("lean", mechanism=dojo.models.pendulum()).run(Progress()).tables
     with pytest.raises(ValueError, match="--cold: it belongs to the report lean, got timing"):
         report(cli._parser().parse_args(["report", "timing", "--cold"]))
+    for given in (["--fixed"], ["--contacts", "foot"]):
+        with pytest.raises(ValueError, match=f"report {given[0]}: it belongs to a ROBOT.urdf"):
+            report(cli._parser().parse_args(["report", "timing", *given]))
 
 
 def test_every_cold_scene_is_a_program_beyond_one_before_it():

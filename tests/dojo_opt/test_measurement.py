@@ -23,6 +23,12 @@ def test_measured_velocity_becomes_the_mean_one_of_a_model_step():
     assert fall.x[-1, 10] == pytest.approx(-9.81 * 0.0995, abs=1e-6)
     np.testing.assert_array_equal(now[:8], fall.x[-1, :8])
     assert Measurement(HOPPER, mean=False)._mean is False
+    for settings in ({"order": 4}, {"accuracy": 1e-3}):  # velocities at nodes, as they are measured
+        measured = Measurement(HOPPER.replace(**settings))
+        for t, state in zip(fall.time, fall.x, strict=True):
+            measured.add(float(t), state)
+        np.testing.assert_array_equal(measured.state(), fall.x[-1])
+        np.testing.assert_allclose(measured.of(HOPPER), now, atol=1e-12)
 
 
 def test_measured_velocity_is_left_alone_when_no_sample_is_a_model_step_old():

@@ -10,7 +10,7 @@ import dojo_opt as dojo
 from dojo_opt.__main__ import main
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.mpc.moving_reference import AnchoredReference
-from dojo_opt.mpc.servo import ModelServo
+from dojo_opt.mpc.servo import ModelServo, Servo
 from dojo_opt.planning.iterate import Iteration
 from dojo_opt.tasks.free_gait import Lead
 from dojo_opt.tasks.idto.allegro_ball import squeezing
@@ -298,6 +298,8 @@ def test_servos_follow_a_plan_that_does_not_know_them():
     wanted = 30.0 * (plan.state(0.02)[0] - 0.1) + 3.0 * (plan.state(0.045)[1] - 0.7)
     assert bare(0.02, x)[0] == pytest.approx(wanted, abs=1e-9)
     assert full(0.02, x)[0] == pytest.approx(wanted + plan.control(0.02)[0], abs=1e-9)
+    now = 30.0 * (plan.state(0.02)[0] - 0.1) + 3.0 * (plan.state(0.02)[1] - 0.7)  # of a model with velocities at nodes
+    assert Servo(sim.replace(order=4), (30.0, 3.0))(plan, 0.02, x)[0] == pytest.approx(now, abs=1e-9)
 
 
 def test_servos_of_the_model_are_the_forces_of_its_springs():

@@ -21,6 +21,11 @@ class MeanStates:
         self._kernels, self._sizes, self.h = kernels, kernels.sizes, kernels.settings.time_step
         self._nx, self._ndx = kernels.nx, kernels.ndx
 
+    @property
+    def mean_over(self) -> float:
+        """Interval before the node over which velocities are means [s]: the time step."""
+        return self.h
+
     def interval(self, x: Vector) -> float:
         """Interval over which the velocity of the state x is the mean [s]: the time step, unless steps are divided."""
         return self.h

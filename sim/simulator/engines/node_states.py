@@ -24,6 +24,11 @@ class NodeStates(MeanStates):
         super().__init__(kernels)
         self._model = kernels.model
 
+    @property
+    def mean_over(self) -> float:
+        """Zero: velocities are no means."""
+        return 0.0
+
     def start(self, q: Vector, v: Vector, h: float | None = None) -> tuple[int, Vector]:
         """The state is that of the node."""
         return int(Status.SOLVED), np.concatenate([q, v])
