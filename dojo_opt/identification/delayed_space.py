@@ -42,6 +42,9 @@ class DelayedSpace:
         self.values, self.low, self.high = (
             np.r_[old, new] for old, new in zip((space.values, space.low, space.high), own[1:], strict=True)
         )
+        last = np.full(int(self.fitted), time_step)
+        self.scale = np.r_[space.scale, last]
+        self.of_bodies = np.r_[space.of_bodies, last < 0.0]  # (n,) which values are coordinates of bodies
         self.past = int(np.ceil(ends[-1] / time_step)) + 1  # steps whose inputs act within a window
 
     @property

@@ -47,7 +47,9 @@ __all__ = ["Identified", "IdentifyOptions", "identify"]
 
 _DAMPING, _LEAST, _LARGEST = 1e-3, 1e-9, 1e8  # share of the diagonal
 _LEAST_NOISE = 1e-150  # whose inverse has a square
-_UNSEEN = 1e-8  # of the largest eigenvalue: combinations that the data do not determine
+_IDLE = 1e-20  # square of the largest effect of a parameter: those of parameters without any
+_UNSEEN = 1e-8  # of the largest eigenvalue, for parameters of the same effect: combinations without any
+_SHARE = 0.01  # of the effect of a parameter in a combination without any: that of one which has a part in it
 _NEARLY = 10.0  # tolerances: the decrease that a fit may still expect at its end, where no step brings one
 _WITHIN = 0.1  # standard deviations: the change of the parameters that it may still expect there
 _AWAY = 0.3  # times a value: standard deviation of the starts of further fits without a prior
@@ -76,7 +78,8 @@ class Identified:
         covariance: (n, n); infinite on the diagonal for parameters that the data do not determine.
         simulator: the simulator with the fitted values, and the kappa of the one that the fit began with.
         rms: root mean square of the errors over their noise: 1 if the given noise is right.
-        unseen: combinations, by label, that change no prediction and have no prior.
+        unseen: combinations, by label, that change no prediction and have no prior: changes of the values over
+            `ParameterSpace.scale`.
         outliers: share of states with reduced weight.
         cost: cost of the data and the prior, see the module.
         window_starts: (nx,) fitted first state of every window.
@@ -175,7 +178,7 @@ class Identified:
         lines = [f"{'parameter':32} {'value':>12} {'deviation':>12} {'before':>12}"]
         lines += [f"{name:32} {value:12.6g} {sd:12.3g} {old:12.6g}" for name, value, sd, old in self._rows()]
         for combination in self.unseen:
-            terms = " ".join(f"{v:+.2f} {k}" for k, v in combination.items())
+            terms = " ".join(f"{v:+.2g} {k}" for k, v in combination.items())
             lines.append(f"not determined by the data: {terms}")
         return "\n".join([*lines, self.closing_line()])
 
@@ -436,7 +439,8 @@ def _identified(
     found = fit.errors(fit.theta, fit.starts, kappa, slopes=True) or []
     usable = [w.solved for w in found]
     cost, weights, far = fit.weigh(found, usable)
-    H = NormalEquations(found, weights, fit.unit).reduced(0.0)[0]
+    equations = NormalEquations(found, weights, fit.unit)
+    H = equations.reduced(0.0)[0]
     message, missed = _MESSAGES[status], _MESSAGES[Status.NOT_EXPLAINED]
     if status == Status.SOLVED and far > _MISSED:
         status, message = Status.NOT_EXPLAINED, missed
@@ -445,16 +449,12 @@ def _identified(
     count = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
     free = count - n - sum(usable) * fit.base.ndx
     variance = max(cost / max(free, 1), 1e-30)
-    H = 0.5 * (H + H.T) / variance + np.diag(fit.prior.precision * fit.unit**2)
-    sizes, axes = np.linalg.eigh(H)
-    seen = sizes > _UNSEEN * max(sizes.max(initial=0.0), 1e-300)
-    covariance = (axes[:, seen] / sizes[seen]) @ axes[:, seen].T * np.outer(fit.unit, fit.unit)
-    blind = np.max(np.abs(axes[:, ~seen]), axis=1, initial=0.0) > 1e-3
-    covariance[blind, :] = covariance[:, blind] = np.nan
-    covariance[blind, blind] = np.inf
+    known = fit.prior.precision * fit.unit**2
+    covariance, shares, axes = _covariance(H / variance + np.diag(known), np.diag(equations.PP) / variance + known)
+    covariance = covariance * np.outer(fit.unit, fit.unit)
     unseen = [
-        {space.labels[i]: float(axis[i]) for i in np.argsort(-np.abs(axis)) if abs(axis[i]) > 0.05}
-        for axis in axes[:, ~seen].T
+        {space.labels[i]: float(axis[i]) for i in np.argsort(-np.abs(axis)) if abs(share[i]) > _SHARE}
+        for share, axis in zip(shares.T, axes.T, strict=True)
     ]
     return Identified(
         status == Status.SOLVED, status, message, space.labels, fit.theta, space.values, covariance,
@@ -462,3 +462,26 @@ def _identified(
         fit.rest(cost, found, usable), fit.starts, space.delayed(fit.windows, fit.theta), fit.predictor.noise, usable,
         history, kappa, time.process_time() - began,
     )  # fmt: skip
+
+
+def _covariance(H: Floats, effects: Floats) -> tuple[Floats, Floats, Floats]:
+    """Covariance H^-1 (n, n); of combinations without effect (n, k), the shares of the parameters and their changes.
+
+    H (n, n) the inverse of the covariance. effects (n,): squares of the effects of single parameters, where starts of
+    windows stay. Parameters are compared by them: values say little about the size of a parameter that may be zero.
+    """
+    H = 0.5 * (H + H.T)
+    alive = effects > _IDLE * effects.max(initial=0.0)
+    size = np.sqrt(np.where(alive, effects, 1.0))
+    sizes, axes = np.linalg.eigh((H / np.outer(size, size))[np.ix_(alive, alive)])
+    seen = sizes > _UNSEEN * sizes.max(initial=1e-300)
+    covariance, shares = np.zeros_like(H), np.zeros((len(H), int((~seen).sum())))
+    covariance[np.ix_(alive, alive)] = (axes[:, seen] / sizes[seen]) @ axes[:, seen].T
+    covariance /= np.outer(size, size)
+    shares[alive] = axes[:, ~seen]
+    shares = np.hstack([shares, np.eye(len(H))[:, ~alive]])
+    blind = np.max(np.abs(shares), axis=1, initial=0.0) > _SHARE
+    covariance[blind, :] = covariance[:, blind] = np.nan
+    covariance[blind, blind] = np.inf
+    changes = shares / size[:, None]
+    return covariance, shares, changes / np.linalg.norm(changes, axis=0)

@@ -44,6 +44,13 @@ def coordinates(call: str, mass: float, inertia: Floats) -> Floats:
     return out
 
 
+def scale(theta: Floats) -> Floats:
+    """(10,) sizes of changes: 1 for the logarithms, the largest radius of gyration for the lengths."""
+    out = np.ones(SIZE)
+    out[_OFF_DIAGONAL] = out[_CENTER] = np.exp(theta[_DIAGONAL].max())
+    return out
+
+
 def body_of(theta: Floats) -> tuple[Floats, Floats]:
     """Mass, centre (3) and inertia (6) in a row, (10,), and their derivative by the coordinates (10, 10)."""
     m = np.exp(2.0 * theta[0])

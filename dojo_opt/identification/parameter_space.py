@@ -12,13 +12,15 @@ from numpy.typing import ArrayLike
 from dojo_opt.identification import inertia_coordinates
 from sim.mechanism import checks
 from sim.simulator.simulator import Simulator
-from solvers.types import Floats
+from solvers.types import Flags, Floats
 
+_Row = tuple[float, float, float, float]  # value, low, high, scale
 Chart = Callable[[Floats], tuple[Floats, Floats]]  # coordinates -> values of parameters, and their derivative
 
 _VECTORS = ("orientation", "axis", "contact_normal")  # whose derivatives are those from where they have come to
 _NOT_NEGATIVE = ("spring", "damper", "armature", "contact_radius")
 _POSITIVE = ("mass", "time_step", "size_a", "size_b", "friction")  # a contact without friction is another law
+_SMALL = 1e-3  # least scale of a value
 _LEAST = 1e-6  # of the value: where positive parameters end
 
 
@@ -38,8 +40,9 @@ class ParameterSpace:
         def slopes(theta): ... space.chain(theta, space.simulator(theta).linearize(x, u, wrt=space.wrt)) ...
         scipy.optimize.least_squares(errors, space.values, slopes, bounds=(space.low, space.high))
 
-    The attributes `labels`, `values`, `low` and `high` (n,) belong to theta; `values` are those of `sim`, but for a
-    restitution of 0, which is 1e-6: without any, a contact has another law.
+    The attributes `labels`, `values`, `low`, `high` and `scale` (n,) belong to theta; `values` are those of `sim`, but
+    for a restitution of 0, which is 1e-6: without any, a contact has another law. `scale` has sizes of changes: the
+    values, at least 1e-3; of the coordinates of bodies, 1 for logarithms and a radius of gyration for lengths.
 
     Args:
         sim: the simulator.
@@ -67,10 +70,13 @@ class ParameterSpace:
         names, bodies = checks.names(f"{call}(names)", names), checks.names(f"{call}(bodies=...)", bodies)
         self._sim = sim
         self._groups: list[_ParameterGroup] = []
-        self._rows: dict[str, tuple[float, float, float]] = {}  # value, low, high
+        self._rows: dict[str, _Row] = {}
         found = sim.parameters(tuple(names))
         checks.distinct(f"{call}(names)", found.names)
-        for name, entries in groupby(zip(found.names, found.values, strict=True), key=lambda entry: _unit(entry[0])):
+        every = _of_several_sizes(found.names)
+        for name, entries in groupby(
+            zip(found.names, found.values, strict=True), key=lambda entry: _unit(entry[0], every)
+        ):
             self._add(f"{call}(names)", name, *map(list, zip(*entries, strict=True)))
         for body in bodies:
             self._add_body(f"{call}(bodies=...)", body)
@@ -83,7 +89,8 @@ class ParameterSpace:
             if clash:
                 raise ValueError(f"{call}(names, bodies=...): {common!r} covers all parts, {clash[0]!r} included")
         self.labels = tuple(self._rows)
-        self.values, self.low, self.high = (np.array(column) for column in zip(*self._rows.values(), strict=True))
+        columns = zip(*self._rows.values(), strict=True)
+        self.values, self.low, self.high, self.scale = (np.array(column) for column in columns)
         self._narrow(f"{call}(bounds=...)", bounds)
 
     def __repr__(self) -> str:
@@ -176,8 +183,18 @@ class ParameterSpace:
             first += len(block)
         return out
 
-    def _append(self, names: Sequence[str], chart: Chart, rows: Mapping[str, tuple[float, float, float]]) -> None:
-        """Coordinates (value, low, high) by their labels."""
+    @property
+    def of_bodies(self) -> Flags:
+        """(n,) which coordinates are those of bodies."""
+        out = np.zeros(len(self.labels), dtype=np.bool_)
+        for group in self._groups:
+            out[group.columns] = group.chart is inertia_coordinates.body_of
+        return out
+
+    def _append(
+        self, names: Sequence[str], chart: Chart, rows: Mapping[str, tuple[float, float, float, float]]
+    ) -> None:
+        """Coordinates by their labels."""
         first = len(self._rows)
         checks.distinct("ParameterSpace", (*self._rows, *rows))
         self._rows.update(rows)
@@ -195,7 +212,8 @@ class ParameterSpace:
         rows = {}
         for entry, value in zip(entries, values, strict=True):
             low, high = self._limits(entry, kind, value)
-            rows[entry] = (float(np.clip(value, low, high)), low, high)
+            inside = float(np.clip(value, low, high))
+            rows[entry] = (inside, low, high, max(abs(inside), _SMALL))
         self._append([name], chart, rows)
 
     def _limits(self, name: str, kind: str, value: float) -> tuple[float, float]:
@@ -215,7 +233,8 @@ class ParameterSpace:
             f"{call}: body {body!r}", float(values[0]), values[inertia_coordinates.INERTIA]
         )
         labels = [f"{body}.{label}" for label in inertia_coordinates.LABELS]
-        free = {label: (float(x), -np.inf, np.inf) for label, x in zip(labels, start, strict=True)}
+        scale = inertia_coordinates.scale(start)
+        free = {label: (float(x), -np.inf, np.inf, float(s)) for label, x, s in zip(labels, start, scale, strict=True)}
         self._append(names, inertia_coordinates.body_of, free)
 
     def _narrow(self, call: str, bounds: Any) -> None:
@@ -235,9 +254,16 @@ def _kind(name: str) -> str:
     return name.partition(":")[0].partition("[")[0]
 
 
-def _unit(name: str) -> str:
-    """The group of a coordinate: a whole vector, or a single parameter."""
-    return name.partition("[")[0] if name.startswith(_VECTORS) else name
+def _of_several_sizes(names: Sequence[str]) -> set[str]:
+    """The `kind:*` of parts with and without components: then one name is that of the latter, and of all together."""
+    common = {name for name in names if name.endswith(":*")}
+    return {name.partition("[")[0] for name in names if "[" in name} & common
+
+
+def _unit(name: str, every: set[str]) -> str:
+    """The group of a coordinate: a whole vector, all of a `kind:*` in `every`, or a single parameter."""
+    whole = name.partition("[")[0]
+    return whole if name.startswith(_VECTORS) or whole in every else name
 
 
 def _limits(kind: str, value: float) -> tuple[float, float]:

@@ -39,8 +39,8 @@ class ShootingFit:
         self.theta, self.base = space.values.copy(), space.simulator(space.values)
         self.prior_weight = 1.0  # of the prior
         self.starts = [w.x[0].copy() for w in windows]
-        # coordinates differ in size by orders of magnitude
-        self.unit = np.maximum(np.abs(space.values), 1e-3)
+        self.unit = space.scale  # coordinates differ in size by orders of magnitude
+        self.variance = 0.0  # of the errors over their noise
 
     def cut(self, windows: list[Window], length: int) -> None:
         """Replace the windows by pieces of these ones; starts stay where a window began there before."""
@@ -83,13 +83,16 @@ class ShootingFit:
     def rest(self, cost: float, found: list[WindowErrors], usable: list[bool]) -> float:
         """The cost of the data and the prior, whose share is chosen anew."""
         values = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
-        self.prior_weight = max(1.0, cost / max(values, 1))
+        self.variance = cost / max(values, 1)
+        self.prior_weight = max(1.0, self.variance)
         return cost + self.pull(self.theta)
 
     def step(self, equations: NormalEquations, damping: float) -> tuple[Floats, list[Floats], Expectation]:
         """New parameters, within their bounds, new starts, and the effect of both in the linear model."""
         H, g, back = equations.reduced(damping)
         H += self.prior_weight * np.diag(self.prior.precision * self.unit**2)
+        # bodies that noise alone would change by more than their size stay near: a body may not become flat
+        H += self.variance * np.diag(self.space.of_bodies)
         g += self.prior_weight * self.prior.precision * (self.theta - self.prior.mean) * self.unit
         low, high = (self.space.low - self.theta) / self.unit, (self.space.high - self.theta) / self.unit
         H = H + np.diag(damping * np.diag(H) + 1e-14 * max(np.trace(H), 1e-14))

@@ -44,6 +44,7 @@ _SEEN = 0.25  # share of its first variance that a friction has at most once a f
 _SLID = 2.0  # a foot that slides is off by so many heights of a contact that stands
 _KNOWN = 0.25  # share of its first deviation that a friction has when it is known
 _MOVED = 0.02  # share of the spread: models are built anew when the estimate has moved by it, and linearised until then
+_TRIED = 1e-3  # deviations before the first measurement: a change that models are tried with
 _NEAR = 3.0  # standard deviations of the height of a contact that stands
 _CLOSE = 1e-4  # [m] the same without noise
 _ROUND_OFF = 1e-6  # [m, rad, m/s, rad/s] least noise: contact is not exact to the last digit
@@ -102,7 +103,8 @@ class ParameterEstimator:
         friction: largest friction that plans assume.
 
     Raises:
-        ValueError: for an unknown parameter, or noise of the wrong shape.
+        ValueError: for an unknown parameter, one that does not change in place, such as a damper that is 0, or noise of
+            the wrong shape; a model of a higher order, or with an accuracy.
     """
 
     def __init__(
@@ -118,12 +120,22 @@ class ParameterEstimator:
         self._noise = np.maximum(noise, _ROUND_OFF) ** 2
         self._near = max(_CLOSE, _NEAR * float(noise[: nominal.nv].max()))
         self._prior = self._spread() ** 2
+        self._check_changes()
         self._used = UsedFriction(nominal.mechanism, self.space.labels)
         if settings.shear and not self._used.frictions.any():
             raise ValueError("Adaptation(shear=...): it shows frictions, and there are none among the parameters")
         self._fine: AdjustableSimulator | None = None  # with steps of the length of the samples
         self._written = self.space.values.copy()  # the values of the models
         self.forget()
+
+    def _check_changes(self) -> None:
+        """Refuse parameters that the models cannot change while the controller runs."""
+        space = self.space
+        other = np.clip(space.values + _TRIED * np.sqrt(self._prior), space.low, space.high)
+        try:
+            AdjustableSimulator.like(self._nominal).set_parameters(space.named(other))
+        except ValueError as error:
+            raise ValueError(f"MPC(adapt=...): {error}") from error
 
     def _spread(self) -> Vector:
         """(n,) standard deviations before the first measurement."""

@@ -90,7 +90,7 @@ def _residuals(found: Identified, residuals: list[NDArray[np.float64]]) -> list[
 def _unseen(found: Identified) -> list[Table]:
     if not found.unseen:
         return []
-    rows: list[list[Cell]] = [[" ".join(f"{v:+.2f} {k}" for k, v in each.items())] for each in found.unseen]
+    rows: list[list[Cell]] = [[" ".join(f"{v:+.2g} {k}" for k, v in each.items())] for each in found.unseen]
     return [Table("Combinations that the data do not determine", ("direction",), rows)]
 
 

@@ -213,6 +213,24 @@ def test_wrong_settings_are_refused_by_name(settings, words):
         dojo.tasks.free_gait_mpc(adapt=dojo.Adaptation(**given))
 
 
+@pytest.mark.parametrize(
+    ("settings", "spread", "words"),
+    [
+        ({}, {"damper:hinge": 0.1}, "no new damper"),
+        ({}, {"time_step": 0.1}, "time_step"),
+        ({"order": 4}, {"mass:link": 0.1}, "order 2"),
+        ({"accuracy": 1e-4}, {"mass:link": 0.1}, "accuracy"),
+    ],
+)
+def test_parameters_that_cannot_change_are_refused_at_once(settings, spread, words):
+    link = dojo.Body("link", 1.0, shape=dojo.Capsule(0.05, 0.4))
+    hinge = dojo.Joint("revolute", "world", "link", "hinge", child_point=(0.0, 0.0, 0.2), axis=(0.0, 1.0, 0.0))
+    sim = dojo.Simulator(dojo.Mechanism([link], [hinge]), time_step=0.05, **settings)
+    problem = dojo.Problem(sim, np.zeros(2), 3, cost=[dojo.cost.Effort(1.0)])
+    with pytest.raises(ValueError, match=rf"MPC\(adapt=...\).*{words}"):
+        dojo.MPC(problem, adapt=dojo.Adaptation(tuple(spread), spread=spread))
+
+
 def test_only_an_adaptation_adapts():
     with pytest.raises(TypeError, match="Adaptation"):
         dojo.tasks.free_gait_mpc(adapt=("mass:trunk",))

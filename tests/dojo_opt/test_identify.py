@@ -113,6 +113,29 @@ def test_unidentifiable_parameters_are_named():
     assert np.isinf(np.diag(found.covariance)).any() and "not determined" in found.summary()
 
 
+def test_parameters_that_begin_at_zero_are_determined_as_others():
+    """A value says little about the size of a parameter, whose deviation is the same from anywhere."""
+    truth = dojo.Simulator(dojo.models.pendulum(damper=0.3), time_step=0.05)
+    motions = _motions(truth, np.random.default_rng(0), np.full(2, 0.01))
+    names, found = ("gravity[1]", "gravity[2]"), []
+    for start in (0.0, 0.1):
+        found.append(dojo.identify(truth.with_parameters({"gravity[1]": start}), motions, names, noise=0.01))
+    assert all(f.success and not f.unseen for f in found)
+    np.testing.assert_allclose(found[0].deviation, found[1].deviation, rtol=1e-3)
+    assert np.all(np.abs(found[0].values - [0.0, -9.81]) < 4.0 * found[0].deviation)
+
+
+def test_bodies_stay_thick_where_the_data_do_not_determine_them():
+    """Noise alone made a flat body of the pendulum, of which no further fit could begin."""
+    truth = dojo.Simulator(dojo.models.pendulum(damper=0.3), time_step=0.05)
+    motions = _motions(truth, np.random.default_rng(1), np.full(2, 0.01))
+    found = dojo.identify(truth.with_parameters({"damper": 0.1}), motions, ("damper",), ("link_0",), noise=0.01)
+    sizes, before = (dojo.ParameterSpace(s, bodies=("link_0",)).values[1:4] for s in (found.simulator, truth))
+    assert found.success and np.abs(sizes - before).max() < 3.0
+    told = {label for combination in found.unseen for label in combination}
+    assert told == {label for label, sd in zip(found.labels, found.deviation, strict=True) if np.isinf(sd)}
+
+
 def test_a_prior_decides_where_the_data_do_not():
     """Without gravity, the mass of a link and the inertia of the motor on its hinge act as one."""
     rng, sd, floating = np.random.default_rng(3), np.array([0.01, 0.05]), {"gravity": (0.0, 0.0, 0.0)}

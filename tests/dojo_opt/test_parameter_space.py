@@ -118,6 +118,17 @@ def test_a_common_shift_is_bounded_by_the_least_parameter() -> None:
     np.testing.assert_allclose(space.simulator(space.low).parameters(("damper:*",)).values, 0.2)
 
 
+def test_the_common_damper_of_joints_of_several_sizes() -> None:
+    """Of the base, one for each degree of freedom, and one of all hinges."""
+    sim = dojo.Simulator(dojo.models.raiberthopper(), time_step=0.05)
+    space = dojo.ParameterSpace(sim, ("damper:*", "mass:foot"))
+    assert space.labels == (*(f"damper:*[{k}]" for k in range(6)), "damper:*", "mass:foot")
+    moved = space.values + 0.1
+    np.testing.assert_allclose(space.simulator(moved).parameters(space.wrt).values, moved)
+    with pytest.raises(ValueError, match=r"'damper:\*\[0\]' is used twice"):
+        dojo.ParameterSpace(sim, ("damper:*", "damper:*[0]"))
+
+
 def flight(sim: dojo.Simulator) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(5)
     x, us = sim.neutral(), rng.normal(size=(40, 6)) * (20, 20, 20, 1, 1, 1)
