@@ -24,6 +24,7 @@ from command import deliver, parser
 
 import dojo_opt as dojo
 from dojo_opt.learn.policy_rollout import PolicyRollout
+from dojo_opt.learn.randomization import RowMotion
 from dojo_opt.learn.registration import task_of
 from dojo_opt.learn.task import Task
 from dojo_opt.report.interleaved_rounds import interleave
@@ -38,8 +39,7 @@ STEPS = {
     "Walker2d": (0.004, 2, None),
 }
 PARTS = (
-    "simulation", "models", "observations and rewards", "actions", "gradient of the return", "critic",
-    "values", "all",
+    "simulation", "models", "observations and actions", "rewards", "gradient of the return", "critic", "values", "all",
 )  # fmt: skip
 
 
@@ -123,9 +123,9 @@ def epoch(name: str, epochs: int) -> list[Cell]:
     task, spent, marks = task_of(name), dict.fromkeys(PARTS, 0.0), []
     options = module.ShacOptions(**task.settings)
     calls = (
-        (dojo.Simulator, "step_batch", "simulation"), (dojo.Simulator, "with_parameters", "models"),
-        (Task, "observe", "observations and rewards"), (Task, "rewards", "observations and rewards"),
-        (PolicyRollout, "act", "actions"), (PolicyRollout, "gradient", "gradient of the return"),
+        (RowMotion, "step", "simulation"), (dojo.Simulator, "with_parameters", "models"),
+        (PolicyRollout, "act", "observations and actions"), (PolicyRollout, "judge", "rewards"),
+        (PolicyRollout, "gradient", "gradient of the return"),
         (module.ShacTraining, "fit_critic", "critic"), (module.ShacTraining, "values", "values"),
     )  # fmt: skip
 
@@ -139,7 +139,6 @@ def epoch(name: str, epochs: int) -> list[Cell]:
     (began, before), (ended, after) = marks[epochs // 2 - 1], marks[-1]
     count = epochs - epochs // 2
     parts = {part: 1e3 * (after[part] - before[part]) / count for part in PARTS}
-    parts["simulation"] -= parts["models"]  # which it makes as they are drawn
     parts["all"] = 1e3 * (ended - began) / count
     return [name, options.environments, options.horizon, *(parts[part] for part in PARTS)]
 

@@ -4,8 +4,8 @@
 
 Needs an idle machine with two cores, for a minute or two. Both numbers of threads take turns, round by round, and the
 least time of each counts. A batch is that of benchmarks/learning_costs.py, with the cutoff with which the task is
-learnt; an epoch has the settings of the task. Simulation and networks are spread over the threads; observations,
-rewards, new starts and the sums of an epoch stay on one.
+learnt; an epoch has the settings of the task. All that rows do is spread over the threads; the calls from Python, new
+starts, random numbers and the sums of an epoch stay on one.
 
 Work is the least processor time of all threads: on two threads it is that on one, and a little more for threads that
 wait. The machine is not idle where the ratio of the work is large, or where the time on one thread exceeds its work.

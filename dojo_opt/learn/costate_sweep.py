@@ -14,12 +14,12 @@ from dojo_opt.learn.network_rows import BLOCK, PART, WIDTH, Packed, backward
 from solvers.compiler import kernel, parallel_kernel, prange
 from solvers.types import Cube, Flags, Integers, Matrix, Vector
 
-__all__ = ["STEEP", "Sweep", "SweepLimits", "sweep_rows"]
+__all__ = ["STEEP", "CostateSweep", "SweepLimits", "sweep_rows"]
 
 STEEP = 1.5  # outputs that are squashed to actions beyond 0.9
 
 
-class Sweep(NamedTuple):
+class CostateSweep(NamedTuple):
     """A rollout with its derivatives, and the buffers of the sweep."""
 
     weights: Vector  # (T n,) of the rewards
@@ -55,7 +55,7 @@ class SweepLimits(NamedTuple):
 
 
 @kernel
-def _through_step(s: Sweep, k: int, i: int) -> None:
+def _through_step(s: CostateSweep, k: int, i: int) -> None:
     """The costate of row i before its step k, from that after it; what the action contributes goes to the step in which
     it was decided.
     """
@@ -80,7 +80,7 @@ def _through_step(s: Sweep, k: int, i: int) -> None:
 
 
 @kernel
-def _by_outputs(s: Sweep, limits: SweepLimits, first: int, k: int, i: int) -> None:
+def _by_outputs(s: CostateSweep, limits: SweepLimits, first: int, k: int, i: int) -> None:
     """Derivatives of row i by the outputs of the network in its step k, which `slopes` has from column `first` on."""
     for j in range(s.actions.shape[1]):
         a, y = s.actions[k, j], s.outputs[k, j]
@@ -90,7 +90,7 @@ def _by_outputs(s: Sweep, limits: SweepLimits, first: int, k: int, i: int) -> No
 
 
 @kernel
-def _through_observation(s: Sweep, limit: float, k: int, i: int, p: int) -> None:
+def _through_observation(s: CostateSweep, limit: float, k: int, i: int, p: int) -> None:
     """Add what the observation contributes to the costate of row i before its step k, and limit its length."""
     costate, rates, square = s.costates[i], s.rates[k], 0.0
     for c in range(rates.shape[0]):
@@ -109,7 +109,7 @@ def _through_observation(s: Sweep, limit: float, k: int, i: int, p: int) -> None
 
 
 @kernel
-def _sweep_part(net: Packed, s: Sweep, limits: SweepLimits, p: int) -> None:
+def _sweep_part(net: Packed, s: CostateSweep, limits: SweepLimits, p: int) -> None:
     """The sweep of the rows of part p."""
     n, steps = s.costates.shape[0], s.layers.shape[0]
     first, last = p * PART, min(p * PART + PART, n)
@@ -125,7 +125,7 @@ def _sweep_part(net: Packed, s: Sweep, limits: SweepLimits, p: int) -> None:
 
 
 @parallel_kernel
-def sweep_rows(net: Packed, s: Sweep, limits: SweepLimits) -> None:
+def sweep_rows(net: Packed, s: CostateSweep, limits: SweepLimits) -> None:
     """The sweep of all rows."""
     for p in prange(s.sums.shape[0]):
         _sweep_part(net, s, limits, p)

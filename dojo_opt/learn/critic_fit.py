@@ -42,7 +42,7 @@ class Samples(NamedTuple):
     ends: Integers  # (minibatches,) where they end in there
 
 
-class Buffers(NamedTuple):
+class FitBuffers(NamedTuple):
     """Numbers on the way, and the moments of Adam."""
 
     moments: Matrix  # (2, packed weights) means and squares
@@ -63,7 +63,7 @@ class Rates(NamedTuple):
 
 
 @kernel
-def _fit_part(net: Packed, samples: Samples, buffers: Buffers, span: tuple[int, int], p: int) -> None:
+def _fit_part(net: Packed, samples: Samples, buffers: FitBuffers, span: tuple[int, int], p: int) -> None:
     """Gradient of the mean square error of a minibatch, samples span[0] up to span[1] of the order, by part p of it."""
     count, width = span[1] - span[0], net.shape[0, SIZE]
     first, last = p * PART, min(p * PART + PART, count)
@@ -82,7 +82,7 @@ def _fit_part(net: Packed, samples: Samples, buffers: Buffers, span: tuple[int, 
 
 
 @kernel
-def _add_parts(buffers: Buffers, count: int, k: int) -> None:
+def _add_parts(buffers: FitBuffers, count: int, k: int) -> None:
     """Gradient by row k of the weights, the sum over parts, and its square."""
     sums, first, square = buffers.sums, buffers.rows[k, FIRST], spread(0.0)
     for c in range(first, first + buffers.rows[k, WIDTH], LANES):
@@ -95,7 +95,7 @@ def _add_parts(buffers: Buffers, count: int, k: int) -> None:
 
 
 @kernel
-def _move(net: Packed, buffers: Buffers, rates: Rates, scale: float, steps: float, k: int) -> None:
+def _move(net: Packed, buffers: FitBuffers, rates: Rates, scale: float, steps: float, k: int) -> None:
     """Adam's step of row k of the weights, along the gradient times `scale`."""
     m, first = buffers.moments, buffers.rows[k, FIRST]
     rate, grown = rates.rate / (1.0 - rates.first**steps), 1.0 / (1.0 - rates.second**steps)
@@ -114,7 +114,7 @@ def _move(net: Packed, buffers: Buffers, rates: Rates, scale: float, steps: floa
 
 
 @parallel_kernel
-def fit_batches(net: Packed, samples: Samples, buffers: Buffers, rates: Rates, steps: float) -> float:
+def fit_batches(net: Packed, samples: Samples, buffers: FitBuffers, rates: Rates, steps: float) -> float:
     """A step on every minibatch; the number of steps so far, `steps` of which were before.
 
     Gradients that are not finite are left out, as minibatches without samples are.
@@ -164,7 +164,7 @@ def fit_network(
     moments = np.zeros((2, network.sums(1).shape[1]))
     moments[:, network.places] = adam.moments[:2]
     rows, sums = network.weight_rows, network.sums(max(parts(most), 1))
-    buffers = Buffers(moments, rows, sums, network.rows(most), network.rows(most), np.zeros(len(rows)))
+    buffers = FitBuffers(moments, rows, sums, network.rows(most), network.rows(most), np.zeros(len(rows)))
     order, ends = np.concatenate(batches), np.cumsum([len(batch) for batch in batches])
     net, rates = network.packed(weights), Rates(rate, norm, *adam.betas)
     steps = fit_batches(net, Samples(*samples, order, ends), buffers, rates, adam.moments[2, 0])

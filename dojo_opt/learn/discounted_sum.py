@@ -26,11 +26,7 @@ class DiscountedSum:
     """
 
     def __init__(self, roll: PolicyRollout, after: Floats, gamma: float) -> None:
-        steps, rows = after.shape
         self.roll, self.after, self.gamma = roll, after, gamma
-        ends = roll.terminated.ravel()
-        survival, slopes = roll.task.survives(roll.after.reshape(steps * rows, -1), ends, slopes=True)
-        self.survival, self.slopes = survival.reshape(steps, rows), slopes.reshape(steps, rows, -1)
         self.last = roll.cut.copy()
         self.last[-1] = True
         self.follows = self._follows()
@@ -45,7 +41,7 @@ class DiscountedSum:
 
     def _sums(self, t: int, follows: Floats) -> Floats:
         """(n,) J_t."""
-        out: Floats = self.roll.rewards[t] + self.gamma * self.survival[t] * follows
+        out: Floats = self.roll.rewards[t] + self.gamma * self.roll.survival[t] * follows
         return out
 
     def first(self) -> Floats:
@@ -61,15 +57,15 @@ class DiscountedSum:
         Returns:
             (T, n) weights of the rewards, and (T, n, ndx) further derivatives by the states after the steps.
         """
-        weights, ends = np.zeros_like(self.after), np.zeros_like(by_value)
+        roll, last, weights = self.roll, self.last, np.zeros_like(self.after)
         discount = np.ones(self.after.shape[1])
-        for t, unsolved in enumerate(self.roll.unsolved):
-            weights[t], ahead = discount, self.gamma * discount
-            ends[t] = (ahead * self.follows[t])[:, None] * self.slopes[t]
-            last = self.last[t]
-            ends[t, last] += (ahead * self.survival[t])[last, None] * by_value[t, last]
-            ends[t, unsolved] = 0.0
-            discount = np.where(self.roll.cut[t], 1.0, ahead * self.survival[t])
+        for t, survival in enumerate(roll.survival):
+            weights[t] = discount
+            discount = np.where(roll.cut[t], 1.0, self.gamma * discount * survival)
+        ahead = self.gamma * weights
+        ends = (ahead * self.follows)[:, :, None] * roll.by_survival
+        ends[last] += (ahead * roll.survival)[last][:, None] * by_value[last]
+        ends[roll.unsolved] = 0.0
         return weights, ends
 
     def traced(self, trace: float) -> Floats:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from dojo_opt.learn.contact_observation import contact_fields, model_path
+from dojo_opt.learn.first_states import first_states
 from dojo_opt.learn.limit_cost import with_limit_cost
 from dojo_opt.learn.randomization import Randomization
 from dojo_opt.learn.survival import within
@@ -26,9 +27,7 @@ from sim.mechanism.body import Body
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.model.state_columns import BodyState
 from sim.simulator.simulator import Simulator
-from solvers.types import Floats
 
 Fields = dict[str, Any]
 
@@ -46,7 +45,6 @@ __all__ = [
     "walker2d",
 ]
 
-_CLEARANCE = 1e-3  # [m] of lifted first states
 _KAPPA = 1e-4  # [N s m]
 _CUTOFF = 0.3  # of learning: derivatives differ by half a percent in the median, by 6 % at most
 _FASTEST = 10.0  # [m/s, rad/s] observed velocity of hopper and walker
@@ -113,64 +111,6 @@ def _model(file: str) -> MjcfMechanism:
             f"{file}: expected {_COORDINATES[file]} coordinates, got {mech.nq}; this Gymnasium is unknown"
         )
     return mech
-
-
-def least_gap(mech: Mechanism) -> Callable[[Floats], float]:
-    """Distance of the lowest contact from level ground, as all contacts of these models have it, quickly.
-
-    Args:
-        mech: the mechanism.
-
-    Returns:
-        Function of the coordinates q (nq,) that returns the distance [m]; infinite without contacts.
-    """
-    if not mech.contacts:
-        return lambda q: np.inf
-    sim, still = Simulator(mech), np.zeros(mech.nv)
-    names = {name: i for i, name in enumerate(mech.body_names)}
-    bodies = np.array([names[c.body] for c in mech.contacts])
-    px, py, pz = np.array([c.point for c in mech.contacts], dtype=np.float64).T
-    offsets = np.array([c.radius + c.height for c in mech.contacts])
-    if not np.all(mech.contact_normals == (0.0, 0.0, 1.0)) or any(c.terrain is not None for c in mech.contacts):
-        raise ValueError("least_gap: expected contacts with level ground")
-
-    def least(q: Floats) -> float:
-        z = sim.maximal(np.concatenate([q, still]))[bodies]
-        w, x, y, s = z[:, BodyState.QUATERNION].T
-        heights = (
-            z[:, BodyState.POSITION][:, 2]
-            + 2.0 * (x * s - w * y) * px
-            + 2.0 * (y * s + w * x) * py
-            + (1.0 - 2.0 * (x * x + y * y)) * pz
-        )
-        return float((heights - offsets).min())
-
-    return least
-
-
-def _starts(
-    mech: Mechanism, height: int, position: float, velocity: Callable[..., Floats], home: Floats | None = None
-) -> Callable[..., Floats]:
-    """First states: uniform noise of the coordinates, within the limits of joints, and the given one of the velocities
-    (generator, nv).
-    """
-    home, quaternions = np.array(mech.neutral if home is None else home, dtype=np.float64), []
-    for joint in mech.joints:
-        if joint.nrot == 3:
-            stop = mech.q_slice(joint.name).stop
-            quaternions.append(slice(stop - 4, stop))
-    (low, high), lowest = mech.coordinate_limits, least_gap(mech)
-
-    def start(rng: np.random.Generator) -> Floats:
-        q = home + rng.uniform(-position, position, len(home))
-        q = np.clip(np.where(q > high, 2.0 * high - q, np.where(q < low, 2.0 * low - q, q)), low, high)
-        for part in quaternions:
-            q[part] /= np.linalg.norm(q[part])
-        v = velocity(rng, mech.nv)
-        q[height] += max(_CLEARANCE - lowest(q), 0.0) if height >= 0 else 0.0
-        return np.concatenate([q, v])
-
-    return start
 
 
 def _tailed(skipped: int, file: str, fastest: float) -> Callable[..., Any]:
@@ -324,7 +264,7 @@ def half_cheetah() -> Task:
     """
     mech = _model("half_cheetah.xml")
     return _task(
-        mech, 5, 0.01, observations=17, start=_starts(mech, 1, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)),
+        mech, 5, 0.01, observations=17, start=first_states(mech, 1, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)),
         name="HalfCheetah", settings=_CHEETAH, **_functions_of_half_cheetah(),
     )  # fmt: skip
 
@@ -336,7 +276,7 @@ def _legged(name: str, file: str, observations: int, limit_cost: float = 0.0) ->
     functions["reward"] = with_limit_cost(f"dojo.learn.{name.lower()}", functions["reward"], limits, limit_cost)
     return _task(
         mech, 4, 0.002, observations=observations,
-        start=_starts(mech, 1, 5e-3, lambda rng, n: rng.uniform(-5e-3, 5e-3, n)), survival=1.0, name=name,
+        start=first_states(mech, 1, 5e-3, lambda rng, n: rng.uniform(-5e-3, 5e-3, n)), survival=1.0, name=name,
         settings=_LEGGED, **functions,
     )  # fmt: skip
 
@@ -384,7 +324,7 @@ def ant(include_cfrc_ext_in_observation: bool = False, contact_cost_weight: floa
         contact_cost_weight, 1.0, np.inf,
     )  # fmt: skip
     return _task(
-        mech, 5, 0.01, start=_starts(mech, 2, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)), survival=1.0,
+        mech, 5, 0.01, start=first_states(mech, 2, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)), survival=1.0,
         name="Ant", settings=_ANT, **{**functions, **fields},
     )  # fmt: skip
 
@@ -414,7 +354,7 @@ def humanoid(include_cfrc_ext_in_observation: bool = False, contact_cost_weight:
         contact_cost_weight, np.inf, 10.0,
     )  # fmt: skip
     return _task(
-        mech, 3, 0.005, start=_starts(mech, 2, 0.01, lambda rng, n: rng.uniform(-0.01, 0.01, n), home),
+        mech, 3, 0.005, start=first_states(mech, 2, 0.01, lambda rng, n: rng.uniform(-0.01, 0.01, n), home),
         survival=5.0, name="Humanoid", **{**functions, **fields},
     )  # fmt: skip
 
@@ -427,7 +367,7 @@ def cartpole() -> Task:
     """
     mech = _model("inverted_pendulum.xml")
     return _task(
-        mech, 2, 0.02, observations=4, start=_starts(mech, -1, 0.01, lambda rng, n: rng.uniform(-0.01, 0.01, n)),
+        mech, 2, 0.02, observations=4, start=first_states(mech, -1, 0.01, lambda rng, n: rng.uniform(-0.01, 0.01, n)),
         survival=1.0, name="Cartpole", **_functions_of_cartpole(),
     )  # fmt: skip
 

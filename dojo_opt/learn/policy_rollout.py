@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from dojo_opt.learn.action_delay import ActionDelay
-from dojo_opt.learn.costate_sweep import Sweep, SweepLimits, sweep_rows
+from dojo_opt.learn.costate_sweep import CostateSweep, SweepLimits, sweep_rows
 from dojo_opt.learn.network import Network
-from dojo_opt.learn.network_rows import forward_rows, parts
+from dojo_opt.learn.network_rows import BLOCK, parts
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.randomization import Drawn, Randomization, draw_pushes
+from dojo_opt.learn.rollout_rows import Acting, Judging, act_rows, judge_rows
 from dojo_opt.learn.task import Task
 from sim.mechanism.short_repr import short_repr
 from solvers.status import Status
@@ -21,7 +23,7 @@ from solvers.types import Flags, Floats
 
 __all__ = ["Noise", "PolicyGradient", "PolicyRollout", "roll_policy_batch"]
 
-_SPAN = 10.0  # as in policy.py
+_SOLVED = int(Status.SOLVED)  # NumPy is slower with members of an enum
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,11 @@ class PolicyRollout:
     actions      (T, n, nu) as decided; rewards (T, n)
     applied      (T, n, nu) actions of the step, and decided_in (T, n) the steps in which they were decided, -1 before
     terminated   (T, n) the episode has ended there; unsolved (T, n) the step was not solved, and has no reward
+    survival     (T, n) probability that the episode goes on after the step
     cut          (T, n) the next step starts from another state: of both, and of episodes that were cut off
+
+    Derivatives, without rows unless they are kept: A (T, n, ndx, ndx), B (T, n, ndx, nu), by_reward (T, n, 2 ndx + nu),
+    by_survival (T, n, ndx), and those of the observations, rates (T, n, no, ndx).
 
     Args:
         policy: a policy with a task.
@@ -109,33 +115,63 @@ class PolicyRollout:
         self.applied, self.decided_in = np.zeros((steps, rows, sim.nu)), np.zeros((steps, rows), dtype=np.int64)
         self.terminated, self.unsolved, self.cut = (np.zeros((steps, rows), dtype=np.bool_) for _ in range(3))
         self.slopes, self._packed = slopes, policy.network.packed(policy.weights)
-        kept, no, ndx, nu = steps if slopes else 0, self.task.observations, sim.ndx, sim.nu
-        self.rates, self.by_reward = np.zeros((kept, rows, no, ndx)), np.zeros((kept, rows, 2 * ndx + nu))
-        self.A, self.B = np.zeros((kept, rows, ndx, ndx)), np.zeros((kept, rows, ndx, nu))
-        self._inside = np.zeros((kept, rows, no), dtype=np.bool_)
-        self._layers = np.zeros((kept, *policy.network.rows(rows).shape))
+        kept, no, ndx, nu = rows if slopes else 0, self.task.observations, sim.ndx, sim.nu
+        self.survival, self.by_survival = np.zeros((steps, rows)), np.zeros((steps, kept, ndx))
+        self.rates, self.by_reward = np.zeros((steps, kept, no, ndx)), np.zeros((steps, kept, 2 * ndx + nu))
+        self.A, self.B = np.zeros((steps, kept, ndx, ndx)), np.zeros((steps, kept, ndx, nu))
+        self._inside = np.zeros((steps, kept, no), dtype=np.bool_)
+        self._layers = np.zeros((steps if slopes else 1, *policy.network.rows(rows).shape))
+        blocks = -(-rows // BLOCK)
+        self._work, self._failed = self.task.room(blocks), np.zeros(blocks, dtype=np.int64)
 
-    def act(self, t: int, noise: Noise | None) -> None:
+    def acting(self, noise: Noise | None) -> Acting:
+        """What `act` needs in every step.
+
+        Args:
+            noise: of the rollout, or None.
+
+        Returns:
+            Arrays of this rollout.
+        """
+        policy, (steps, _, no), nu = self.policy, self.observations.shape, self.actions.shape[2]
+        without = np.zeros((steps, 0, no)), np.zeros((steps, 0, nu))
+        seen, explored = without if noise is None else (noise.observations, noise.actions)
+        return Acting(
+            self.task.addresses[0], self.task.layout, self.x, seen, explored, policy.mean, policy.deviation,
+            self.observations, self.rates, self._inside, self._layers, self.outputs, self.actions, self._work,
+            self._failed,
+        )  # fmt: skip
+
+    @cached_property
+    def _judging(self) -> Judging:
+        """What `judge` needs in every step."""
+        _, reward, end, survival = self.task.addresses
+        return Judging(
+            reward, end, survival, self.task.layout, self.x, self.applied, self.after, self.rewards, self.by_reward,
+            self.terminated, self.survival, self.by_survival, self._work, self._failed,
+        )  # fmt: skip
+
+    def act(self, t: int, acting: Acting) -> None:
         """Choose the actions (n, nu) of step t.
 
         Args:
             t: number of the step.
-            noise: of the rollout, or None.
+            acting: of the rollout.
         """
-        policy, network = self.policy, self.policy.network
-        self.observations[t], rates = self.task.observe(self.x[t], self.slopes)
-        scaled = (self.observations[t] - policy.mean) / policy.deviation
-        if noise is not None:
-            scaled = scaled + noise.observations[t]
-        layers = self._layers[t] if self.slopes else network.rows(len(scaled))
-        layers[: len(scaled), : scaled.shape[1]] = np.clip(scaled, -_SPAN, _SPAN)
-        forward_rows(self._packed, layers)
-        y = network.outputs(layers, len(scaled))
-        if noise is not None:
-            y = y + noise.actions[t]
-        self.outputs[t], self.actions[t] = y, policy.squashed(y)
-        if self.slopes:
-            self.rates[t], self._inside[t] = rates, np.abs(scaled) < _SPAN
+        act_rows(self._packed, acting, self.policy.linear, t)
+        if self._failed.any():
+            self.task.observe(self.x[t], self.slopes)  # which raises the error
+
+    def judge(self, t: int) -> None:
+        """The rewards of step t, without those of survival, and where episodes end.
+
+        Args:
+            t: number of the step.
+        """
+        judge_rows(self._judging, t)
+        if self._failed.any():  # one of these raises the error
+            self.task.rewards(self.x[t], self.applied[t], self.after[t], self.slopes)
+            self.task.survives(self.after[t], self.task.ends(self.after[t]), self.slopes)
 
     def gradient(
         self, weights: Floats, ends: Floats | None = None, limit: float = np.inf, saturation: float = 0.0
@@ -162,7 +198,7 @@ class PolicyRollout:
         def cubes(array: Any) -> Any:
             return array.reshape(steps * rows, *array.shape[2:])
 
-        sweep = Sweep(
+        sweep = CostateSweep(
             np.ascontiguousarray(weights).ravel(),
             np.zeros((0, ndx)) if ends is None else np.ascontiguousarray(ends).reshape(flat),
             self.cut.ravel(), self.unsolved.ravel(), self.decided_in.ravel(),
@@ -187,7 +223,7 @@ def roll_policy_batch(
     slopes: bool = False,
     kappa_grad: float | None = None,
     delays: ActionDelay | None = None,
-    restart: Callable[[int, Flags, Flags, Floats], Flags] | None = None,
+    restart: Callable[[PolicyRollout, int], Flags] | None = None,
 ) -> PolicyRollout:
     """Rows under a policy, each from its own state, on all cores.
 
@@ -200,8 +236,8 @@ def roll_policy_batch(
         slopes: whether `gradient` will be called.
         kappa_grad: smoothing of the derivatives [N s m]; that of the motion by default.
         delays: the last actions of the rows, for the delay of `drawn`; none by default, as where episodes begin.
-        restart: function of (step, terminated (n,), unsolved (n,), states (n, nx)) that replaces the states of rows
-            that start anew, and returns which these are (n,); by default rows go on, unsolved ones stand still.
+        restart: function of the rollout and the number t of a step that replaces the states x[t + 1] of rows that start
+            anew, and returns which these are (n,); by default rows go on, unsolved ones stand still.
 
     Returns:
         The rollout.
@@ -218,31 +254,29 @@ def roll_policy_batch(
     lags.begin()
     out.x[0] = starts
     one_pass = slopes and kappa_grad is None
-    impulses = model.sim.row_impulses(len(starts))
+    acting, motion = out.acting(noise), model.motion(model.sim.row_impulses(len(starts)))
     for t in range(steps):
-        out.act(t, noise)
+        out.act(t, acting)
         out.applied[t], out.decided_in[t] = lags.apply(t, out.actions[t], model.delay)
-        x, inputs = out.x[t], task.inputs(out.applied[t])
-        found = model.step(x, inputs, one_pass, impulses=impulses)
-        A, B, unsolved = found.A, found.B, found.status != Status.SOLVED
+        x, inputs, room = out.x[t], task.inputs(out.applied[t]), (out.A[t], out.B[t])
+        out.after[t], status = motion.step(x, inputs, room if one_pass else None)
+        unsolved = status != _SOLVED
         if slopes and not one_pass:
             smooth = model.step(x, inputs, True, kappa_grad)
-            A, B, unsolved = smooth.A, smooth.B, unsolved | (smooth.status != Status.SOLVED)
-        out.after[t] = out.x[t + 1] = found.x
-        out.rewards[t], by_reward = task.rewards(x, out.applied[t], found.x, slopes)
-        out.terminated[t], out.unsolved[t] = task.ends(found.x), unsolved
-        out.rewards[t] += task.survival * ~out.terminated[t]
-        out.rewards[t, unsolved] = 0.0
-        if slopes:
-            out.A[t], out.B[t], out.by_reward[t] = A, B, by_reward
+            out.A[t], out.B[t], unsolved = smooth.A, smooth.B, unsolved | (smooth.status != Status.SOLVED)
+        out.x[t + 1], out.unsolved[t], out.cut[t] = out.after[t], unsolved, unsolved
+        out.judge(t)
+        if task.survival != 0.0:
+            out.rewards[t] += task.survival * ~out.terminated[t]
+        if unsolved.any():
+            out.rewards[t, unsolved] = 0.0
         if noise is not None and noise.pushes is not None:
             out.x[t + 1, :, task.sim.nq : task.sim.nx] += noise.pushes[t]
-        out.cut[t] = unsolved
         if restart is not None:
-            out.cut[t] |= restart(t, out.terminated[t], unsolved, out.x[t + 1])
+            out.cut[t] |= restart(out, t)
         if out.cut[t].any():
             lags.forget(out.cut[t])
-            impulses.forget(out.cut[t])
+            motion.impulses.forget(out.cut[t])
     return out
 
 

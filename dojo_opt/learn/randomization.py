@@ -17,7 +17,7 @@ from sim.simulator.contact_groups import ContactGroups
 from sim.simulator.row_impulses import RowImpulses
 from sim.simulator.simulator import Simulator
 from sim.simulator.step_batch import StepBatch
-from solvers.types import Floats
+from solvers.types import Floats, Integers
 
 __all__ = ["Models", "Randomization", "check_pushes", "draw_pushes"]
 
@@ -182,6 +182,10 @@ class Drawn:
             x[:, -6 * self.touch.count :] = self.touch.wrenches(felt.x, felt.contacts).reshape(len(x), -1)
         return replace(found, x=x)
 
+    def motion(self, impulses: RowImpulses) -> RowMotion:
+        """The rows of these impulses, for many actions."""
+        return RowMotion(self, impulses)
+
     def rows(self, chosen: NDArray[np.int64]) -> Drawn:
         """Models of some rows."""
         kappa = None if self.kappa is None else self.kappa[chosen]
@@ -192,3 +196,34 @@ class Drawn:
     def of(cls, task: Task) -> Drawn:
         """The model of the task, for all rows."""
         return cls(task.sim, task.substeps, None, {}, touch=task.touch_groups)
+
+
+class RowMotion:
+    """Rows of a batch that act again and again.
+
+    Args:
+        drawn: models of the rows.
+        impulses: of the rows, of their simulator.
+    """
+
+    def __init__(self, drawn: Drawn, impulses: RowImpulses) -> None:
+        self._drawn, self.impulses = drawn, impulses
+        plain = drawn.touch is None
+        self._stepper = impulses.stepper(drawn.substeps, drawn.kappa, drawn.parameters) if plain else None
+
+    def step(self, xs: Floats, inputs: Floats, room: tuple[Floats, Floats] | None) -> tuple[Floats, Integers]:
+        """(states (n, nx) after an action of every row, Status (n,) of each).
+
+        Args:
+            xs: (n, nx) states of the task.
+            inputs: (n, nu) [N, N m].
+            room: for derivatives, A (n, ndx, ndx) and B (n, ndx, nu), or None.
+        """
+        nx = self._drawn.sim.nx
+        if self._stepper is None:
+            found = self._drawn.step(xs, inputs, room is not None, impulses=self.impulses)
+            if room is not None:
+                room[0][:], room[1][:] = found.A, found.B
+            return found.x, found.status
+        found = self._stepper.step(xs[:, :nx], inputs, room)
+        return found.x if xs.shape[1] == nx else np.concatenate([found.x, xs[:, nx:]], axis=1), found.status

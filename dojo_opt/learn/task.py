@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.rollout_rows import END, OBSERVATION, REWARD, SURVIVAL
 from dojo_opt.learn.task_functions import check_number, check_observation, compiled_call
 from dojo_opt.planning.manifold import displace, tangent_layout
 from dojo_opt.planning.residual import jit
@@ -46,10 +47,12 @@ def never(x: Floats) -> bool:
 
 def _observation_loop(observation: Callable[..., Any]) -> Any:
     @users_loop
-    def evaluate(layout, xs, work, values, slopes):  # type: ignore[no-untyped-def]
-        """values[i] = o(x_i), and slopes[i] = do/dx by central differences on the manifold, if it has rows."""
+    def evaluate(part, layout, xs, work, values, slopes):  # type: ignore[no-untyped-def]
+        """For rows part[0] up to part[1]: values[i] = o(x_i), and slopes[i] = do/dx by central differences on the
+        manifold, if it has rows.
+        """
         n, nx, d = layout.shape[0], xs.shape[1], values.shape[1]
-        for row in range(xs.shape[0]):
+        for row in range(part[0], part[1]):
             for k in range(nx):
                 work[0, k] = xs[row, k]
             observation(work[0, :nx], values[row])
@@ -68,10 +71,12 @@ def _observation_loop(observation: Callable[..., Any]) -> Any:
 
 def _reward_loop(reward: Callable[..., Any]) -> Any:
     @users_loop
-    def evaluate(layout, xs, acts, nexts, work, values, slopes):  # type: ignore[no-untyped-def]
-        """values[i] = r(x, a, x'), and slopes[i] = dr/d(dx, a, dx') by central differences, if it has rows."""
+    def evaluate(part, layout, xs, acts, nexts, work, values, slopes):  # type: ignore[no-untyped-def]
+        """Of a part, values[i] = r(x, a, x'), and slopes[i] = dr/d(dx, a, dx') by central differences, if it has
+        rows.
+        """
         n, nx, m = layout.shape[0], xs.shape[1], acts.shape[1]
-        for row in range(xs.shape[0]):
+        for row in range(part[0], part[1]):
             for k in range(nx):
                 work[0, k], work[2, k] = xs[row, k], nexts[row, k]
             for k in range(m):
@@ -110,10 +115,12 @@ def _itself(function: Any) -> Any:
 
 def _survival_loop(probability: Callable[..., Any]) -> Any:
     @users_loop
-    def evaluate(layout, xs, work, values, slopes):  # type: ignore[no-untyped-def]
-        """values[i] = s(x_i), and slopes[i] = ds/dx by central differences on the manifold, if it has rows."""
+    def evaluate(part, layout, xs, work, values, slopes):  # type: ignore[no-untyped-def]
+        """Of a part, values[i] = s(x_i), and slopes[i] = ds/dx by central differences on the manifold, if it has
+        rows.
+        """
         n, nx = layout.shape[0], xs.shape[1]
-        for row in range(xs.shape[0]):
+        for row in range(part[0], part[1]):
             for k in range(nx):
                 work[0, k] = xs[row, k]
             values[row] = probability(work[0, :nx])
@@ -130,9 +137,9 @@ def _survival_loop(probability: Callable[..., Any]) -> Any:
 
 def _end_loop(terminated: Callable[..., Any]) -> Any:
     @users_loop
-    def evaluate(xs, out):  # type: ignore[no-untyped-def]
-        """out[i] = whether the episode ends in x_i."""
-        for row in range(xs.shape[0]):
+    def evaluate(part, xs, out):  # type: ignore[no-untyped-def]
+        """Of a part, out[i] = whether the episode ends in x_i."""
+        for row in range(part[0], part[1]):
             out[row] = terminated(xs[row])
 
     return evaluate
@@ -172,11 +179,12 @@ def compile_functions(
     _loop(_judge_loop, observation, reward, terminated).compile_for(row, row, row, row)
     _loop(_itself, observation).compile_for(row, row)
     if batches:
-        _loop(_observation_loop, observation).compile_for(layout, rows, rows, rows, stack)
-        _loop(_reward_loop, reward).compile_for(layout, rows, rows, rows, rows, row, rows)
-        _loop(_end_loop, terminated).compile_for(rows, np.zeros(1, dtype=np.bool_))
+        part = 0, 0
+        _loop(_observation_loop, observation).compile_for(part, layout, rows, rows, rows, stack)
+        _loop(_reward_loop, reward).compile_for(part, layout, rows, rows, rows, rows, row, rows)
+        _loop(_end_loop, terminated).compile_for(part, rows, np.zeros(1, dtype=np.bool_))
         if survival_probability is not None:
-            _loop(_survival_loop, survival_probability).compile_for(layout, rows, rows, row, rows)
+            _loop(_survival_loop, survival_probability).compile_for(part, layout, rows, rows, row, rows)
 
 
 @dataclass(frozen=True)
@@ -292,7 +300,8 @@ class Task:
         return self.substeps * self.sim.time_step
 
     @cached_property
-    def _layout(self) -> Any:
+    def layout(self) -> Any:
+        """Addresses of the tangent components; see manifold.py."""
         return tangent_layout(self.sim, self.sim.neutral())
 
     @cached_property
@@ -319,6 +328,27 @@ class Task:
     def _survival_loop(self) -> Any:
         assert self.survival_probability is not None
         return _loop(_survival_loop, self.survival_probability)
+
+    @cached_property
+    def addresses(self) -> tuple[int, int, int, int]:
+        """Of the loops, for kernels: observation, reward, end of an episode, and survival, 0 without."""
+        loops = [("observation", OBSERVATION, self._observation_loop), ("reward", REWARD, self._reward_loop)]
+        loops.append(("terminated", END, self._end_loop))
+        if self.survival_probability is not None:
+            loops.append(("survival_probability", SURVIVAL, self._survival_loop))
+        observation, reward, end, *survival = (compiled_call(name, call.address, loop) for name, call, loop in loops)
+        return observation, reward, end, *(survival or [0])
+
+    def room(self, parts: int) -> Floats:
+        """Scratch of the loops, when they are called by their address.
+
+        Args:
+            parts: number of parts of the rows.
+
+        Returns:
+            (parts, 3, ...) zeros.
+        """
+        return np.zeros((parts, *self._work.shape))
 
     @cached_property
     def _work(self) -> Floats:
@@ -354,7 +384,7 @@ class Task:
         n = len(xs)
         values = np.zeros((n, self.observations))
         out = np.zeros((n if slopes else 0, self.observations, self.sim.ndx))
-        compiled_call("observation", self._observation_loop, self._layout, xs, self._work.copy(), values, out)
+        compiled_call("observation", self._observation_loop, (0, n), self.layout, xs, self._work.copy(), values, out)
         return values, out
 
     def observe_one(self, x: Floats) -> Floats:
@@ -385,7 +415,7 @@ class Task:
         n, width = len(xs), 2 * self.sim.ndx + self.sim.nu
         values, out = np.zeros(n), np.zeros((n if slopes else 0, width))
         work = self._work.copy()
-        compiled_call("reward", self._reward_loop, self._layout, xs, actions, nexts, work, values, out)
+        compiled_call("reward", self._reward_loop, (0, n), self.layout, xs, actions, nexts, work, values, out)
         return values, out
 
     def ends(self, xs: Floats) -> Flags:
@@ -398,7 +428,7 @@ class Task:
             (n,) flags.
         """
         out = np.zeros(len(xs), dtype=np.bool_)
-        compiled_call("terminated", self._end_loop, xs, out)
+        compiled_call("terminated", self._end_loop, (0, len(xs)), xs, out)
         return out
 
     def judge(self, x: Floats, action: Floats, after: Floats) -> tuple[Floats, float, bool]:
@@ -432,7 +462,7 @@ class Task:
         out = np.zeros((len(xs) if slopes else 0, self.sim.ndx))
         if self.survival_probability is not None:
             loop, work = self._survival_loop, self._work.copy()
-            compiled_call("survival_probability", loop, self._layout, xs, work, values, out)
+            compiled_call("survival_probability", loop, (0, len(xs)), self.layout, xs, work, values, out)
         return values, out
 
     def first(self, rng: np.random.Generator) -> Floats:

@@ -14,6 +14,7 @@ import numpy as np
 import dojo_opt as dojo
 from dojo_opt.learn.critic_fit import fit_network
 from dojo_opt.learn.environment_names import TASKS
+from dojo_opt.learn.first_states import first_states
 from dojo_opt.learn.gymnasium_tasks import FUNCTIONS
 from dojo_opt.learn.network import Adam, Network
 from dojo_opt.learn.policy import LearnedPolicy
@@ -263,7 +264,8 @@ def _users() -> None:
 
 
 def _environments(batches: bool) -> None:
-    """Functions of the tasks of Gymnasium's registry; those of Go2 depend on its file."""
+    """Functions of the tasks of Gymnasium's registry, those of Go2 depend on its file; and their first states."""
+    first_states(dojo.models.sphere(), 2, 0.1, lambda rng, count: np.zeros(count))(np.random.default_rng(0))
     for name, (module, function, _) in TASKS.items():
         if name in FUNCTIONS:
             compile_functions(**FUNCTIONS[name](), batches=batches)
@@ -273,8 +275,7 @@ def _environments(batches: bool) -> None:
                 task.observation, task.reward, task.terminated, task.survival_probability, batches=batches
             )
             if batches and name == "QuadrotorWaypoint":  # the sweep of gradients
-                few: dict[str, Any] = {"epochs": 1, "environments": 2, "horizon": 2, "hidden": (4,)}
-                few |= {"evaluations": 1, "episodes": 1}
+                few: dict[str, Any] = {"epochs": 1, "environments": 2, "horizon": 2, "evaluations": 1, "episodes": 1}
                 dojo.learn.shac(task, **few)
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism.short_repr import short_repr
 from sim.model.model import Model
@@ -29,12 +30,14 @@ class RowImpulses:
         bounds: (n, nlimit, 2) of the limits.
         dry: (n, ndry, 4) of the dry friction.
         known: (n,) whether a row has them; one that was not solved, or whose step was divided, has none.
+        rows: RowSteps of the simulator that made them, if any.
     """
 
     cones: Floats
     bounds: Floats
     dry: Floats
     known: NDArray[np.bool_]
+    rows: Any = None
 
     __repr__ = short_repr
 
@@ -64,6 +67,21 @@ class RowImpulses:
         """
         self.known[rows] = False
 
+    def stepper(
+        self, substeps: int, kappa: ArrayLike | None = None, parameters: Mapping[str, ArrayLike] | None = None
+    ) -> Any:
+        """Many knots of the rows of these impulses: models and settings are checked, and looked up, once.
+
+        Args:
+            substeps: as for `Simulator.step_batch`.
+            kappa: the same.
+            parameters: the same.
+
+        Returns:
+            RowStepper, whose steps start from these impulses, and write them.
+        """
+        return self.rows.row_stepper(self, substeps, kappa, parameters)
+
     def of_rows(self, rows: Any) -> RowImpulses:
         """The impulses of some rows.
 
@@ -73,4 +91,4 @@ class RowImpulses:
         Returns:
             RowImpulses, a copy.
         """
-        return RowImpulses(self.cones[rows], self.bounds[rows], self.dry[rows], self.known[rows])
+        return RowImpulses(self.cones[rows], self.bounds[rows], self.dry[rows], self.known[rows], self.rows)

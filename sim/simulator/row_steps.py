@@ -20,7 +20,8 @@ from sim.simulator.engines.engine import BOUND, CONE, REPORT, Engine
 from sim.simulator.knot_stepper import KnotStepper
 from sim.simulator.results import contacts_of, reservation, status_message
 from sim.simulator.row_impulses import RowImpulses
-from sim.simulator.step_batch import RowBatch, RowModels, StepBatch
+from sim.simulator.row_stepper import RowStepper
+from sim.simulator.step_batch import RowBatch, RowModels, StepBatch, row_settings
 from solvers.types import Floats
 
 _CALL = "Simulator.step_batch"
@@ -87,7 +88,8 @@ class RowSteps:
             raise ValueError(f"{_CALL}(contacts=True): expected no derivatives, and a simulator without an accuracy")
         rows = self._models.of(f"{_CALL}(parameters=...)", parameters, count)
         touched = np.zeros((count if contacts else 0, *engine.no_outputs[0].shape[1:]))
-        found, reports = RowBatch(rows, states, inputs, steps, kappas, touched, kept).step(derivatives)
+        settings = row_settings(rows, kappas)
+        found, reports = RowBatch(rows, states, inputs, steps, kappas, touched, kept, settings).step(derivatives)
         if contacts:
             found = replace(found, contacts=contacts_of(self._mechanism, engine.settings.time_step, touched))
         if not len(found.unsolved):
@@ -113,7 +115,23 @@ class RowSteps:
         """As `Simulator.row_impulses`."""
         model = self._engine.model
         size = CONE * len(model.contact_body) + BOUND * len(model.limit_dof) + len(Dry) * len(model.dry_dof)
-        return RowImpulses.of(model, room_for("Simulator.row_impulses(count)", count, 8.0 * (1 + size), least=0))
+        found = RowImpulses.of(model, room_for("Simulator.row_impulses(count)", count, 8.0 * (1 + size), least=0))
+        return replace(found, rows=self)
+
+    def row_stepper(
+        self,
+        impulses: RowImpulses,
+        substeps: int,
+        kappa: ArrayLike | None,
+        parameters: Mapping[str, ArrayLike] | None,
+    ) -> RowStepper:
+        """As `RowImpulses.stepper`."""
+        engine, count = self._engine, len(impulses)
+        kept, kappas = self._checked_impulses(impulses, count), self._kappas(kappa, count)
+        steps = room_for(f"{_CALL}(substeps=...)", substeps, 8.0 * (engine.nx + engine.nu) * max(count, 1))
+        given = checks.mapping(f"{_CALL}(parameters=...)", parameters)
+        rows = self._models.of(f"{_CALL}(parameters=...)", given, count)
+        return RowStepper(rows, steps, kappas, kept, self._arguments)
 
     def _checked_impulses(self, given: RowImpulses | None, count: int) -> RowImpulses:
         """Checked impulses of `count` rows; of none where there are none, or where engines have no use for them."""

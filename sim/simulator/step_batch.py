@@ -28,6 +28,8 @@ from solvers.types import Integers
 Floats = NDArray[np.float64]
 
 _KEPT = 512  # models
+_STATUS, _ITERATIONS = int(StepReport.STATUS), int(StepReport.ITERATIONS)  # NumPy is slower with members of an enum
+_IMPULSES, _DEADLINE, _SETTINGS = int(StepSetting.IMPULSES), int(StepSetting.DEADLINE), len(StepSetting)
 
 
 @dataclass(frozen=True)
@@ -192,6 +194,14 @@ def _distinct(rows: Floats) -> tuple[Floats, Integers]:
     return found, index.reshape(-1)
 
 
+def row_settings(rows: RowEngines, kappas: Floats) -> Floats:
+    """(n, 10) settings of rows, of StepSetting, with these kappas (n,) where they are not NaN."""
+    settings = rows.settings.copy()
+    given = ~np.isnan(kappas)
+    settings[given, StepSetting.KAPPA] = kappas[given]
+    return settings
+
+
 @dataclass(frozen=True)
 class RowBatch:
     """Rows that are stepped together."""
@@ -203,14 +213,20 @@ class RowBatch:
     kappas: Floats  # (n,), NaN for that of the engine
     contacts: Floats  # (n, ncontact, 11) out, of the last step of each row, or (0, ncontact, 11): not kept
     impulses: RowImpulses  # of n rows, or of none
+    settings: Floats  # (n, 10) of StepSetting
 
     __repr__ = short_repr
 
-    def step(self, derivatives: bool) -> tuple[StepBatch, Floats]:
-        """One knot of every row, and the report of each."""
+    def step(self, derivatives: bool, room: tuple[Floats, Floats] | None = None) -> tuple[StepBatch, Floats]:
+        """One knot of every row, and the report of each; room for derivatives: A and B."""
         first = self.rows.engines[0]
         n = len(self.us)
-        A, B = (np.zeros((n if derivatives else 0, first.ndx, size)) for size in (first.ndx, first.nu))
+        if room is None:
+            room = (
+                np.zeros((n if derivatives else 0, first.ndx, first.ndx)),
+                np.zeros((n if derivatives else 0, first.ndx, first.nu)),
+            )
+        A, B = room
         x_next, reports = np.array(self.xs), np.zeros((n, REPORT))
         if not first.in_one_kernel:
             self._by_engine(derivatives, A, B, x_next, reports)
@@ -218,6 +234,17 @@ class RowBatch:
             self._linearize(A, B, x_next, reports)
         elif n:
             self._roll(x_next, reports)
+        known = first.in_one_kernel or not derivatives  # the kernel looks at the derivatives of every step
+        if reports[:, _STATUS].any() or not (known or refuse(reports, n, A, B) == n):
+            self._mend(derivatives, A, B, x_next, reports)
+        elif len(self.impulses):
+            self.impulses.known[:] = True
+        statuses, iterations = reports[:, _STATUS].astype(np.int64), reports[:, _ITERATIONS].astype(np.int64)
+        return StepBatch(x_next, statuses, iterations, A, B), reports
+
+    def _mend(self, derivatives: bool, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
+        """Divide unsolved steps; rows that remain unsolved keep their states, with derivatives of zero."""
+        n = len(self.us)
         whole = reports[:, StepReport.STATUS] == Status.SOLVED
         for i in np.flatnonzero(reports[:, StepReport.STATUS]):
             if int(reports[i, StepReport.STATUS]) in DIVISIBLE:
@@ -230,8 +257,6 @@ class RowBatch:
             A[i : i + 1], B[i : i + 1] = 0.0, 0.0
         if len(self.impulses):
             self.impulses.known[:] = whole & (reports[:, StepReport.STATUS] == Status.SOLVED)
-        statuses, iterations = (reports[:, k].astype(np.int64) for k in (StepReport.STATUS, StepReport.ITERATIONS))
-        return StepBatch(x_next, statuses, iterations, A, B), reports
 
     def _kappa(self, row: int) -> float | None:
         """Kappa of a row; None for that of its engine."""
@@ -244,12 +269,9 @@ class RowBatch:
         models = rows.gradient_tables if derivatives else rows.step_tables
         data_tables = rows.engines[0].chunks(n)
         scratch, count = rows.scratch(data_tables), len(data_tables)
-        settings = rows.settings.copy()
-        given = ~np.isnan(self.kappas)
-        settings[given, StepSetting.KAPPA] = self.kappas[given]
-        kept = self.impulses
+        settings, kept = self.settings, self.impulses
         if len(kept):
-            settings[:, StepSetting.IMPULSES] = kept.known
+            settings[:, _IMPULSES] = kept.known
         return RowTables(models, scratch, settings, kept.cones, kept.bounds, kept.dry), count
 
     def _linearize(self, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
@@ -257,11 +279,11 @@ class RowBatch:
         rows, chunks = self._tables(derivatives=True)
         line = Linearized(self.xs, self.us, self.rows.engines[0].no_wrenches, A, B, x_next, reports)
         done = np.zeros(len(self.us), dtype=np.int64)
-        deadline = np.zeros(len(StepSetting))
+        deadline = np.zeros(_SETTINGS)
         for _ in pieces(deadline, 2):
-            rows.settings[:, StepSetting.DEADLINE] = deadline[StepSetting.DEADLINE]
+            rows.settings[:, _DEADLINE] = deadline[_DEADLINE]
             linearize_rows(rows, self.substeps, line, done, chunks)
-            if np.all(done == self.substeps):
+            if (done == self.substeps).all():
                 break
 
     def _roll(self, x_next: Floats, reports: Floats) -> None:
@@ -274,7 +296,7 @@ class RowBatch:
         knots = np.zeros(n, dtype=np.int64)
         contacts = np.zeros((len(self.contacts) * self.substeps, *self.contacts.shape[1:]))
         motions = BatchBuffers(xs, us, reports[:, None], knots, first.no_wrenches, contacts, *first.no_outputs[1:])
-        deadline = np.zeros(len(StepSetting))
+        deadline = np.zeros(_SETTINGS)
         for _ in pieces(deadline, 2):
             rows.settings[:, StepSetting.DEADLINE] = deadline[StepSetting.DEADLINE]
             roll_rows(rows, motions, chunks)

@@ -6,6 +6,7 @@ local_kernel            a kernel that a function makes, not kept on disk
 entry                   a kernel for given types, called by its address
 parallel_kernel         a loop over the threads, with `prange`; `threads` sets their number
 users_kernel            a function of the user; users_loop is a loop around one, users_callee a kernel that it calls
+AddressCall             a call of a users_loop by its address, in kernels
 optional, link          a kernel with a slot in a table of addresses, for features that few scenes have
 record, Field, Table    NamedTuples of arrays that kernels take as one pointer
 fingerprint             the content of a function, equal for those that compile to the same code
@@ -19,6 +20,7 @@ shipped                 the code that came compiled with the package
 CompilationError        Numba's error for code it cannot compile
 """
 
+from solvers.compiler.addresses import AddressCall
 from solvers.compiler.cache import cache_folder, shipped, stamp
 from solvers.compiler.clock import PAUSE, seconds
 from solvers.compiler.function_digest import fingerprint
@@ -42,6 +44,7 @@ from solvers.compiler.records import Field, Part, Table, record, table
 
 __all__ = [
     "PAUSE",
+    "AddressCall",
     "CompilationError",
     "Field",
     "Part",

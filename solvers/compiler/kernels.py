@@ -255,6 +255,12 @@ class UsersKernel(Kernel):
         """Compile or load the entry for arguments of these types, without a call."""
         self.entry.compile(tuple(self.entry.typeof_pyval(value) for value in args))
 
+    def address(self, kinds: tuple[Any, ...]) -> int:
+        """Where the entry for arguments of these types is, in this process."""
+        self.entry.compile(kinds)
+        code = self.entry.overloads[kinds]
+        return int(code.library.get_pointer_to_function(code.fndesc.llvm_func_name))
+
     def _form(self, compiler: Any, **flags: bool) -> Any:
         chosen = UsersCompiler if self.flags.get("parallel") else compiler  # whose loops are functions of their own
         form = numba.jit(nopython=True, pipeline_class=chosen, **flags, **self.flags)(self.py_func)

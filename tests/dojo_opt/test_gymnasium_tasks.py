@@ -10,7 +10,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.learn import environment
-from dojo_opt.learn.gymnasium_tasks import least_gap
+from dojo_opt.learn.first_states import least_gap
 from dojo_opt.learn.registration import task_of
 from dojo_opt.learn.vector_environment import VectorEnvironment
 

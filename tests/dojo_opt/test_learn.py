@@ -123,7 +123,7 @@ def test_a_smooth_probability_of_survival_has_the_derivative_of_what_it_makes_le
         return DiscountedSum(roll, after, 0.9)
 
     found = total(slopes=True)
-    assert found.survival.min() < 0.9 and found.follows.min() > 0.0
+    assert found.roll.survival.min() < 0.9 and found.follows.min() > 0.0
     gradient = found.roll.gradient(*found.weights(np.broadcast_to(by_state, (6, 2, 2)))).weights
     for i in range(0, policy.network.count, 3):
         kept, sides = policy.weights[i], []
@@ -149,6 +149,18 @@ def test_rows_start_anew_where_their_survival_is_improbable(task):
     assert dojo.learn.evaluate(held.policy, 2).lengths.tolist() == [1000, 1000]
 
 
+def test_errors_of_functions_of_a_task_leave_the_threads(task):
+    def terminated(x):
+        if x[1] > 4.0:
+            raise ValueError("too fast")
+        return False
+
+    mortal = replace(task, terminated=terminated)
+    dojo.learn.roll_policy_batch(_policy(mortal), np.array([[0.3, 0.0]] * 5), 1)
+    with pytest.raises(ValueError, match="too fast"):
+        dojo.learn.roll_policy_batch(_policy(mortal), np.array([[0.3, 0.0]] * 5 + [[0.3, 9.0]]), 1)
+
+
 def test_saturated_outputs_cost_what_brings_them_back(task):
     policy, starts = _policy(task), np.array([[0.25, -1.0], [0.8, 1.5]])
     policy.weights[-1] = 4.0  # the bias of the output
@@ -162,9 +174,9 @@ def test_saturated_outputs_cost_what_brings_them_back(task):
 def test_a_row_that_starts_anew_passes_no_gradient_back(task):
     policy, starts = _policy(task), task.starts([np.random.default_rng(0)] * 2)
 
-    def restart(t, terminated, unsolved, states):
+    def restart(roll, t):
         if t == 2:
-            states[0] = starts[1]
+            roll.x[t + 1, 0] = starts[1]
         return np.array([t == 2, False])
 
     weights = np.ones((5, 2))
@@ -233,7 +245,7 @@ def test_adam_moves_weights_as_its_paper_says_however_many_steps_are_behind():
 def test_a_delayed_action_is_applied_later_and_forgotten_where_an_episode_begins(task):
     policy, starts, drawn = _policy(task), np.array([[0.25, -1.0], [0.8, 1.5]]), replace(Drawn.of(task), delay=1)
 
-    def restart(t, terminated, unsolved, states):
+    def restart(roll, t):
         return np.array([t == 2, False])
 
     delays = ActionDelay(2, 2, task.sim.nu)
