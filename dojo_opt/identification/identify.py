@@ -50,6 +50,7 @@ _LEAST_NOISE = 1e-150  # whose inverse has a square
 _IDLE = 1e-20  # square of the largest effect of a parameter: those of parameters without any
 _UNSEEN = 1e-8  # of the largest eigenvalue, for parameters of the same effect: combinations without any
 _SHARE = 0.01  # of the effect of a parameter in a combination without any: that of one which has a part in it
+_POOR, _GOOD = 0.1, 0.5  # shares of the expected decrease: of a step that is refused, and that lowers the damping
 _NEARLY = 10.0  # tolerances: the decrease that a fit may still expect at its end, where no step brings one
 _WITHIN = 0.1  # standard deviations: the change of the parameters that it may still expect there
 _AWAY = 0.3  # times a value: standard deviation of the starts of further fits without a prior
@@ -381,7 +382,7 @@ def _descend(fit: ShootingFit, stage: _Stage, began: float, history: list[dict[s
             return Status.SIMULATION_FAILED
         if data <= _EXACT * sum(w.errors.size for w, use in zip(found, usable, strict=True) if use):
             return Status.SOLVED
-        accepted, gain, equations = False, 0.0, NormalEquations(found, weights, fit.unit)
+        accepted, gain, share, equations = False, 0.0, 0.0, NormalEquations(found, weights, fit.unit)
         expected = None  # of the least damped step
         while damping < _LARGEST and not accepted:
             theta, starts, now = fit.step(equations, damping)
@@ -391,8 +392,9 @@ def _descend(fit: ShootingFit, stage: _Stage, began: float, history: list[dict[s
             trial = fit.errors(theta, starts, kappa, slopes=False)
             if trial is not None and all(t.solved or not use for t, use in zip(trial, usable, strict=True)):
                 ahead = fit.weigh(trial, usable)[0] + fit.pull(theta)
-                accepted, gain = ahead < cost, (cost - ahead) / cost
-            damping = max(damping / 5.0, _LEAST) if accepted else 4.0 * damping
+                gain, share = (cost - ahead) / cost, (cost - ahead) / now.decrease
+                accepted = share > _POOR
+            damping = 4.0 * damping if not accepted else max(damping / 5.0, _LEAST) if share > _GOOD else damping
         if expected is None or not accepted:
             return Status.LINE_SEARCH
         size = float(np.linalg.norm((theta - fit.theta) / fit.unit))

@@ -275,7 +275,8 @@ def _environments(batches: bool) -> None:
                 task.observation, task.reward, task.terminated, task.survival_probability, batches=batches
             )
             if batches and name == "QuadrotorWaypoint":  # the sweep of gradients
-                few: dict[str, Any] = {"epochs": 1, "environments": 2, "horizon": 2, "evaluations": 1, "episodes": 1}
+                few: dict[str, Any] = {"epochs": 1, "environments": 2, "horizon": 2, "hidden": (4,)}
+                few |= {"evaluations": 1, "episodes": 1}
                 dojo.learn.shac(task, **few)
 
 

@@ -30,6 +30,7 @@ __all__ = ["legged_mpc"]
 _GAITS = ("trot", "walk", "pace", "bound", "hop")
 # of a robot of the size and weight of the A1, as in `quadruped_mpc`: lengths go with the height, times with its root
 _KNOT, _KNOTS, _HORIZON = 0.04, 12, 20  # [s], of a period, of a plan
+_HOP = 0.4  # [s], a period: in a longer one the base falls so far that knees meet their stops
 _SPEED, _LIFT, _KAPPA = 0.2, 0.05, 1e-3  # [m/s], [m], [N s m]
 _BASE, _ANGLE, _VELOCITY, _RATE, _EFFORT = 10.0, 1.0, 0.1, 0.01, 1e-4
 _CAREFUL = 0.5  # share of the friction that plans assume
@@ -56,10 +57,11 @@ def legged_mpc(
     """A robot with two, four or six legs walks at a commanded velocity: 20 knots, 12 of them a period of its gait.
 
     Feet and stance are found, see `dojo_opt.gaits.legs.Legs`. Weights are those of `quadruped_mpc` in units of the
-    robot's weight and height, times go with the root of the height: 40 ms a knot for one of 0.29 m. Torques stay within
-    the limits of its inputs. The cost tracks the gait with its torques by inverse dynamics; plans assume half the
-    friction of the feet, and the height of the ground is estimated from the stance feet. Where a push leaves the line
-    search of a tick only short steps, a step of all states at once (multiple shooting) is tried, but on two feet.
+    robot's weight and height, times go with the root of the height: 40 ms a knot for one of 0.29 m, 33 ms in a hop.
+    Torques stay within the limits of its inputs. The cost tracks the gait with its torques by inverse dynamics; plans
+    assume half the friction of the feet, and the height of the ground is estimated from the stance feet. Where a push
+    leaves the line search of a tick only short steps, a step of all states at once (multiple shooting) is tried, but on
+    two feet.
 
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator.
@@ -70,7 +72,7 @@ def legged_mpc(
         feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
             radii [m] in a dict keyed by name (default None: found).
         stance: coordinates of the stance by joint (default None: found).
-        period: duration of a cycle of the gait [s] (default None: 12 knots).
+        period: duration of a cycle of the gait [s] (default None: 0.48 s, of a hop 0.4 s, for the A1's height).
         step_height: lift of a swinging foot [m] (default None: 0.05 m for the A1's height).
         duty: share of the period that a foot is on the ground (default None: that of the gait).
         damping: least damper of the joints of model and plant [N m s/rad] (default None: see `Legs`).
@@ -88,7 +90,8 @@ def legged_mpc(
     checks.one_of(f"{call}(gait)", gait, _GAITS)
     legs = Legs(robot, feet, damping=damping, stance=stance)
     slow, unit = legs.size**0.5, legs.torque
-    cycle = _KNOT * _KNOTS * slow if period is None else checks.number(f"{call}(period=...)", period, above=0.0)
+    usual = _HOP if gait == "hop" else _KNOT * _KNOTS
+    cycle = usual * slow if period is None else checks.number(f"{call}(period=...)", period, above=0.0)
     knot = 1e-3 * max(1, round(1e3 * cycle / _KNOTS))
     sim = legs.simulator(knot / whole_number(f"{call}(substeps=...)", substeps), PLANNED)
     lift = _LIFT * legs.size if step_height is None else step_height
@@ -110,8 +113,8 @@ def legged_mpc(
     )
     grip = min((c.friction for c in sim.mechanism.contacts), default=0.0)
     planner = replace(OPTIONS, multiple_shooting_below=0.0 if legs.biped else _SHORT)
-    usual = {"learn_ground": True, "options": planner, "kappa": _KAPPA * unit * slow, "friction": _CAREFUL * grip}
-    return MPC(problem, reference={0: reference, 1: reference.torques}, **{**usual, **settings})
+    own = {"learn_ground": True, "options": planner, "kappa": _KAPPA * unit * slow, "friction": _CAREFUL * grip}
+    return MPC(problem, reference={0: reference, 1: reference.torques}, **{**own, **settings})
 
 
 def _period(name: str, sim: Simulator, command: Vector, **settings: Any) -> Gait:

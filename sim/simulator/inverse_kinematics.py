@@ -1,4 +1,4 @@
-"""ik: coordinates at which frames reach their targets, within the joint limits."""
+"""ik: coordinates at which frames reach their targets, within the joint limits, with loops closed and gears in mesh."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from sim.mechanism import checks
 from sim.mechanism.shapes import rotation_matrix
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.kinematics import Kinematics
+from sim.simulator.loop_closure import Closure
 from sim.simulator.simulator import Simulator
 from solvers.types import Floats
 
@@ -25,6 +26,7 @@ _NEAR, _FAR = 0.5, 2.0  # [rad, m] spread of the coordinates of further starts, 
 _NEARBY = 5  # number of these, after which joints that the targets do not need may end far from where they were
 _TURN = 1.0  # [rad] largest change of a coordinate in an iteration
 _SMALLEST_ROOM = 1e-9  # [rad, m] of a coordinate that a step may change
+_DIFFERENCE = 1e-6  # [m, rad] of central differences of gaps
 _ORTHOGONAL = 1e-6  # error of R R^T of a rotation matrix
 
 
@@ -39,16 +41,16 @@ class IkResult:
         q: (nq,) coordinates.
         success: whether all errors are within the tolerance.
         message: sentence about the outcome.
-        error: largest distance or angle from a target [m, rad].
-        errors: the same by target.
+        error: largest distance or angle from a target, or gap of a loop joint or gear [m, rad].
+        errors: the same by target, and by loop joint and "gear NAME".
         iterations: number of iterations from all starts.
     """
 
     q: Floats
     success: bool
     message: str
-    error: float  # largest distance [m] or angle [rad] from a target
-    errors: dict[str, float]  # by target
+    error: float
+    errors: dict[str, float]
     iterations: int
 
     __repr__ = short_repr
@@ -69,7 +71,7 @@ def ik(
     limits.
 
     Each step is min |J dq + r|^2 + damping |dq|^2 under lo <= q + dq <= hi, solved as a bounded problem, so that joints
-    slide along their limits.
+    slide along their limits. Gaps of loop joints and gears are errors as those of the targets are.
 
     Args:
         sim: the simulator, or its Kinematics with frames that were added.
@@ -85,7 +87,7 @@ def ik(
             postures in which no small motion helps (default 16).
 
     Returns:
-        IkResult; without a solution nearby, its message names the farthest target.
+        IkResult; without a solution nearby, its message names the farthest target, or the loop joint or gear.
 
     Raises:
         ValueError: a frame or a joint is unknown, or a target has the wrong form.
@@ -103,11 +105,11 @@ def ik(
     q = np.array(neutral if start is None else checks.array("ik(start=...)", start, (kin.sim.nq,)))
     low, high, free = _bounds(kin, fixed, limits)
     q = _inside(kin, q, low, high)
-    search = _Search(kin, wanted, low, high, free, 0.1 * tolerance, max_iterations)
+    search = _Search(kin, wanted, kin.sim.closure(), low, high, free, 0.1 * tolerance, max_iterations)
     q, r, count = search.descend(q)
     rng = np.random.default_rng(0)
     for attempt in range(attempts - 1):
-        if max(_errors(wanted, r).values()) <= tolerance:
+        if max(search.errors(q, r).values()) <= tolerance:
             break
         dq = np.zeros(kin.sim.nv)
         dq[free] = (_NEAR if attempt < _NEARBY else _FAR) * rng.normal(size=len(free))
@@ -115,17 +117,16 @@ def ik(
         count += more
         if r_other @ r_other < r @ r:
             q, r = other, r_other
-    if max(_errors(wanted, r).values()) > tolerance:  # out of reach: as near as possible
+    if max(search.errors(q, r).values()) > tolerance:  # out of reach: as near as possible
         q, r, more = search.descend(q, idle_at_most=max_iterations)
         count += more
-    errors = _errors(wanted, r)
+    errors = search.errors(q, r)
     worst = max(errors, key=lambda name: errors[name])
     success = errors[worst] <= tolerance
-    message = (
-        f"All targets are met to {errors[worst]:.2g}."
-        if success
-        else f"{worst!r} stays {errors[worst]:.3g} from its target: out of reach, or too far from start."
-    )
+    off = f"{worst!r} stays {errors[worst]:.3g} {'from its target' if worst in wanted else 'open'}"
+    message = f"All targets are met to {errors[worst]:.2g}."
+    if not success:
+        message = f"{off}: out of reach, or too far from start."
     return IkResult(q, success, message, errors[worst], errors, count)
 
 
@@ -134,6 +135,7 @@ class _Search(NamedTuple):
 
     kin: Kinematics
     wanted: Mapping[str, Target]
+    closure: Closure | None
     low: Floats
     high: Floats
     free: NDArray[np.int64]
@@ -143,14 +145,14 @@ class _Search(NamedTuple):
     def descend(self, q: Floats, idle_at_most: int = _IDLE) -> tuple[Floats, Floats, int]:
         """(coordinates, residual, iterations) from a start within the limits, up to some idle iterations in a row."""
         kin, free = self.kin, self.free
-        r, J = _residual(kin, q, self.wanted)
+        r, J = self.residual(q)
         damping, count, idle = _ACCEPT, 0, 0
         while count < self.max_iterations and np.abs(r).max() > self.enough and damping < _MOST and idle < idle_at_most:
             count += 1
             dq = np.zeros(kin.sim.nv)
             dq[free] = _step(J[:, free], r, damping, *(b[free] for b in _room(kin, q, self.low, self.high)))
             tried = _inside(kin, kin.moved(q, dq), self.low, self.high)  # rounding may be beyond a limit
-            r_tried, J_tried = _residual(kin, tried, self.wanted)
+            r_tried, J_tried = self.residual(tried)
             if r_tried @ r_tried < r @ r:
                 idle = idle + 1 if r_tried @ r_tried > (1.0 - _PROGRESS) * (r @ r) else 0
                 small = float(np.abs(dq).max()) < _SMALL
@@ -160,6 +162,24 @@ class _Search(NamedTuple):
             else:
                 damping = max(1e-6, 10.0 * damping)
         return q, r, count
+
+    def residual(self, q: Floats) -> tuple[Floats, Floats]:
+        """Errors of the targets, then gaps of loops and gears, (m,), and their Jacobian (m, nv)."""
+        r, J = _residual(self.kin, q, self.wanted)
+        if self.closure is None:
+            return r, J
+        steps = _DIFFERENCE * np.concatenate([np.zeros((1, J.shape[1])), np.eye(J.shape[1]), -np.eye(J.shape[1])])
+        gaps = self.closure.errors(self.kin.moved(np.tile(q, (len(steps), 1)), steps))
+        ahead, behind = np.split(gaps[1:], 2)
+        return np.concatenate([r, gaps[0]]), np.concatenate([J, (ahead - behind).T / (2.0 * _DIFFERENCE)])
+
+    def errors(self, q: Floats, r: Floats) -> dict[str, float]:
+        """Sizes of the errors r at q, by target, loop joint and gear."""
+        out = _errors(self.wanted, r)
+        if self.closure is not None:
+            x = np.concatenate([q, np.zeros(self.kin.sim.nv)])
+            out |= {name: float(np.abs(gap).max(initial=0.0)) for name, gap in self.closure.gaps(x).items()}
+        return out
 
 
 def _target(kin: Kinematics, name: str, given: Any) -> Target:

@@ -391,13 +391,20 @@ class Kinematics:
             The function, also for calls from Python.
 
         Raises:
-            ValueError: the quantity or the frame is unknown, or there is a frame too many.
+            ValueError: the quantity or the frame is unknown, there is a frame too many, or a velocity is asked for of a
+                simulator of higher order or with an accuracy, whose states have no means.
         """
         call, names = "Kinematics.compiled", {q.name.lower(): q for q in KinematicQuantity}
         found = names[checks.one_of(f"{call}(quantity)", quantity, names)]
         whole = found in (KinematicQuantity.CENTER_OF_MASS, KinematicQuantity.COM_JACOBIAN)
         if whole != (frame is None):
             raise ValueError(f"{call}({quantity!r}, frame): expected {'no' if whole else 'the name of a'} frame")
+        moving = found in (KinematicQuantity.VELOCITY, KinematicQuantity.VELOCITY_JACOBIAN)
+        if moving and not self.sim.mean_over:
+            raise ValueError(
+                f"{call}({quantity!r}): expected a Simulator of order 2, whose velocities are means over a time step, "
+                f"got {self.sim!r}, whose velocities are those at the node"
+            )
         body, point, turn = (-1, np.zeros(3), np.eye(3)) if frame is None else self._frame(f"{call}(frame)", frame)
         place = np.concatenate([point, quaternion(turn)])
         return CompiledKinematics(self.sim, found, body, place)

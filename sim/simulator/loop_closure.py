@@ -60,6 +60,11 @@ class Closure:
         """
         return {name: gap[0] for name, gap in self._gaps(x[None]).items()}
 
+    def errors(self, qs: Floats) -> Floats:
+        """All gaps of coordinates (n, nq) in rows (n, k), in the order of `gaps`."""
+        still = np.zeros((len(qs), self._mechanism.nv))
+        return np.concatenate([*self._gaps(np.concatenate([qs, still], axis=1)).values()], axis=1)
+
     def _gaps(self, xs: Floats, only: str = "") -> dict[str, Floats]:
         """All gaps of `gaps`, or the one of a row."""
         mech = self._mechanism

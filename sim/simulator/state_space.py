@@ -191,6 +191,14 @@ class StateSpace:
         """
         return Closure(self.mechanism, self._states).gaps(self._placed("loop_gaps", x))
 
+    def closure(self) -> Closure | None:
+        """The constraints of loops and gears.
+
+        Returns:
+            The Closure; None for trees.
+        """
+        return Closure(self.mechanism, self._states) if self._closes else None
+
     def loop_rank(self, x: ArrayLike | None = None) -> LoopRank:
         """The redundant loop constraints at a state.
 

@@ -60,6 +60,14 @@ def test_every_tick_after_a_push_has_a_new_plan():
     assert rejected() == 0 and rejected(options=OPTIONS) > 1
 
 
+@pytest.mark.parametrize("gait", ["bound", "hop"])
+def test_gaits_with_a_flight_have_references_within_the_stops_of_the_joints(gait):
+    mpc = dojo.tasks.legged_mpc(dojo.models.quadruped(), gait)
+    low, high = mpc.sim.mechanism.coordinate_limits
+    states = mpc.problem.costs[0].reference[:, 7 : mpc.sim.nq]
+    assert np.all((states >= low[7:]) & (states <= high[7:])) and np.ptp(states, axis=0).max() > 0.1
+
+
 def test_an_unknown_gait_or_command_is_refused():
     with pytest.raises(ValueError, match="gallop"):
         dojo.tasks.legged_mpc(dojo.models.quadruped(), "gallop")

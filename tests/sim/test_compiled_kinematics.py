@@ -130,6 +130,14 @@ def test_functions_run_in_threads_and_other_processes(arm):
     np.testing.assert_array_equal(filled(again, states[0], 7), found[0])
 
 
+@pytest.mark.parametrize("settings", [{"order": 4}, {"accuracy": 1e-4}], ids=["order", "accuracy"])
+def test_velocities_at_nodes_are_refused(arm, settings):
+    """Their mean over the last step, which is what the function gives, cannot be had from the state."""
+    kin = dojo.Kinematics(arm.replace(**settings))
+    with pytest.raises(ValueError, match=r"compiled\('velocity'\): expected a Simulator of order 2, .* at the node"):
+        kin.compiled("velocity", kin.frames[0])
+
+
 def test_unknown_quantities_and_frames_are_refused(arm):
     kin = dojo.Kinematics(arm)
     with pytest.raises(ValueError, match="'place' is not one of"):

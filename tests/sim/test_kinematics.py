@@ -127,6 +127,26 @@ def test_inverse_kinematics_finds_most_postures_of_an_arm(rng: np.random.Generat
     assert all(np.all((one.q >= low) & (one.q <= high)) for one in found)
 
 
+def test_inverse_kinematics_closes_loops_and_keeps_gears() -> None:
+    """A linkage with its foot moved, and a chain with a gear."""
+    sim = dojo.Simulator(dojo.models.fivebar(), time_step=0.01)
+    kin, q = dojo.Kinematics(sim), sim.neutral()[: sim.nq]
+    place = kin.pose("forearm_r", q)[0] + [0.01, 0.0, 0.01]
+    found = dojo.ik(sim, {"forearm_r": place})
+    gaps = sim.loop_gaps(np.concatenate([found.q, np.zeros(sim.nv)]))
+    assert found.success and max(np.abs(gap).max() for gap in gaps.values()) < 1e-8
+    np.testing.assert_allclose(kin.pose("forearm_r", found.q)[0], place, atol=1e-8)
+    far = dojo.ik(sim, {"forearm_r": place + [9.0, 0.0, 0.0]}, attempts=1)
+    assert not far.success and set(far.errors) == {"forearm_r", *gaps}
+    hinge = {"axis": (0, 1, 0), "parent_point": (0.5, 0, 0)}
+    joints = [dojo.Joint("revolute", a, b, name=f"j{b}", **hinge) for a, b in ((None, "a"), ("a", "b"), ("b", "c"))]
+    geared = dojo.Mechanism(
+        [dojo.Body(n, 1.0, np.eye(3)) for n in "abc"], joints, gears=[dojo.Gear("jb", "jc", 2.0)], inputs=[]
+    )
+    found = dojo.ik(dojo.Simulator(geared), {"c": (1.1, 0.0, 0.3)})
+    assert found.success and found.q[1] == pytest.approx(2.0 * found.q[2], abs=1e-8)
+
+
 def test_inverse_kinematics_of_a_floating_robot(tmp_path: Path) -> None:
     """A pose of the hand and the place of the centre of mass, the orientation of the base held."""
     sim = dojo.Simulator(robot(tmp_path), 0.01)
