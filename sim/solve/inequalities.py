@@ -73,7 +73,7 @@ def choose_inequalities(model: Model, data: Data, options: StepOptions) -> None:
 @kernel
 def inequalities_activated(model: Model, data: Data, options: StepOptions) -> bool:
     """Whether inactive contacts have become active at configuration 3; they are from now on."""
-    pairs = pairs_activated(model, data)
+    pairs = pairs_activated(model, data, options)
     ground = has_activated(model, data, options)
     if pairs or ground:
         enlist_pairs(model, data)

@@ -100,8 +100,9 @@ def allegro(item: str = "cube", trial: int = 0, hull: ArrayLike | None = None, *
     meet the object alone, and the palm is its box. Can, foam brick and stick are a cylinder, a box and a capsule of
     their sizes, and the torus, of which MuJoCo sees the convex hull, is a polytope of 60 corners. The others have mass,
     centre of mass, inertia and size of the publication's meshes, and are boxes or cylinders, unless the corners of
-    their convex hulls are given. Plans see torus and others as ellipsoids, those of hulls the nearest ones. Contacts
-    have no torsional friction. At the start, fingers that overlap the object are unbent, or it is lifted.
+    their convex hulls are given. Plans see torus and others as ellipsoids, those of hulls the nearest ones, and tips as
+    three balls each where they see a box or a cylinder. Contacts have no torsional friction. At the start, fingers that
+    overlap the object are unbent, or it is lifted.
 
     Args:
         item: "cube", "can", "foam brick", "stick", "torus", "bowl", "airplane", "binoculars", "cup", "mug",

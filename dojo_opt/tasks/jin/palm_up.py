@@ -15,7 +15,7 @@ from sim.mechanism.collision import Collision
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.shapes import Box, Capsule, Solid, Sphere, rotation_matrix
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Solid, Sphere, rotation_matrix
 from solvers.rotation import quat_mul
 from solvers.types import Vector
 
@@ -54,6 +54,9 @@ _SPHERES: dict[str, tuple[tuple[int, tuple[float, float, float], float], ...]] =
 }
 _TIPS = {"finger": (0.019, 0.02), "thumb": (0.035, 0.016)}  # [m]
 _TIP_RADIUS = 0.012  # [m]
+# of a capsule in plans against boxes and cylinders: a capsule has up to 11 points with a cylinder, a ball has one; an
+# edge reaches 1.1 mm deeper between three balls than into the capsule
+_TIP_BALLS = 3
 
 
 def _finger(name: str, side: float) -> list[FileLink]:
@@ -108,6 +111,13 @@ def links() -> list[FileLink]:
     return out
 
 
+def _tips(center: Vector, length: float, balls: int) -> list[Solid]:
+    """A capsule along z, or so many balls in a row from one of its ends to the other."""
+    if balls == 0:
+        return [Capsule(_TIP_RADIUS, length, center=center)]
+    return [Sphere(_TIP_RADIUS, center=center + [0.0, 0.0, z]) for z in np.linspace(-0.5, 0.5, balls) * length]
+
+
 def mechanism(item: str, thing: PalmObject, planned: bool = False) -> Mechanism:
     """An object, and the hand below it: their pairs, and no others.
 
@@ -116,8 +126,9 @@ def mechanism(item: str, thing: PalmObject, planned: bool = False) -> Mechanism:
     Args:
         item: name of the object.
         thing: the object.
-        planned: whether it is the model of the controller, whose inputs are bounded, whose contacts reach 1 cm, and
-            whose object has a simpler shape, if there is one (default False).
+        planned: whether it is the model of the controller, whose inputs are bounded, whose contacts reach 1 cm, whose
+            object has a simpler shape, if there is one, and whose fingertips are rows of balls where that is a box or a
+            cylinder (default False).
 
     Returns:
         The mechanism.
@@ -126,6 +137,7 @@ def mechanism(item: str, thing: PalmObject, planned: bool = False) -> Mechanism:
     shape = thing.simple or thing.shape if planned else thing.shape
     bodies, joints = assembled(own)
     reach, limit = (_REACH, TORQUE) if planned else (None, np.inf)
+    rows = _TIP_BALLS if planned and isinstance(shape, Box | Cylinder) else 0
     parts: list[tuple[str | None, Solid, float, str]] = []
     for name in NAMES:
         kind = "thumb" if name == "thumb" else "finger"
@@ -134,7 +146,7 @@ def mechanism(item: str, thing: PalmObject, planned: bool = False) -> Mechanism:
             parts.append((link, Sphere(size, center=from_com(own, link, point)), _FINGER, f"{name}:{number}"))
         middle, length = _TIPS[kind]
         center = from_com(own, f"{name}_3", (0.0, 0.0, middle))
-        parts.append((f"{name}_3", Capsule(_TIP_RADIUS, length, center=center), _FINGER, f"{name}:tip"))
+        parts += [(f"{name}_3", tip, _FINGER, f"{name}:tip{k}") for k, tip in enumerate(_tips(center, length, rows))]
     at = rotation_matrix(_UP) @ np.array([-0.0093, 0.0, -0.0475])
     parts.append((None, Box(0.0408, 0.113, 0.095, center=at, orientation=_UP), max(_PALM, thing.friction), "palm"))
     collisions = [

@@ -12,6 +12,7 @@ A collision is inactive when its stiffness, relative to the inertia behind it, d
 for its n points at the activation gap a, half the gap ahead; M and T as in inactive.py, of both bodies; d: the
 collisions that one of its bodies has, so that the sum over them holds. A gap below a at the solution activates the
 collision, and the step is solved again. Derivatives take all collisions as active (`all_near`): they are exact.
+One beyond its reach has no force at all: it is placed at the solution only, to see whether it has come within it.
 
 Columns of model.pair_bound: PairBound of sim/model/record_columns.py.
 """
@@ -36,7 +37,7 @@ from sim.contact.pairs.limited_reach import (
     sort_pairs,
     stay_beyond,
 )
-from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, point_kinematics
+from sim.contact.pairs.pair_contact import acts, add_pair_wrench, point_kinematics
 from sim.contact.pairs.pair_pose import balls_apart, place_shapes
 from sim.contact.pairs.previous_features import overlapped
 from sim.dynamics.displacements import third_quaternion
@@ -80,7 +81,7 @@ def begin_pairs(model: Model, data: Data, options: StepOptions) -> None:
         a = FAR if is_beyond(model, data, j) else _begin_pair(model, data, options, j)
         data.pair_activation[j] = a
         data.pair_before[j, RelativePose.LEFT] = options.left * overlapped(model, data, j) if a == 0.0 else 0.0
-        if a > 0.0:
+        if 0.0 < a < model.pair_bound[j, PairBound.REACH]:
             change += _change(model, data, options, j, a)
     leave_beyond(model, data)
     data.pair_travel[0] = options.tolerance / change if change > 0.0 else 1e300
@@ -182,21 +183,27 @@ def inactive_pair_impulses(model: Model, data: Data, h: float, kappa: float) -> 
     for k in range(data.near_collision_count[0]):
         j = data.near_collisions[k]
         a = data.pair_activation[j]
-        if a > 0.0:
-            place_shapes(model, data, j, data.pos3, data.rot3)
-            choose_shapes(model, data, j)
+        if 0.0 < a < model.pair_bound[j, PairBound.REACH]:
+            _place_inactive(model, data, h, j, kappa)
             for m in range(j, end_of(model, j)):
-                _evaluate(model, data, h, m, kappa, a)
+                _apply_inactive(model, data, m)
 
 
 @kernel
-def _evaluate(model: Model, data: Data, h: float, j: int, kappa: float, a: float) -> None:
-    """Cone variables of one point of an inactive collision on the central path, and its wrench."""
-    c = model.contact_height.shape[0] + j
-    point_kinematics(model, data, h, j)
-    start_contact(model, data, c, kappa, a)
-    if not is_absent(data, j):
-        n, t1, t2 = contact_impulse(model, data, c)
+def _place_inactive(model: Model, data: Data, h: float, j: int, kappa: float) -> None:
+    """Cone variables of the points of an inactive collision at configuration 3, on the central path."""
+    place_shapes(model, data, j, data.pos3, data.rot3)
+    choose_shapes(model, data, j)
+    for m in range(j, end_of(model, j)):
+        point_kinematics(model, data, h, m)
+        start_contact(model, data, model.contact_height.shape[0] + m, kappa, data.pair_activation[j])
+
+
+@kernel
+def _apply_inactive(model: Model, data: Data, j: int) -> None:
+    """inactive_wrench -= impulse of one point of an inactive collision."""
+    if acts(data, j):
+        n, t1, t2 = contact_impulse(model, data, model.contact_height.shape[0] + j)
         add_pair_wrench(model, data, j, n, t1, t2, data.inactive_wrench)
 
 
@@ -232,11 +239,13 @@ def add_inactive_pairs(data: Data) -> None:
 
 
 @optional(Slot.PAIRS_ACTIVATED, default=False, seldom=True)
-def pairs_activated(model: Model, data: Data) -> bool:
+def pairs_activated(model: Model, data: Data, options: StepOptions) -> bool:
     """Whether an inactive collision has become active at configuration 3; it is active from now on."""
     found = False
     for m in range(data.near_collision_count[0]):
         j = data.near_collisions[m]
+        if data.pair_activation[j] == model.pair_bound[j, PairBound.REACH]:
+            _place_inactive(model, data, options.h, j, options.kappa)
         least = 1e300
         for k in range(j, end_of(model, j)):
             least = min(least, data.pair_out[k, Witness.GAP])
@@ -280,5 +289,7 @@ def _came_within_reach(model: Model, data: Data) -> bool:
 def all_near(model: Model, data: Data) -> None:
     """All collisions within their reach taken as active, for the derivatives of a step that has been solved."""
     for m in range(data.near_collision_count[0]):
-        data.pair_activation[data.near_collisions[m]] = 0.0
+        j = data.near_collisions[m]
+        if data.pair_activation[j] < model.pair_bound[j, PairBound.REACH]:
+            data.pair_activation[j] = 0.0
     enlist_pairs(model, data)

@@ -89,6 +89,12 @@ def is_absent(data: Data, j: int) -> bool:
     return data.pair_out[j, Witness.GAP] > _NO_POINT
 
 
+@kernel
+def acts(data: Data, j: int) -> bool:
+    """Whether pair j has a wrench: its shapes have that point now, within their reach."""
+    return not is_absent(data, j) and data.pair_fade[j, PairFade.PART] > 0.0
+
+
 @optional(Slot.PAIR_KINEMATICS)
 def pair_kinematics(model: Model, data: Data, h: float) -> None:
     """Gap, slip, frame and point of the pairs of active collisions at configuration 3."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from sim.contact.contact_law import condense_contact, contact_constant, contact_error, contact_impulse
 from sim.contact.pairs.inactive_pairs import add_inactive_pairs
 from sim.contact.pairs.limited_reach import with_fade
-from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
+from sim.contact.pairs.pair_contact import acts, add_pair_wrench, pair_arm, pair_force, shares
 from sim.contact.pairs.pair_jacobian import pair_jacobian
 from sim.contact.pairs.taut_string import is_taut
 from sim.contact.pairs.taut_string_stiffness import add_string_stiffness, add_string_turn
@@ -93,7 +93,7 @@ def condense_pairs(model: Model, data: Data, h: float, kappa: float, indefinite:
         c = data.active[m]
         pair_jacobian(model, data, h, c - ground)
         condense_contact(model, data, h, c, kappa, indefinite, form)
-        if not is_absent(data, c - ground):
+        if acts(data, c - ground):
             add_pair_stiffness(model, data, c - ground, indefinite)
 
 
@@ -105,7 +105,7 @@ def apply_pairs(model: Model, data: Data) -> float:
     for m in range(data.active_ground_count[0], data.active_count[0]):
         c = data.active[m]
         n, t1, t2 = contact_impulse(model, data, c)
-        if not is_absent(data, c - ground):
+        if acts(data, c - ground):
             add_pair_wrench(model, data, c - ground, n, t1, t2, data.wrench)
         r = max(r, contact_error(model, data, c))
     add_inactive_pairs(data)
@@ -120,7 +120,7 @@ def pair_constants(model: Model, data: Data, target: NewtonTarget) -> None:
         c = data.active[m]
         contact_constant(model, data, c, target)
         w = data.contact_w[c]
-        if not is_absent(data, c - ground):
+        if acts(data, c - ground):
             add_pair_wrench(model, data, c - ground, w[0], w[1], w[2], data.wrench)
 
 
