@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.planning.executors import check_executor
 from dojo_opt.planning.ilqr_search import Search
-from dojo_opt.planning.ilqr_start import FreeStart, at_rest, fitting_stage, periodic_gains
+from dojo_opt.planning.ilqr_start import FreeStart, at_rest, fitting_stage, only_stops, periodic_gains
 from dojo_opt.planning.iterate import Iterate, Iteration
 from dojo_opt.planning.multi_start import multi_start, of_problem
 from dojo_opt.planning.objective import Objective
@@ -75,7 +75,8 @@ def ilqr(
 ) -> Plan:
     """Plan a trajectory.
 
-    A guess of states begins at the stage that it fits best, because smooth contact would move a good guess away. A
+    A guess of states begins at the stage that it fits best, because smooth contact would move a good guess away;
+    without contacts within reach at the last one, because a smooth stop of a joint pushes away one that rests there. A
     guess with a resting joint that has to move begins at the smoothest stage. When an attempt fails, the planner
     restarts at another stage, within `max_iterations`; the table of iterations shows it.
 
@@ -298,7 +299,9 @@ class Solver:
                 self._begin(guess)
             elif first:
                 skipped = ", ".join(kappas[:first])
-                self._history.note(f"k_eval {skipped} skipped: the guess of states fits {kappas[first]} best")
+                stops = only_stops(self.problem.sim, guess.x)
+                why = "is far from any contact" if stops else f"fits {kappas[first]} best"
+                self._history.note(f"k_eval {skipped} skipped: the guess of states {why}")
             status = self._descend(first)
             ends.append(self._ended(status))
             if status not in FAILED or ends[-1].mismatch <= self.options.violation_tolerance:
@@ -326,7 +329,8 @@ class Solver:
             return [0]
         if at_rest(self.problem.sim, self.objective, now):
             return list(range(len(stages)))
-        first, linear = fitting_stage(self._horizon, now, stages)
+        least = len(stages) - 1 if only_stops(self.problem.sim, now.x) else 0
+        first, linear = fitting_stage(self._horizon, now, stages, least)
         if linear is not None:
             self._open_gaps(stages[first], linear)
         return [first, *range(first)]

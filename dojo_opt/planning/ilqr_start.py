@@ -12,6 +12,7 @@ from dojo_opt.planning.options import Stage
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.task_space.task_term import PeriodicTaskTerm
 from dojo_opt.planning.term import PeriodicTerm
+from sim.mechanism.stance import gaps
 from sim.simulator.horizon import Horizon
 from sim.simulator.simulator import Simulator
 from solvers.riccati import Quadratic, Regularization, backward, value_hessian, work_size
@@ -25,18 +26,35 @@ _ROUNDED = 1e-12  # of the largest gradient: a smaller one is rounding, such as 
 _CURVED = 1e-8  # curvature, relative to that of the components, below which a direction is rounding
 _CYCLES = 200  # a trot takes 20
 _TOLERANCE = 1e-8  # change of the value from one cycle to the next, relative to its largest curvature
+_LOOKS, _NEAR = 8, 0.01  # knots of a guess whose contacts are looked at, and gap of one within reach [m]
 _TRUST = 1e-2  # share of the regularisation that holds the start, relative to the curvature there
 
 
-def fitting_stage(horizon: Horizon, now: Iterate, stages: tuple[Stage, ...]) -> tuple[int, Any]:
+def only_stops(sim: Simulator, xs: Floats) -> bool:
+    """Whether stops of joints are all that smoothing acts on near a guess of states, looked at at some knots.
+
+    Smooth stages find contacts, and where joints with dry friction begin to slide. Stops need none: a smooth one pushes
+    a joint that rests there away, and the plan has to follow it back from stage to stage.
+    """
+    mech = sim.mechanism
+    stops = any(np.isfinite(np.asarray(joint.limits, dtype=np.float64)).any() for joint in mech.joints if joint.limits)
+    if not stops or mech.collisions or any(np.any(joint.friction) for joint in mech.joints):
+        return False
+    some = xs[:: -(-len(xs) // _LOOKS)]
+    return all(float(gaps(mech, x[: sim.nq]).min(initial=np.inf)) > _NEAR for x in some)
+
+
+def fitting_stage(horizon: Horizon, now: Iterate, stages: tuple[Stage, ...], least: int = 0) -> tuple[int, Any]:
     """The stage that a guess of states fits best, and its derivatives; None if no stage can be linearised.
 
     It is the smoothest down to which the guess fits nearly as well as at harder ones. A good reference leaves small
     gaps at a hard contact and large ones at a smooth one, where contact begins above the ground; smoothing it first
     would only lead away from it. A poor one fits nowhere, and needs all the stages.
+
+    least: number of the first stage that counts.
     """
-    best, chosen, there = np.inf, 0, None
-    for i in range(len(stages) - 1, -1, -1):
+    best, chosen, there = np.inf, least, None
+    for i in range(len(stages) - 1, least - 1, -1):
         linear = horizon.linearize(now.x, now.u, stages[i].kappa_eval)
         misfit = np.inf if np.any(linear.status) else float(np.sum(horizon.gaps(linear, now.x) ** 2))
         if misfit <= _GOOD_FIT * best and misfit < np.inf:

@@ -1,12 +1,16 @@
 """iLQR through stages of smoothing, with gaps that open and close."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
+import dojo_opt as dojo
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.planning.ilqr import Solver, ilqr
 from dojo_opt.planning.ilqr_search import Direction, Search
+from dojo_opt.planning.ilqr_start import only_stops
 from dojo_opt.planning.iterate import Iterate
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
@@ -131,6 +135,20 @@ def test_a_good_guess_of_states_skips_the_smooth_stages():
     poor = ilqr(problem, controls=plan.u, states=np.tile([1.0, 0.0], (21, 1)))
     assert poor.history[0]["kappa_eval"] == 3e-2
     assert again.success and poor.success
+
+
+def test_only_stops_of_joints_need_no_smooth_stages():
+    """A shut gripper at its stop took an arm through a hundred iterations."""
+    body, joint = dojo.Body("a", 1.0, shape=dojo.Capsule(0.02, 0.3)), dojo.Joint("revolute", None, "a", limits=(-1, 0))
+    xs = np.zeros((21, 2))
+
+    def found(joint, *contacts):
+        return only_stops(dojo.Simulator(dojo.Mechanism([body], [joint], contacts), time_step=0.02), xs)
+
+    assert found(joint) and found(joint, dojo.Contact("a", height=-0.2))
+    assert not found(joint, dojo.Contact("a", height=-1e-3))
+    assert not found(dataclasses.replace(joint, friction=0.1))
+    assert not found(dataclasses.replace(joint, limits=None))
 
 
 class Lost(Pendulum):

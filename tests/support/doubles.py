@@ -49,7 +49,7 @@ class DiscreteSystem:
         self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
         self.calls: list[float] = []
         dofs, inputs = (tuple(f"{what} {i}" for i in range(n)) for what, n in (("dof", self.nv), ("input", self.nu)))
-        joints = (SimpleNamespace(nv=self.nv),)
+        joints = (SimpleNamespace(nv=self.nv, limits=None),)
         self.mechanism = SimpleNamespace(dof_names=dofs, input_names=inputs, joints=joints)
 
     def neutral(self):
