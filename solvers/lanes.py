@@ -34,6 +34,7 @@ __all__ = [
     "dot_lanes",
     "keep",
     "load",
+    "lowest",
     "minus_outer",
     "plus",
     "plus_outer",
@@ -144,6 +145,18 @@ def _at_least(typing: Any, x: Any, number: Any) -> Any:
 
 
 @intrinsic
+def _lowest(typing: Any, x: Any) -> Any:
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        lanes = [builder.extract_element(args[0], ir.Constant(ir.IntType(32), k)) for k in range(LANES)]
+        while len(lanes) > 1:
+            pairs = zip(lanes[::2], lanes[1::2], strict=True)
+            lanes = [builder.select(builder.fcmp_ordered("<", a, b), a, b) for a, b in pairs]
+        return lanes[0]
+
+    return types.float64(_LANES), lower
+
+
+@intrinsic
 def _root(typing: Any, x: Any) -> Any:
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         kind = ir.FunctionType(_Vector, [_Vector])
@@ -195,6 +208,12 @@ def total(x: Lanes) -> float:
 def at_least(x: Lanes, number: float) -> Lanes:
     """The larger of each lane and the number; the number where a lane is NaN."""
     return np.where(x > number, x, number)
+
+
+@compiled_as(_lowest)
+def lowest(x: Lanes) -> float:
+    """The smallest lane."""
+    return float(x.min())
 
 
 @compiled_as(_root)

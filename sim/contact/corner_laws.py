@@ -15,14 +15,14 @@ from sim.contact.corners import Corners, corners_at, turn_of
 from sim.dynamics.pose_jacobians import columns_to_origin, rows_to_origin
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import Inactive
+from sim.model.record_columns import Corner, Inactive
 from sim.model.slots import Slot
 from solvers.compiler import inlined, kernel, optional
 from solvers.lanes import LANES, Lanes, load, spread, store, total
 from solvers.rotation import transposed_times
 from solvers.types import Matrix, Vector
 
-_WEAK = 32.0  # activation gaps beyond which e (inactive.py) is 1e-2 at most: Newton's method converges without
+_WEAK = 174.0  # activation gaps beyond which e (inactive.py) is 1e-2 at most: Newton's method converges without
 
 
 @inlined
@@ -48,14 +48,30 @@ def _clear(S: Matrix) -> None:
 
 
 @kernel
-def _sum_laws(model: Model, data: Data, h: float, c: int, indefinite: float) -> None:
-    """corner_sums = sum of (1, P x) W C + turning of the arms, in the frame of the contacts, at configuration 3."""
-    S, end = data.corner_sums, model.cluster_end[c]
+def _gather_near(model: Model, data: Data, c: int) -> int:
+    """near_corners = the inactive corners of a cluster that are not weak; returns how many."""
+    C, N, n = data.corners, data.near_corners, 0
+    least = _WEAK * data.inactive[c, Inactive.ACTIVATION]
+    for k in range(c, model.cluster_end[c]):
+        if C[Corner.GAP, k] <= least and C[Corner.OUT, k] > 0.0:
+            for r in range(N.shape[0]):
+                N[r, n] = C[r, k]
+            n += 1
+    return n
+
+
+@kernel
+def _sum_laws(model: Model, data: Data, h: float, c: int, indefinite: float, corners: tuple[Matrix, int, int]) -> None:
+    """corner_sums = sum of (1, P x) W C + turning of the arms, in the frame of the contacts, at configuration 3.
+
+    corners: columns of a matrix like `data.corners` from the second up to the third.
+    """
+    S, (C, first, end) = data.corner_sums, corners
     turn = turn_of(model, data, h, c)
     w, (s0, s1, s2), i = turn.c, turn.s, 1.0 / h
     _clear(S)
-    for j in range(c, end, LANES):
-        k = corners_at(data.corners, j, end, turn, data.inactive[c, Inactive.ACTIVATION], data.carry.inactive_kappa[0])
+    for j in range(first, end, LANES):
+        k = corners_at(C, j, end, turn, data.inactive[c, Inactive.ACTIVATION], data.carry.inactive_kappa[0])
         a, b, d = k.a, k.b, k.c
         f, u, z = k.q * k.total, k.m * k.q, (2.0 * k.m) / (k.total * k.root)
         n = -1.0 * (f / k.gap)
@@ -131,8 +147,9 @@ def _to_world(F: Vector, S: Matrix, out: Vector) -> None:
 
 @optional(Slot.ADD_CORNER_LAWS)
 def add_corner_laws(model: Model, data: Data, h: float, indefinite: float, fresh: bool, out: Matrix) -> None:
-    """out[body] -= laws of the inactive corners, about O.  (nbody, 36)   fresh: of configuration 3, as derivatives have
-    to be; otherwise of a near one.
+    """out[body] -= laws of the inactive corners, about O.  (nbody, 36)
+
+    fresh: of configuration 3, and all of them, as derivatives need; otherwise of a near one, without the weak ones.
     """
     B, o = data.corner_block, data.origin
     for m in range(data.inactive_count[0]):
@@ -142,9 +159,12 @@ def add_corner_laws(model: Model, data: Data, h: float, indefinite: float, fresh
         if row[Inactive.CORNERS] == 0.0 or (weak and not fresh):
             continue
         if fresh or row[Inactive.SHARE] != indefinite:
-            _sum_laws(model, data, h, c, indefinite)
+            if fresh:
+                _sum_laws(model, data, h, c, indefinite, (data.corners, c, model.cluster_end[c]))
+            else:
+                _sum_laws(model, data, h, c, indefinite, (data.near_corners, 0, _gather_near(model, data, c)))
             _to_world(model.contact_frame[c], data.corner_sums, data.corner_law[c])
-            row[Inactive.SHARE] = indefinite
+            row[Inactive.SHARE], row[Inactive.DRIFT] = indefinite, 0.0
         i = model.contact_body[c]
         for k in range(36):
             B[k] = data.corner_law[c, k]

@@ -25,7 +25,7 @@ from sim.model.model import Law, Model
 from sim.model.record_columns import Cluster, Cone, ContactRow, Corner, Inactive
 from sim.model.slots import Slot
 from solvers.compiler import inlined, kernel, optional
-from solvers.lanes import LANES, Lanes, at_least, keep, load, root, spread, store, total
+from solvers.lanes import LANES, Lanes, at_least, keep, load, lowest, root, spread, store, total
 from solvers.rotation import Vec3, cross, put_three, times, transposed_times
 from solvers.types import Matrix
 
@@ -58,6 +58,7 @@ class Corners(NamedTuple):
     total: Lanes  # S
     q: Lanes  # of inactive corners, 0 of the others
     m: Lanes  # 2 mu^2
+    weight: Lanes  # 1 of inactive corners, 0 of the others
 
 
 @kernel
@@ -99,19 +100,20 @@ def corners_at(C: Matrix, j: int, end: int, turn: Turn, least_gap: float, kappa:
     m = 2.0 * (mu * mu)
     r = root(gap * gap + (2.0 * m) * (x * x + y * y))
     s = gap + r
-    return Corners(a, b, c, gap, x, y, r, s, (kappa * weight) / (gap * s), m)
+    return Corners(a, b, c, gap, x, y, r, s, (kappa * weight) / (gap * s), m, weight)
 
 
 @optional(Slot.EVALUATE_CORNERS)
 def evaluate_corners(model: Model, data: Data, h: float, c: int) -> None:
-    """Impulses of the inactive corners of a cluster at configuration 3: FORCE, ARMS and LEAST_GAP of Inactive, and the
-    cone variables of each.
+    """Impulses of the inactive corners of a cluster at configuration 3: FORCE, ARMS and LEAST_GAP of Inactive, and GAP,
+    IMPULSE and FRICTION of each corner.
     """
     row, C, end = data.inactive[c], data.corners, model.cluster_end[c]
     turn = turn_of(model, data, h, c)
     o = spread(0.0)
     N, X, Y = o, o, o
     n0, n1, n2, x0, x1, x2, y0, y1, y2 = o, o, o, o, o, o, o, o, o
+    near = _FAR
     for j in range(c, end, LANES):
         k = corners_at(C, j, end, turn, row[Inactive.ACTIVATION], data.carry.inactive_kappa[0])
         f, along = k.q * k.total, k.m * k.q
@@ -121,6 +123,7 @@ def evaluate_corners(model: Model, data: Data, h: float, c: int) -> None:
         n0, n1, n2 = n0 + f * px, n1 + f * py, n2 + f * pz
         x0, x1, x2 = x0 + fx * px, x1 + fx * py, x2 + fx * pz
         y0, y1, y2 = y0 + fy * px, y1 + fy * py, y2 + fy * pz
+        near = min(near, lowest(k.gap + _FAR * (spread(1.0) - k.weight)))
         store(C, Corner.GAP, j, k.gap)
         store(C, Corner.IMPULSE, j, f)
         store(C, Corner.FRICTION1, j, fx)
@@ -132,20 +135,18 @@ def evaluate_corners(model: Model, data: Data, h: float, c: int) -> None:
     put_three((total(n0), total(n1), total(n2)), Inactive.ARMS, row)
     put_three((total(x0), total(x1), total(x2)), Inactive.ARMS + 3, row)
     put_three((total(y0), total(y1), total(y2)), Inactive.ARMS + 6, row)
-    row[Inactive.LEAST_GAP] = _write_cones(model, data, c)
+    row[Inactive.LEAST_GAP] = near
 
 
 @kernel
-def _write_cones(model: Model, data: Data, c: int) -> float:
-    """Cone variables of the inactive corners of a cluster as they were evaluated; returns their least gap."""
-    C, near = data.corners, _FAR
+def write_cones(model: Model, data: Data, c: int) -> None:
+    """Cone variables of the inactive corners of a cluster as they were evaluated last."""
+    C = data.corners
     for k in range(c, model.cluster_end[c]):
         if C[Corner.OUT, k] > 0.0:
             z = data.cone[k]
             z[Cone.SLACK], z[Cone.IMPULSE] = C[Corner.GAP, k], C[Corner.IMPULSE, k]
             z[Cone.FRICTION1], z[Cone.FRICTION2] = C[Corner.FRICTION1, k], C[Corner.FRICTION2, k]
-            near = min(near, z[Cone.SLACK])
-    return near
 
 
 @optional(Slot.REPORT_CORNERS)

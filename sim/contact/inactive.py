@@ -8,7 +8,7 @@ direction, is inactive if its stiffness, relative to the inertia behind it, is b
 
 n: contacts of the mechanism with the ground, a: half the gap that is ahead, W: largest |J^-1/2 (r x f)| of a unit
 impulse f, J0: least moment of inertia, p: mean point. Contacts of a near cluster are inactive up to e = 1e-2, in
-derivatives active (stiff_contacts.py); of a cluster of many points up to 10, with their stiffness in the matrix
+derivatives active (stiff_contacts.py); of a cluster of many points up to 300, with their stiffness in the matrix
 (corner_laws.py).
 Derivation: docs/theory/inactive_contacts.md.
 
@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.contact.corners import gather_corners, least_corner_gap
+from sim.contact.corners import gather_corners, least_corner_gap, write_cones
 from sim.contact.far_contacts import choose_far, far_gap, has_far_activated
 from sim.contact.pairs.inactive_pairs import COUPLED
 from sim.contact.terrain_contact import terrain_gap
@@ -35,8 +35,8 @@ from solvers.dense import clear
 from solvers.rotation import rotate, three
 from solvers.types import Matrix
 
-_UNSTEADY = 0.1  # share of the motion in the step before by which the motion of corners in this one may differ
-_STIFFEST = 10.0  # largest e of the inactive corners of a cluster, whose stiffness the matrix does not omit
+_UNSTEADY = 0.03  # share of the motion in the step before by which the motion of corners in this one may differ
+_STIFFEST = 300.0  # largest e of the inactive corners of a cluster, whose stiffness the matrix does not omit
 
 
 @kernel
@@ -126,7 +126,7 @@ def _sort(model: Model, data: Data, options: StepOptions, c: int, a: float) -> f
         row[Inactive.STIFF] = row[Inactive.CORNERS] = 1.0
         if gather_corners(model, data, c, 2.0 * a, _UNSTEADY * _travel(model, data, c)) or corners == 0.0:
             row[Inactive.LEAST_GAP] = 0.0
-            row[Inactive.SHARE] = -1.0
+        row[Inactive.SHARE] = -1.0  # that of a step before may be of another length
         return a
     for k in range(c, model.cluster_end[c]):
         data.contact_out[k] = 1 if a > 0.0 else 0
@@ -245,6 +245,8 @@ def _came_near(model: Model, data: Data, c: int) -> bool:
     """Whether contacts of the inactive cluster c have become active at configuration 3; they are from now on."""
     row = data.inactive[c]
     found = False
+    if model.cluster[c, Cluster.CORNERS] > 0.0:
+        write_cones(model, data, c)
     if row[Inactive.CORNERS] > 0.0 and least_corner_gap(model, data, c) >= row[Inactive.ACTIVATION]:
         return False
     if row[Inactive.STIFF] == 0.0:

@@ -20,6 +20,8 @@ from solvers.compiler import inlined, kernel
 from solvers.rotation import Vec3, cross, put_three, rotate, three, transposed_times
 from solvers.types import Vector
 
+_DRIFT = 1.0  # bound of the relative change of a law of corners, up to which it stays in the matrix
+
 
 @kernel
 def changes(model: Model, data: Data, h: float, c: int) -> tuple[float, float]:
@@ -61,7 +63,7 @@ def update_inactive(model: Model, data: Data, h: float) -> None:
                 evaluate_on_terrain(model, data, h, c)
         elif not law <= fraction:
             if model.cluster[c, Cluster.CORNERS] > 0.0:
-                _evaluate_corners(model, data, h, c)
+                _evaluate_corners(model, data, h, c, law)
             else:
                 _evaluate(model, data, h, c)
         elif data.inactive[c, Inactive.TURNED] > 0.0 or law + arms > fraction:
@@ -174,14 +176,23 @@ def _evaluate(model: Model, data: Data, h: float, c: int) -> None:
 
 
 @kernel
-def _evaluate_corners(model: Model, data: Data, h: float, c: int) -> None:
-    """`_evaluate` of a cluster of corners, of which all are inactive if it is so as a whole."""
+def _evaluate_corners(model: Model, data: Data, h: float, c: int, law: float) -> None:
+    """`_evaluate` of a cluster of corners, of which all are inactive if it is so as a whole.
+
+    law: of `changes`. The matrix keeps the law of a near motion: iterates hardly move from there, and the bound is that
+    of all corners at the least gap, many times the change of their stiffness.
+    """
     row = data.inactive[c]
+    if law < 1e300:
+        row[Inactive.DRIFT] += (
+            law * (1.0 + model.cluster[c, Cluster.FRICTION]) / (row[Inactive.BY_GAP] * row[Inactive.LEAST_GAP])
+        )
+    if not (law < 1e300 and row[Inactive.DRIFT] < _DRIFT):
+        row[Inactive.SHARE] = -1.0
     keep_motion(data, h, model.contact_body[c], row)
     if row[Inactive.CORNERS] == 0.0:
         gather_corners(model, data, c, -1e300, 0.0)
     evaluate_corners(model, data, h, c)
-    row[Inactive.SHARE] = -1.0
     bound_changes(model, data, c, (1.0 - NEARER) * row[Inactive.LEAST_GAP])
     _bound_turn(row)
     row[Inactive.RADIUS_ARMS] = row[Inactive.RADIUS_ARMS + 1] = row[Inactive.TURNED] = 0.0

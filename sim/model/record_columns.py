@@ -127,6 +127,7 @@ class Inactive(Code):
     STIFF = 37  # 1 where derivatives do not omit it
     CORNERS = 38  # 1 where its law is in the matrix (contact/corners.py)
     SHARE = 39  # `indefinite` of the law in corner_law; -1 where that has not been evaluated
+    DRIFT = 40  # bound of the relative change of that law since it was evaluated
 
 
 class Corner(Code):

@@ -9,6 +9,7 @@ from solvers.lanes import (
     dot_lanes,
     keep,
     load,
+    lowest,
     minus_outer,
     plus,
     plus_outer,
@@ -40,6 +41,7 @@ def _rows(S, P):
 def _roots(A, bound):
     x, y = load(A, 0, 0), load(A, 1, 0)
     store(A, 2, 0, root(at_least(x, bound)) / y)
+    A[3, 0] = lowest(x)
 
 
 def both(kernel, *arguments):
@@ -53,8 +55,9 @@ def both(kernel, *arguments):
 
 
 def test_roots_quotients_and_bounds(rng):
-    A = rng.normal(size=(3, LANES))
+    A = rng.normal(size=(4, LANES))
     out, bound = both(_roots, A, 0.1)
+    assert out[3, 0] == A[0].min()
     np.testing.assert_allclose(out[2], np.sqrt(np.maximum(A[0], 0.1)) / A[1], rtol=1e-14)
 
 
