@@ -179,7 +179,8 @@ class Drawn:
         if self.touch is not None:
             felt = self.sim.step_batch(*asked, False, *given, contacts=True) if derivatives else found
             assert felt.contacts is not None
-            x[:, -6 * self.touch.count :] = self.touch.wrenches(felt.x, felt.contacts).reshape(len(x), -1)
+            numbers = 6 * self.touch.count
+            x[:, -numbers:] = self.touch.wrenches(felt.x, felt.contacts).reshape(len(x), numbers)
         return replace(found, x=x)
 
     def motion(self, impulses: RowImpulses) -> RowMotion:

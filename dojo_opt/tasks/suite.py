@@ -146,7 +146,7 @@ class SuiteTask:
         return closed_loop(self.mpc, plant, duration, fallen=self.lost, finished=self.finished)
 
     def outcome(self, loop: ClosedLoop) -> TaskOutcome:
-        """How a run ended.
+        """How a run ended. One that is shorter than the task, and has not achieved its aim before, is no success.
 
         Args:
             loop: a run of this task.
@@ -158,7 +158,10 @@ class SuiteTask:
         ms = milliseconds(loop.log, cpu=True)
         times = (float(np.median(ms)), float(np.percentile(ms, 99))) if ms.size else (np.nan, np.nan)
         depth = max(0.0, -float(loop.contacts.gap.min(initial=np.inf)))
-        return TaskOutcome(loop.survived and done, measures, *times, depth, sum(tick.fallback for tick in loop.log))
+        lasted = loop.duration > self.duration - 0.5 * self.model.time_step
+        early = self.finished is not None and self.finished(loop.duration, loop.x[-1])
+        fallbacks = sum(tick.fallback for tick in loop.log)
+        return TaskOutcome(loop.survived and done and (lasted or early), measures, *times, depth, fallbacks)
 
 
 def timed(rate: float) -> dict[str, Any]:

@@ -30,7 +30,8 @@ class _Values:
 class AdjustableSimulator(Simulator):
     """A simulator that its owner changes in place, because a new one for every measurement would take too long.
 
-    Only motions change: `mechanism`, `parameters`, `describe` and copies keep the values that it was made with.
+    Only motions change: `mechanism`, `parameters`, `describe`, copies, and rows of `step_batch` with own parameters
+    keep the values that it was made with.
     """
 
     def __init__(self, *arguments: Any, **settings: Any) -> None:

@@ -167,6 +167,15 @@ def test_observations_and_rewards_of_the_cheetah_agree_with_mujoco():
     np.testing.assert_allclose(reward, data.qpos[0] / 0.05 - 0.1 * np.sum(action**2), atol=1e-2)
 
 
+def test_forces_of_environments_that_are_over_together():
+    """With the default reset, a step then moves none of them."""
+    options = {"include_cfrc_ext_in_observation": True, "max_episode_steps": 2}
+    envs = gymnasium.make_vec("dojo/Ant-v0", num_envs=2, **options)
+    first, _ = envs.reset(seed=0)
+    ends = [envs.step(np.zeros((2, 8)))[3].all() for _ in range(4)]
+    assert ends == [False, True, False, False] and first.shape == envs.step(np.zeros((2, 8)))[0].shape
+
+
 @pytest.mark.slow
 def test_forces_of_contacts_are_those_of_mujoco():
     """Ants that have come to rest in both: the same bodies press, in Gymnasium's order; all forces add up to the

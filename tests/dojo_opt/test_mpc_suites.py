@@ -45,7 +45,8 @@ def test_the_spinner_starts_to_turn():
     assert loop.x[-1, 2] > 0.5
     outcome = task.outcome(loop)
     assert outcome.penetration < 1e-4
-    assert set(outcome.measures) == {"mean speed [rad/s]"}
+    assert set(outcome.measures) == {"mean speed [rad/s]"} and not outcome.success
+    assert replace(task, duration=1.5).outcome(loop).success == (0.8 < outcome.measures["mean speed [rad/s]"] < 1.2)
 
 
 @pytest.mark.slow

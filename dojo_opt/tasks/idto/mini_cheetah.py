@@ -11,6 +11,7 @@ from dojo_opt.plant.closed_loop import ClosedLoop
 from dojo_opt.tasks.free_gait import GaitWeights, free_gait_mpc
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
 from dojo_opt.tasks.suite import SuiteTask
+from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.collision import Collision
 from sim.mechanism.contact import Contact
@@ -221,6 +222,7 @@ def mini_cheetah_hills(*, count: int = 5, speed: float = 0.4, **settings: Any) -
         ValueError: for an argument out of range.
     """
     count = whole_number("idto.mini_cheetah_hills(count=...)", count)
+    checks.number("idto.mini_cheetah_hills(speed=...)", speed, above=0.0)
     way = _FIRST + _APART * count - 0.5
     task = mini_cheetah(speed=speed, terrain=hills(count), **settings)
     judge, duration = _Walked(way), 8.0 / speed * way / 6.5
@@ -228,7 +230,7 @@ def mini_cheetah_hills(*, count: int = 5, speed: float = 0.4, **settings: Any) -
 
 
 class _Walked:
-    """Whether the robot gets `far` [m] on its feet."""
+    """Whether the robot gets `far` [m] on its feet, backward where that is negative."""
 
     def __init__(self, far: float) -> None:
         self._far = far
@@ -239,4 +241,5 @@ class _Walked:
         pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
         way, low = float(loop.x[-1, 0] - loop.x[0, 0]), float(loop.x[:, 2].min())
         tilt = float(max(np.abs(roll).max(), np.abs(pitch).max()))
-        return way >= self._far and low > _LOW and tilt < _TILT, {"way [m]": way, "lowest [m]": low, "tilt [rad]": tilt}
+        done = way * np.sign(self._far) >= abs(self._far) and low > _LOW and tilt < _TILT
+        return done, {"way [m]": way, "lowest [m]": low, "tilt [rad]": tilt}
