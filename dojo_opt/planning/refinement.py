@@ -60,7 +60,7 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
             options.say(f"Refinement: every time step divided by {count}:")
             plans.append(solve(problem.refined(count), plans[-1], left))
         if asked is None or not plans[-1].success:
-            return _joined(plans, began, options)
+            return plans[0] if len(plans) == 1 else _joined(plans, began, options)  # as its own last line has it
         try:
             apart = replay_error(plans[-1])
         except KeyboardInterrupt:
