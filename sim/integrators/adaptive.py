@@ -25,6 +25,7 @@ from sim.integrators.runge_kutta import advance
 from sim.integrators.runge_kutta import begin as begin_node
 from sim.integrators.substep_lengths import (
     before_impact,
+    before_stop,
     lengthen,
     lengthen_kink,
     next_length,
@@ -236,7 +237,7 @@ def attempt(
     long = min(clock[Clock.LONG], rest, reach)
     if long < rest < 2.0 * long:
         long = 0.5 * rest
-    short = min(clock[Clock.SHORT], clock[Clock.CUT], rest, before_impact(clock))
+    short = before_stop(clock, min(clock[Clock.SHORT], clock[Clock.CUT], rest, before_impact(clock)))
     if clock[Clock.BEYOND] > 0.0:
         short, long = min(clock[Clock.BEYOND], rest), 0.0
     if short < rest < 2.0 * short and clock[Clock.BEYOND] == 0.0:

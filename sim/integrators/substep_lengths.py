@@ -17,6 +17,7 @@ _TRIES = 4.0  # lengths 5, 25, ... times the shortest that are tried in turn, wh
 _STALLED = 0.5  # error of an impact over that in a longer step
 _SLIGHT, _LARGE = 0.1, 1.0  # errors of impacts, in accuracies
 _PRESSED = 8.0  # error over allowed of a step of order 2 in contact, over that of the same step of order 4
+_SOON = 0.01  # share of a length: contacts that stop sliding before are not waited for
 _UP_TO, _NEARLY, _HALF_WAY = 0.98, 16.0, 0.5  # of the time to an impact; where impacts are so much shorter than it
 
 
@@ -149,3 +150,10 @@ def before_impact(clock: Vector) -> float:
 def before_landing(h: float, ahead: float) -> float:
     """Length of a step that ends before contacts that the last one, of length h, reached after the time `ahead`."""
     return max(min(_UP_TO * ahead, 0.5 * h if ahead >= h else h), 0.02 * h)
+
+
+@kernel
+def before_stop(clock: Vector, h: float) -> float:
+    """The length h, or as far as to where a contact stops sliding."""
+    left = clock[Clock.STOP] - clock[Clock.TIME]
+    return left if _SOON * h < left < h else h

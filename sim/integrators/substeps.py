@@ -15,6 +15,7 @@ from solvers.status import Status
 from solvers.types import Cube, Integers, Matrix, Vector
 
 _SOLVED = int(Status.SOLVED)
+_SLIPS = 1e-3  # [m/s] slower contacts rest
 
 
 class Clock(Code):
@@ -49,6 +50,7 @@ class Clock(Code):
     STALLS = 26  # impacts refused in a row that were no more exact than the one before
     ROUGH = 27  # length of the step just tried over the longest of order 4, 0 where that is not known
     ENDED = 28  # 1 where `settled` of a SubstepState are the nodes where the impact of the step just tried has ended
+    STOP = 29  # time when the first contact stops sliding, at its deceleration [s]
 
 
 class AccuracyGoal(Code):
@@ -77,7 +79,7 @@ class SubstepState(NamedTuple):
     node: Vector  # (nx,) scratch: the node after the undivided step
     ahead: Vector  # (nx,) scratch: mean state of a step from there
     settled: Matrix  # (2, nx) scratch: nodes a short step after that, and after the halves
-    clock: Vector  # (29,) in place
+    clock: Vector  # (30,) in place
     report: Vector  # (9,) in place; PARTS counts the sub-steps
     parts: Cube  # (3, ncontact, 11) scratch: contacts of both halves, and of the whole step
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the step
@@ -109,7 +111,7 @@ def begin_substeps(line: SubstepState, end: float) -> None:
     clock[Clock.SHORT] = clock[Clock.LONG] = end
     clock[Clock.SHORT_RATIO] = clock[Clock.LONG_RATIO] = 1.0
     clock[Clock.LEAST] = clock[Clock.CUT] = clock[Clock.IMPACT] = NEVER
-    clock[Clock.CEILING] = NEVER
+    clock[Clock.CEILING] = clock[Clock.STOP] = NEVER
     clock[Clock.BEGUN] = 1.0
     for c in range(line.slips.shape[0]):
         line.slips[c] = BEGINS
@@ -128,12 +130,25 @@ def keep(line: SubstepState, h: float, order: int) -> None:
     line.clock[Clock.CUT] = line.clock[Clock.LEAST] = NEVER
     line.clock[Clock.REFUSED] = 0.0
     line.clock[Clock.BEYOND] = line.clock[Clock.ANY] = 0.0
+    line.clock[Clock.STOP] = NEVER
     if order == 8 or line.clock[Clock.HIT] > 0.0:
         line.clock[Clock.IMPACT] = NEVER
         line.clock[Clock.MISS] = line.clock[Clock.STALLS] = 0.0
     if order != 8:
         line.clock[Clock.READY] = 0.0
         add_contacts(line)
+        line.clock[Clock.STOP] = line.clock[Clock.TIME] + _time_to_stop(line, h)
+
+
+@kernel
+def _time_to_stop(line: SubstepState, h: float) -> float:
+    """Time until the first contact that slides stops, at the deceleration in the two halves of a step [s]."""
+    time = NEVER
+    for c in range(line.slips.shape[0]):
+        slower = line.parts[0, c, ContactRow.SLIP] - line.parts[1, c, ContactRow.SLIP]
+        if slower > 0.0 and line.slips[c] > _SLIPS and three(line.parts[1, c], ContactRow.IMPULSE) != (0.0, 0.0, 0.0):
+            time = min(time, 0.5 * h * line.slips[c] / slower)
+    return time
 
 
 @kernel

@@ -79,6 +79,7 @@ def test_a_block_slides_as_far_as_it_should(accuracy: float, steps: int) -> None
     sim = dojo.Simulator(block(friction=0.3), accuracy=accuracy)
     motion = sim.rollout(placed(sim, 0.25, 2.0), steps=steps, duration=1.0, throw=True)
     assert abs(motion.x[-1][0] - 2.0**2 / (2.0 * 0.3 * G)) < 3.0 * accuracy
+    assert steps > 1 or motion.parts[0] < 10  # a step ends where it stops
     impulse = motion.contacts.impulse.sum(axis=(0, 1))
     assert impulse == pytest.approx([-2.0, 0.0, G], abs=0.1 + 0.25 * G / steps)
 
