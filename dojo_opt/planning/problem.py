@@ -248,8 +248,8 @@ class Problem:
     def exclusive(self) -> Iterator[Problem]:
         """This problem; for a second user at the same time, such as another thread, one with terms of its own.
 
-        Yields:
-            The problem whose terms may be written into.
+        Returns:
+            A context with the problem whose terms may be written into.
         """
         with _IN_USE_LOCK:
             free = id(self) not in _IN_USE
