@@ -197,8 +197,12 @@ ANSWERS: tuple[Any, ...] = (np.full(2, np.nan), None, "a", np.zeros(3), np.ones(
 def test_wrong_answers_of_users_functions_are_refused_by_name() -> None:
     plant = dojo.Plant(dojo.Simulator(dojo.models.pendulum(), 0.05))
     for answer in ANSWERS:
-        loop = dojo.closed_loop(lambda time, x: np.zeros(1), plant, 0.1, reference=lambda times, answer=answer: answer)
-        check_refused(loop.rms, "closed_loop(reference=...)")
+        check_refused(
+            lambda answer=answer: dojo.closed_loop(
+                lambda time, x: np.zeros(1), plant, 0.1, reference=lambda times: answer
+            ),
+            "closed_loop(reference=...)",
+        )
         lines = np.linspace(0.0, 1.0, 4)
         check_refused(
             lambda answer=answer, lines=lines: dojo.Terrain.from_function(lambda X, Y: answer, lines, lines),

@@ -58,7 +58,7 @@ class Disturbances:
         if not np.all((noise >= 0.0) & np.isfinite(noise)):
             raise ValueError(f"{call}(noise=...): expected numbers >= 0, got {checks.shown(self.noise)}")
         for name in ("push", "push_time", "payload", "friction", "slope"):
-            if (given := getattr(self, name)) is not None:
+            if (given := getattr(self, name)) is not None or name != "friction":
                 low, high = checks.vector(f"{call}({name}=...)", given, 2)
                 if not low <= high:
                     raise ValueError(f"{call}({name}=...): expected (low, high) with low <= high, got {given!r}")

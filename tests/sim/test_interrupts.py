@@ -73,7 +73,7 @@ ROLLOUTS = {  # calls of so many steps; enough of them take a second
     "higher order, far": (lambda n: FALLING.rollout(FLYING, inputs(FALLING, n)), 600_000),
     "higher order, near": (lambda n: FALLING.rollout(RESTING, inputs(FALLING, n)), 300_000),
     "higher order, near, closed loop": (
-        lambda n: FALLING.rollout_feedback(RESTING, inputs(FALLING, n // 100), substeps=100),
+        lambda n: FALLING.rollout_feedback(RESTING, inputs(FALLING, n // 20), substeps=20),
         300_000,
     ),
 }
