@@ -17,7 +17,7 @@ from sim.solve.inequalities import (
 )
 from sim.solve.merit import residuals
 from sim.solve.prediction import predict, predictable
-from sim.solve.trial_velocity import INFEASIBLE, move_trial_velocity, set_trial_velocity
+from sim.solve.trial_velocity import INFEASIBLE, set_trial_velocity
 from solvers.compiler import inlined, kernel
 from solvers.types import Vector
 
@@ -161,7 +161,8 @@ def at_kappa(
 ) -> KnownStart:
     """At the guess with the impulses kappa / gap, where they all but balance.
 
-    Active features are those at the incoming velocity, whatever the guess: a step has one solution, with every guess.
+    Next to pairs of bodies at the incoming velocity, whatever the guess: their features are chosen at the start, and a
+    step has one solution.
     """
     q, v, u = inputs
     h = options.h
@@ -173,7 +174,8 @@ def at_kappa(
     placed = True  # most guess the incoming velocity: there already
     for d in range(v.shape[0]):
         placed = placed and velocity[d] == v[d]
-    if not placed and not move_trial_velocity(model, data, h, q, velocity):
+    placed = placed or data.active_count[0] > data.active_ground_count[0]
+    if not placed and not set_trial_velocity(model, data, h, q, velocity, 1.0):
         return KnownStart(False, kappa, INFEASIBLE, 1.0, False)
     start_inequalities(model, data, h, kappa, 0.0)
     hard = residuals(model, data, h, q, v, u)

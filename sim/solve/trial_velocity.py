@@ -16,34 +16,15 @@ INFEASIBLE = (1e300, 1e300)  # residuals where no trial velocity is feasible
 
 @kernel
 def set_trial_velocity(model: Model, data: Data, h: float, q: Vector, v: Vector, fraction: float) -> bool:
-    """nu = fraction v, slowed down until no body turns by half a turn; False if that fails. Features of shapes that are
-    active are chosen there.
-    """
-    if not _place(model, data, h, q, v, fraction):
-        return False
-    choose_pairs(model, data)
-    inequality_kinematics(model, data, h)
-    return True
-
-
-@kernel
-def move_trial_velocity(model: Model, data: Data, h: float, q: Vector, v: Vector) -> bool:
-    """nu = v, likewise, with the features that are active already."""
-    if not _place(model, data, h, q, v, 1.0):
-        return False
-    inequality_kinematics(model, data, h)
-    return True
-
-
-@kernel
-def _place(model: Model, data: Data, h: float, q: Vector, v: Vector, fraction: float) -> bool:
-    """nu = fraction v, slowed down, with configuration 3 of all bodies."""
+    """nu = fraction v, slowed down until no body turns by half a turn; False if that fails."""
     for _ in range(30):
         for d in range(v.shape[0]):
             data.nu[d] = fraction * v[d]
             data.nu_trial[d] = data.nu[d]
         if momentum_balance(model, data, h, q):
             turn_bodies(data, data.rot3)
+            choose_pairs(model, data)
+            inequality_kinematics(model, data, h)
             return True
         fraction *= 0.7
     return False
