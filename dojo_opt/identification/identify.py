@@ -394,7 +394,10 @@ def _descend(fit: ShootingFit, stage: _Stage, began: float, history: list[dict[s
                 ahead = fit.weigh(trial, usable)[0] + fit.pull(theta)
                 gain, share = (cost - ahead) / cost, (cost - ahead) / now.decrease
                 accepted = share > _POOR
-            damping = 4.0 * damping if not accepted else max(damping / 5.0, _LEAST) if share > _GOOD else damping
+            if not accepted:
+                damping *= 4.0
+            elif share > _GOOD:
+                damping = max(damping / 5.0, _LEAST)
         if expected is None or not accepted:
             return Status.LINE_SEARCH
         size = float(np.linalg.norm((theta - fit.theta) / fit.unit))

@@ -191,9 +191,7 @@ class ParameterSpace:
             out[group.columns] = group.chart is inertia_coordinates.body_of
         return out
 
-    def _append(
-        self, names: Sequence[str], chart: Chart, rows: Mapping[str, tuple[float, float, float, float]]
-    ) -> None:
+    def _append(self, names: Sequence[str], chart: Chart, rows: Mapping[str, _Row]) -> None:
         """Coordinates by their labels."""
         first = len(self._rows)
         checks.distinct("ParameterSpace", (*self._rows, *rows))

@@ -128,7 +128,7 @@ class Velocity(TaskSpec):
 
 def needs_order_two(call: str, sim: Simulator) -> None:
     """Refuse simulators whose states have velocities at nodes."""
-    if sim.order != 2:
+    if not sim.mean_over:
         raise ValueError(f"{call}: expected a Simulator of order 2, whose velocities are means, got {sim!r}")
 
 
