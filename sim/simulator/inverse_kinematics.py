@@ -123,10 +123,10 @@ def ik(
     errors = search.errors(q, r)
     worst = max(errors, key=lambda name: errors[name])
     success = errors[worst] <= tolerance
-    off = f"{worst!r} stays {errors[worst]:.3g} {'from its target' if worst in wanted else 'open'}"
     message = f"All targets are met to {errors[worst]:.2g}."
     if not success:
-        message = f"{off}: out of reach, or too far from start."
+        where = "from its target" if worst in wanted else "open"
+        message = f"{worst!r} stays {errors[worst]:.3g} {where}: out of reach, or too far from start."
     return IkResult(q, success, message, errors[worst], errors, count)
 
 

@@ -165,8 +165,8 @@ class StateSpace:
         Raises:
             ValueError: no such state is found; the message names the loop joint or gear that stays open, and its gap.
         """
-        state = self._placed("close", x)
-        return Closure(self.mechanism, self._states).close(state) if self._closes else state
+        state, closure = self._placed("close", x), self.closure()
+        return state if closure is None else closure.close(state)
 
     def _placed(self, method: str, x: ArrayLike) -> Floats:
         """A state whose bodies have poses and velocities that are finite."""
@@ -211,12 +211,12 @@ class StateSpace:
         Raises:
             ValueError: the mechanism has neither loops nor gears.
         """
-        if not self._closes:
+        closure = self.closure()
+        if closure is None:
             raise ValueError(
                 f"Simulator.loop_rank: {self.mechanism.name!r} has no joint that closes a loop, and no gear"
             )
-        state = self.neutral() if x is None else self._placed("loop_rank", x)
-        return Closure(self.mechanism, self._states).rank(state)
+        return closure.rank(self.neutral() if x is None else self._placed("loop_rank", x))
 
     def state_from_velocity(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """State with coordinates q (nq,) whose velocity at the node is v (nv,).
