@@ -34,6 +34,7 @@ from dojo_opt.planning.refinement import refine
 from dojo_opt.planning.subproblem import Subproblem
 from sim.mechanism import checks
 from sim.mechanism.renamed import renamed_keywords
+from sim.model.interruptible_loops import TimeUp, ends_at
 from sim.simulator.derivative_results import Linearization
 from sim.simulator.results import Interrupted
 from solvers.riccati import PredictedChange
@@ -118,19 +119,14 @@ def ilqr(
     check_executor("ilqr", executor)
     checks.whole_number("ilqr(seed=...)", seed, 0)
     if checks.whole_number("ilqr(starts=...)", starts) > 1:
-        guess = (controls, states, warm_start)
-        return multi_start(ilqr, problem, guess, {"options": options}, starts, seed, executor)
+        return multi_start(ilqr, problem, (controls, states, warm_start), {"options": options}, starts, seed, executor)
     if problem.refinement != 1:
         problem.refined(problem.refinement)  # which refuses a wrong one before any work
     with problem.exclusive() as own:
         plan = Solver(own, options).solve(controls, states, warm_start)
         if plan.success:
-            plan = refine(own, plan, options, _solve_again)
+            plan = refine(own, plan, options, lambda finer, last, left: Solver(finer, left).solve(warm_start=last))
     return plan if own is problem else of_problem(plan, problem)
-
-
-def _solve_again(finer: Problem, last: Plan, left: Options) -> Plan:
-    return Solver(finer, left).solve(warm_start=last)
 
 
 class _Attempt(NamedTuple):
@@ -266,7 +262,7 @@ class Solver:
         if xs is not None:
             xs = self.states("ilqr(states=...)", problem.check_states("ilqr(states=...)", xs))
             self._begin(self.guess(xs, us))
-            return self._attempts(duals)
+            return self._in_time(duals)
         idle = Iterate(np.tile(problem.start, (problem.horizon + 1, 1)), us)
         kappa = self.options.stages[0].kappa_eval
         shot = self._search.rollout(idle, None, kappa)
@@ -275,7 +271,7 @@ class Solver:
             reason = Status(int(shot.status))
             return Status.SIMULATION_FAILED, f" Knot {int(shot.solved_knots)}, {reason.name}: {MESSAGES[reason]}"
         self._begin(self._search.iterate_of(shot, None, kappa))
-        return self._attempts(duals)
+        return self._in_time(duals)
 
     def _begin(self, now: Iterate) -> None:
         """Start from another trajectory."""
@@ -283,6 +279,14 @@ class Solver:
         self._subproblem.forget()
         self.now = now
         self._begun = True  # from here on Ctrl-C leaves a plan
+
+    def _in_time(self, duals: tuple[Sequence[Matrix], ...]) -> tuple[Status, str]:
+        """`_attempts`, whose rollouts and derivatives end at the time limit."""
+        with ends_at(self._history.began + self.options.time_limit):
+            try:
+                return self._attempts(duals)
+            except TimeUp:
+                return Status.TIME_LIMIT, ""
 
     def _attempts(self, duals: tuple[Sequence[Matrix], ...]) -> tuple[Status, str]:
         """Attempts from the guess, each beginning at a stage, until one is good; else that with the least violation.
@@ -507,9 +511,8 @@ class Solver:
         return self._history.add(**merit, **kappas, **step, violation=self.objective.violation(now.x, now.u))
 
     def _recover(self, stage: Stage, kappa_grad: float) -> float | None:
-        """After several failed searches: close open gaps, else bring the derivatives nearer to the rollouts.
-
-        Returns the smoothing of the derivatives from now on, None when there is nothing to change.
+        """After several failed searches: close open gaps, else bring the derivatives nearer to the rollouts. The
+        smoothing of the derivatives from now on, None when there is nothing to change.
         """
         if self.now.gaps is not None:
             return kappa_grad if self._close_gaps(stage) else None
@@ -576,7 +579,7 @@ class Solver:
             K=local.K.copy(),
             k=local.k.copy(),
             violation=violation,
-            gap=now.gap,
+            gap=np.inf if now.kappa is None else now.gap,
             seconds=time.perf_counter() - history.began,
             time_step=float(self.problem.sim.time_step),
             substeps=self.problem.substeps,

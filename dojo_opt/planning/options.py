@@ -97,7 +97,8 @@ class Options:
             2).
         multiple_shooting_below: with open gaps, a step size below this is compared with a step of multiple shooting; 0
             for single shooting only (default 1).
-        time_limit: limit of the wall time, checked before each iteration [s] (default inf).
+        time_limit: limit of the wall time [s] (default inf). It ends iterations and replays in their midst, but neither
+            the first rollout nor the last: the best trajectory so far is rolled out, and has its gains.
         callback: function of the record of each iteration; it may raise StopIteration to end the solve (default None).
         verbose: whether to print one line per iteration (default False).
         stream: file for these lines (default None: the standard output).

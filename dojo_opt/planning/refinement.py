@@ -13,6 +13,7 @@ from dojo_opt.planning.options import Options
 from dojo_opt.planning.overload import overload
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import REPLAY_ACCURACY, Problem
+from sim.model.interruptible_loops import TimeUp, ends_at
 from sim.simulator.results import FeedbackRollout, Interrupted
 from solvers.status import MESSAGES, Status
 
@@ -62,7 +63,10 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
         if asked is None or not plans[-1].success:
             return plans[0] if len(plans) == 1 else _joined(plans, began, options)  # as its own last line has it
         try:
-            apart = replay_error(plans[-1])
+            with ends_at(began + options.time_limit):
+                apart = replay_error(plans[-1])
+        except TimeUp:
+            return _ended(_joined(plans, began, options), Status.TIME_LIMIT)
         except KeyboardInterrupt:
             raise Interrupted(_ended(_joined(plans, began, options), Status.INTERRUPTED)) from None
         options.say(f"Replay with an accuracy of {REPLAY_ACCURACY:g}: {apart:.1e} from the plan, asked {asked:g}")

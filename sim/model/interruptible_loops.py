@@ -7,11 +7,16 @@ Data, so that the result is the same to the last bit.
     for _ in pieces(settings, steps):
         done = roll(..., settings, ..., done)
         if done == steps: break
+
+Between two pieces a time limit holds, too: in `with ends_at(time)`, loops of this thread end with TimeUp after it.
 """
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from math import inf
 from time import perf_counter
 
 from sim.model.data import Data
@@ -19,12 +24,35 @@ from sim.model.record_columns import LoopClock, StepSetting
 from solvers.compiler import PAUSE, kernel, seconds
 from solvers.types import Vector
 
-__all__ = ["is_due", "pieces", "rows", "note_deadline"]
+__all__ = ["TimeUp", "ends_at", "is_due", "pieces", "rows", "note_deadline"]
 
 _LOOK = 64.0  # work between two readings of the clock; one costs about a tenth of the smallest step
 _ROWS = 64  # of the first piece
 _ONE = (None,)
 _DEADLINE = int(StepSetting.DEADLINE)  # NumPy takes three times as long with the member of an enum
+
+
+class TimeUp(Exception):
+    """The time of `ends_at` has passed within a loop, whose progress is lost."""
+
+
+class _Limit(threading.local):
+    """The time when loops of this thread end, as in time.perf_counter() [s]."""
+
+    end = inf
+
+
+_LIMIT = _Limit()
+
+
+@contextmanager
+def ends_at(end: float) -> Iterator[None]:
+    """A context whose loops, of this thread, raise TimeUp after the time `end`, as in time.perf_counter() [s]."""
+    before, _LIMIT.end = _LIMIT.end, min(end, _LIMIT.end)
+    try:
+        yield
+    finally:
+        _LIMIT.end = before
 
 
 def pieces(settings: Vector, steps: int) -> Iterable[None]:
@@ -34,6 +62,8 @@ def pieces(settings: Vector, steps: int) -> Iterable[None]:
 
 def _pieces(settings: Vector) -> Iterator[None]:
     while True:
+        if perf_counter() > _LIMIT.end:
+            raise TimeUp
         settings[_DEADLINE] = seconds() + PAUSE
         yield
 

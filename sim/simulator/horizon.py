@@ -139,7 +139,7 @@ class Horizon:
 
         guess: (T, nx) where the velocities after each knot are looked for first; by default in the later rows of xs.
         """
-        A, B, x_next, reports = self._engine.linearize(xs, us, self._substeps, kappa, guess)
+        A, B, x_next, reports = self._engine.linearize_plan(xs, us, self._substeps, kappa, guess)
         statuses = reports[:, StepReport.STATUS].astype(np.int64)
         return Linearization(A, B, x_next, statuses, accuracy=reports[:, StepReport.ACCURACY])
 

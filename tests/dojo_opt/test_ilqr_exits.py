@@ -7,6 +7,7 @@ from dojo_opt.cost import Effort, Tracking
 from dojo_opt.planning.ilqr import Solver, ilqr
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
+from dojo_opt.problems import hop
 from solvers.riccati import PredictedChange
 from solvers.status import MESSAGES, Status
 from support.doubles import DoubleIntegrator, Pendulum, SmoothedWall
@@ -28,6 +29,15 @@ def test_iteration_limit():
 def test_time_limit():
     plan = ilqr(swingup(), time_limit=0.0)
     assert plan.status == Status.TIME_LIMIT and plan.nit == 0 and np.all(np.isfinite(plan.x))
+
+
+def test_the_time_limit_ends_a_rollout(monkeypatch):
+    problem, ended = hop(), []
+    monkeypatch.setattr(
+        Solver, "_attempts", lambda self, duals: ended.append(problem.sim.rollout(problem.start, steps=300_000))
+    )
+    plan = ilqr(problem, time_limit=0.1)
+    assert plan.status == Status.TIME_LIMIT and not plan.success and not ended
 
 
 def test_time_limit_returns_a_consistent_plan():

@@ -232,6 +232,44 @@ def test_derivatives_keep_the_division(name: str, height: float, steps: int) -> 
         assert np.abs(sim.difference(ahead, behind) / 2e-4 - B[:, k]).max() < 1e-6 * np.abs(B).max()
 
 
+def in_equal_parts(sim: dojo.Simulator, second: dojo.Simulator, x: Floats, u: Floats) -> Floats:
+    """The node after a step in ten equal ones of order 2, those of the second simulator."""
+    held = u, engine(sim).no_wrenches
+    mean = engine(sim)._mean(x, held, second.time_step)[1]
+    end = second.rollout(mean, np.tile(u, (10, 1)), throw=True).x[-1]
+    return engine(sim)._node(end, held, second.time_step)[1]
+
+
+def test_planners_see_where_an_impact_leads() -> None:
+    """Derivatives that hold the sub-steps of a landing are a thousand times as steep as the way that it depends on."""
+    rng = np.random.default_rng(3)
+    sim = dojo.Simulator(models.hopper(), time_step=0.05, kappa=1e-6, tolerance=1e-12, accuracy=1e-3)
+    second = sim.replace(time_step=0.005, accuracy=None, kappa=1e-7, divide=False)
+    x = sim.integrate(sim.neutral(), np.r_[np.zeros(sim.nv), 0.3 * rng.normal(size=sim.nv)])
+    x[1], x[sim.nq + 1] = x[1] + 0.05, x[sim.nq + 1] - 2.0
+    u = np.zeros(sim.nu)
+    A, B, (x_next,), (report,) = engine(sim).linearize_plan(x[None], u[None], 1, sim.kappa)
+    held, _ = sim.linearize(x, u, throw=True)
+    assert np.array_equal(x_next, sim.step(x, u).x)
+    assert report[StepReport.ACCURACY] < 1e-5
+    off = []
+    for k in range(1, sim.ndx, 3):
+        dx = 2e-7 * np.eye(sim.ndx)[k]
+        ahead, behind = (in_equal_parts(sim, second, sim.integrate(x, s * dx), u) for s in (1.0, -1.0))
+        assert (
+            np.abs(sim.difference(ahead, behind) / 4e-7 - A[0][:, k]).max()
+            < report[StepReport.ACCURACY] * np.abs(A).max()
+        )
+        moved = sim.difference(sim.step(sim.integrate(x, 5e3 * dx), u).x, x_next)
+        off.append([np.abs(moved - 5e3 * slopes @ dx).max() for slopes in (A[0], held)])
+    for k in range(sim.nu):
+        du = 1e-4 * np.eye(sim.nu)[k]
+        ahead, behind = (in_equal_parts(sim, second, x, u + s * du) for s in (1.0, -1.0))
+        off_by = np.abs(sim.difference(ahead, behind) / 2e-4 - B[0][:, k]).max()
+        assert off_by < report[StepReport.ACCURACY] * np.abs(B).max()
+    assert np.max(off, axis=0)[0] < 0.1 < 500.0 < np.max(off, axis=0)[1]
+
+
 def test_orders_agree_on_dampers() -> None:
     """A falling hopper with dampers: substeps of order 2 approach order 8, four times closer at half the length."""
     sim = dojo.Simulator(models.hopper(), accuracy=1e-3)

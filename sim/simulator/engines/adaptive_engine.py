@@ -55,6 +55,7 @@ _ROWS = 256  # sub-steps between two pauses
 _MOST = 1_000_000  # sub-steps of a step: an input is not held for ever
 
 _DIVISIONS = {4: (1, 2), 6: tuple(range(1, PARTS + 1))}  # of extrapolated steps, by their order
+_EVEN, _HALVINGS = 5e-3, 6  # [s] longest step of the derivatives for planners; lengths that are tried
 _NUDGE = 1e-3  # of states and inputs, in differences
 
 Held = tuple[Vector, Cube]  # input (nu,) and external wrenches (1 or 0, nbody, 6) of a step
@@ -362,6 +363,66 @@ class AdaptiveEngine(PythonLoopEngine):
             A, B = dx @ A, dx @ B + du
         return A, B, worst
 
+    def linearize_plan(
+        self, xs: Floats, us: Floats, substeps: int, kappa: float, guess: Floats | None = None
+    ) -> tuple[Floats, ...]:
+        """As Engine.linearize_plan: where something may touch, next states have the accuracy, and derivatives are those
+        of equal time steps of order 2.
+
+        Derivatives that hold the sub-steps hold the time of an impact, too. In sub-steps of a microsecond, a contact
+        whose gap changes by a micrometre is another one: they are right, and of no use further away.
+        """
+        if self.sizes.ncontact + len(self.model.limit_dof) == 0:
+            return self.linearize(xs, us, substeps, kappa)
+        n = len(us)
+        A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
+        x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
+        for t in range(n):
+            rolled = self.roll(xs[t], np.repeat(us[t : t + 1], substeps, axis=0), kappa=kappa)
+            reports[t] = rolled.summary()
+            if rolled.solved_steps == substeps:
+                A[t], B[t], reports[t] = self._even_slopes(rolled, us[t], kappa)
+                x_next[t] = rolled.xs[-1]
+        return A, B, x_next, reports
+
+    def _even_slopes(self, rolled: Rolled, u: Vector, kappa: float) -> tuple[Floats, Floats, Vector]:
+        """(A, B, report) of a knot: products of the derivatives of its steps, each in equal parts of order 2."""
+        A, B = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
+        held, step = (u, self.external(None)), self.settings.time_step
+        for x in rolled.xs[:-1]:
+            for parts in _even_parts(step):
+                dx, du, report = self._slopes_of_parts(x, held, step / parts, parts, kappa)
+                if report[StepReport.STATUS] == Status.SOLVED:
+                    break
+            else:
+                return A, B, report
+            A, B = dx @ A, dx @ B + du
+        return A, B, report
+
+    def _slopes_of_parts(
+        self, x: Vector, held: Held, h: float, parts: int, kappa: float
+    ) -> tuple[Floats, Floats, Vector]:
+        """(A, B, report) of steps of order 2 of length h from the node x to a node."""
+        (u, wrench), reports, settings = held, np.zeros((1, REPORT)), self._part_settings(h, kappa)
+        A, B = np.zeros((1, self.ndx, self.ndx)), np.zeros((1, self.ndx, self.nu))
+        status, mean = self._mean(x, held, h)
+        if status != Status.SOLVED:
+            return A[0], B[0], _refused(status)
+        last, model, data, step = mean.copy(), self._second.gradient_table(), self._scratch.table(), 0
+        line = Linearized(mean[None], u[None], wrench, A, B, last[None], reports)
+        for _ in pieces(settings, parts):
+            step = int(linearize(model, data, settings, (0, step, 1), parts, line))
+            if step == parts:
+                break
+        if reports[0, StepReport.STATUS] != Status.SOLVED:
+            return A[0], B[0], reports[0]
+        status, end = self._node(last, held, h)
+        if status != Status.SOLVED:
+            return A[0], B[0], _refused(status)
+        C, D = self._mean_slopes(x, held, h, mean)
+        E, F = self._end_slopes(last, held, h, end)
+        return E @ A[0] @ C, E @ (A[0] @ D + B[0]) + F, reports[0]
+
     # -- motions -------------------------------------------------------------------------------------------------------
 
     def roll(
@@ -454,6 +515,12 @@ class AdaptiveEngine(PythonLoopEngine):
         carried: Floats = self._kept.contacts
         impulses = carried[:, ContactRow.IMPULSE : ContactRow.POINT]
         return np.asarray(np.linalg.norm(impulses, axis=1) <= self.settings.tolerance)
+
+
+def _even_parts(step: float) -> list[int]:
+    """Numbers of equal parts of a step, from few on."""
+    few = max(1, int(np.ceil(step / _EVEN - 1e-9)))
+    return [few << k for k in range(_HALVINGS)]
 
 
 def _least_exact(report: Vector) -> tuple[bool, float]:

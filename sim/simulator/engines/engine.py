@@ -371,6 +371,12 @@ class Engine(LinkedModel):
                 array[unsolved] = 0.0
         return A, B, x_next, reports
 
+    def linearize_plan(
+        self, xs: Floats, us: Floats, substeps: int, kappa: float, guess: Floats | None = None
+    ) -> tuple[Floats, ...]:
+        """As linearize, with derivatives that lead a planner on where those of the steps do not."""
+        return self.linearize(xs, us, substeps, kappa, guess)
+
     def linearize_knot(
         self, x: Vector, given: tuple[Floats, Cube], kappa: float | None
     ) -> tuple[Floats, Floats, Vector, Vector]:
