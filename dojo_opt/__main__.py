@@ -195,7 +195,7 @@ def _run_suite(args: argparse.Namespace) -> int:
     task = getattr(there, name)(**given)
     if isinstance(task, PlanTask):
         return _plan_task(args, task)
-    loop = task.run(seed, task.plant(seed, **_arguments(args.perturb)), args.seconds)
+    loop = task.run(plant=task.plant(seed, **_arguments(args.perturb)), seconds=args.seconds)
     outcome = task.outcome(loop)
     if args.out:
         _save(dojo.plots.closed_loop(loop), args.out)

@@ -43,15 +43,16 @@ def to_jax(sim: Simulator, kappa: float | None = None, parameters: ParameterSpac
         sim: the simulator.
         kappa: central-path parameter of the derivatives, larger for smoother contact [N s m]; by default that of the
             simulator.
-        parameters: the parameters in theta (default None: no parameters).
+        parameters: the parameters in theta, order 2 without accuracy only (default None: no parameters).
 
     Returns:
         (step, rollout): step gives the next state (nx,), rollout all states (T + 1, nx), including x0.
 
     Raises:
         ImportError: JAX is not installed.
-        ValueError: JAX computes with 32 bits. Errors of the simulator in a call (SimulationError: an unsolved step;
-            ValueError: numbers that are not finite, quaternions of another length) appear in JAX's own error.
+        ValueError: JAX computes with 32 bits, or the steps of the simulator have no derivatives by `parameters`. Errors
+            of the simulator in a call (SimulationError: an unsolved step; ValueError: numbers that are not finite,
+            quaternions of another length) appear in JAX's own error.
     """
     jax = _jax()
     core = Rollouts(_CALL, sim, kappa, parameters)

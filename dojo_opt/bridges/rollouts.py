@@ -51,6 +51,11 @@ class Rollouts:
             raise TypeError(f"{call}(sim): expected a Simulator, got {sim!r}")
         if parameters is not None and not isinstance(parameters, ParameterSpace):
             raise TypeError(f"{call}(parameters=...): expected a ParameterSpace, got {parameters!r}")
+        if parameters is not None and (sim.order > 2 or sim.accuracy is not None):
+            raise ValueError(
+                f"{call}(parameters=...): expected a simulator of order 2 without an accuracy, whose steps alone "
+                f"have derivatives by parameters, got {sim!r}"
+            )
         self.sim, self.call, self._space = sim, call, parameters
         self._kappa = None if kappa is None else checks.number(f"{call}(kappa=...)", kappa, above=0.0)
         self._cotangents = Cotangents(sim)

@@ -29,7 +29,7 @@ def to_torch(sim: Simulator, kappa: float | None = None, parameters: ParameterSp
         sim: the simulator.
         kappa: central-path parameter of the derivatives, larger for smoother contact [N s m]; by default that of the
             simulator.
-        parameters: the parameters in theta (default None: no parameters).
+        parameters: the parameters in theta, order 2 without accuracy only (default None: no parameters).
 
     Returns:
         (step, rollout): step gives the next states (..., nx), rollout all states (..., T + 1, nx), including x0.
@@ -37,7 +37,8 @@ def to_torch(sim: Simulator, kappa: float | None = None, parameters: ParameterSp
     Raises:
         ImportError: PyTorch is not installed.
         SimulationError: in a call, a step is not solved.
-        ValueError: in a call, a shape is wrong, a number not finite, or a quaternion not of unit length.
+        ValueError: the steps of the simulator have no derivatives by `parameters`. In a call, a shape is wrong, a
+            number not finite, or a quaternion not of unit length.
         TypeError: in a call, a tensor does not hold doubles.
     """
     try:

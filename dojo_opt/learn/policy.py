@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.learn.network import Network, number_of, perceptron
 from dojo_opt.learn.onnx_file import write_onnx
+from dojo_opt.learn.policy_controller import Command, PolicyController
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
@@ -119,24 +120,19 @@ class LearnedPolicy:
 
     def __call__(self, x: ArrayLike) -> Floats:
         """Input (nu,) for a state (nx,) of the task: that of its simulator, followed by a command where it has one."""
-        if self.task is None:
-            raise ValueError("LearnedPolicy(x): a loaded policy has no task; LearnedPolicy.load(path, task)")
-        state = checks.array("LearnedPolicy(x)", x, (self.task.nx,))
-        return self.task.inputs(self.action(self.task.observe_one(state)))
+        task = self._known_task("LearnedPolicy(x)")
+        state = checks.array("LearnedPolicy(x)", x, (task.nx,))
+        return task.inputs(self.action(task.observe_one(state)))
 
-    def controller(self, time: float, x: Floats) -> Floats:
-        """As `dojo.closed_loop` takes a controller.
+    @property
+    def controller(self) -> PolicyController:
+        """As `dojo.closed_loop` takes one: a function of (time, state (sim.nx,)) that returns the input (nu,) [N, N m].
 
-        Args:
-            time: not used [s].
-            x: (nx,) state.
-
-        Returns:
-            (nu,) input [N, N m].
+        The loop tells it the forces of contacts that tasks with `touch` want. Tasks with a command need `commanded`.
         """
-        return self(x)
+        return self.commanded(())
 
-    def commanded(self, command: ArrayLike | Callable[[float], ArrayLike]) -> Callable[[float, Floats], Floats]:
+    def commanded(self, command: Command) -> PolicyController:
         """A controller, as `dojo.closed_loop` takes one, that follows a command.
 
         Args:
@@ -144,14 +140,17 @@ class LearnedPolicy:
 
         Returns:
             Function of (time, state (sim.nx,)) with the input (nu,) [N, N m].
+
+        Raises:
+            ValueError: a command of the wrong shape, or a policy without a task.
         """
+        task = self._known_task("LearnedPolicy.commanded(command)")
+        return PolicyController(self, task, command)
 
-        def controller(time: float, x: Floats) -> Floats:
-            given = command(time) if callable(command) else command
-            size = self.task.commands if self.task is not None else None
-            return self(np.concatenate([x, checks.array("LearnedPolicy.commanded(command)", given, (size,))]))
-
-        return controller
+    def _known_task(self, call: str) -> Task:
+        if self.task is None:
+            raise ValueError(f"{call}: a loaded policy has no task; LearnedPolicy.load(path, task)")
+        return self.task
 
     @cached_property
     def _sizes(self) -> Integers:

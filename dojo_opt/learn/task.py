@@ -262,6 +262,11 @@ class Task:
         for name in ("low", "high"):
             object.__setattr__(self, name, checks.array(f"Task({name}=...)", getattr(self, name), (self.sim.nu,)))
         ContactGroups(self.sim, self.touch)  # checks the names
+        if self.touch and not self.sim.has_stepper:
+            raise ValueError(
+                "Task(touch=...): expected a simulator of order 2 without an accuracy, whose steps have their contacts "
+                f"in batches, got {self.sim!r}"
+            )
         if not np.all(self.low < self.high):
             raise ValueError(f"Task(low=..., high=...): expected low < high, got {self.low} and {self.high}")
         self._check_functions()

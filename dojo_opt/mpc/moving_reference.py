@@ -109,12 +109,18 @@ class SampledReference:
             The new trajectory.
 
         Raises:
-            ValueError: the trajectory has no simulator or no cycle, or the interval is not positive.
+            ValueError: the trajectory has no simulator or no cycle, velocities of its simulator are no means, or the
+                interval is not positive.
         """
         if self._sim is None or self.cycle is None:
             raise ValueError(
                 "SampledReference.with_mean_velocities: expected states (sim=...) and a cycle, which give the state "
                 "before the first row"
+            )
+        if not self._sim.mean_over:
+            raise ValueError(
+                "SampledReference.with_mean_velocities: expected a simulator of order 2 without an accuracy, whose "
+                f"velocities are means, got {self._sim!r}; its samples have the velocities of their times"
             )
         sim, h = self._sim, checks.number("SampledReference.with_mean_velocities(interval)", interval, above=0.0)
         then = self(self.time - h)

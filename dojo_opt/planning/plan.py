@@ -211,7 +211,8 @@ class Plan:
         knot = self.time_step * self.substeps
         steps = round(knot / h)
         if steps < 1 or abs(steps * h - knot) > 1e-9 * knot:
-            raise ValueError(f"{call}: expected a whole part of the knot of {knot:g} s, got {h:g}")
+            near = knot / max(round(knot / h), 1)
+            raise ValueError(f"{call}: expected a whole part of the knot of {knot:g} s, such as {near:.12g}, got {h:g}")
         return steps
 
     def _start(self, sim: Simulator) -> Vector:

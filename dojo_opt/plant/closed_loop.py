@@ -140,7 +140,8 @@ def closed_loop(
 
     Args:
         controller: an `MPC`, which is reset, or any function of (time [s], state (nx,)) that returns an input (nu,)
-            [N, N m].
+            [N, N m]. One with a method `feel` is told of every step (simulator of the plant, state (nx,), contacts
+            (ncontact, 11) as rows of `ContactRow`).
         plant: the plant, which is reset.
         duration: length of the run [s].
         control_step: time between calls of the controller, whose answer is held in between [s]; a multiple of the time
@@ -294,6 +295,7 @@ def _drive(
     """Call the controller at regular steps of the plant, until the end, the aim, a fall, or an unsolved step."""
     command = np.zeros(plant.nominal.nu)
     own, log = getattr(controller, "references", None), getattr(controller, "log", [])
+    feel = getattr(controller, "feel", None)
     for k in range(steps):
         if k % every == 0:
             answer = controller(plant.time, plant.measure().copy())  # a controller may write into its argument
@@ -309,6 +311,8 @@ def _drive(
             run.reservations.append(f"Plant, step {k}: {result.detail}")
         run.contacts.append(result.scene[2])
         run.x.append(plant.x)
+        if feel is not None:
+            feel(plant.simulator, plant.x, result.scene[2])
         run.u.append(u)  # last: Ctrl-C may come between two of them, and counts the steps by this one
         if has_fallen(plant.x):
             run.message, run.survived = f"Fell at {plant.time:.3f} s.", False

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from math import cos, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.mechanism.axes import translation_axes
-from sim.mechanism.contact import Contact
 from sim.mechanism.forward_kinematics import body_poses
-from sim.mechanism.joint import Joint
+from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.shapes import rotation_matrix
+from sim.mechanism.shapes import HalfSpace, rotation_matrix
+from sim.mechanism.terrain import Terrain
 from solvers.compiler import kernel
 from solvers.types import Cube, Floats, Matrix, Vector
 
@@ -56,8 +57,10 @@ class FallCheck:
     with the orientation O of the joint and the point d of the base that it holds. Of a single rotation about an axis e
     the quaternion is (cos, e sin) of half the angle, and K is reduced to these two.
 
+    A base that does not begin above the ground has no height to lose.
+
     Args:
-        mechanism: the robot; its contacts say where the ground is.
+        mechanism: the robot; its contacts, and half-spaces that it collides with, say where the ground is.
         x: (nx,) its first state.
         normal: (3,) outward normal of the ground.
     """
@@ -69,7 +72,7 @@ class FallCheck:
         self._joint = joint = mechanism.joints[0]
         floor = _floor(mechanism)
         self._hill = None if floor is None else floor.terrain
-        up = np.array([0.0, 0.0, 1.0]) if floor is None or self._hill is not None else np.asarray(floor.normal)
+        up = np.array([0.0, 0.0, 1.0]) if floor is None or self._hill is not None else floor.normal
         outer, first = rotation_matrix(joint.orientation), body_poses([joint], x[: joint.nq])[joint.child]
         climb = outer.T @ up / up[2]
         upright, held = (outer.T @ normal, first.rotation.T @ normal), (climb, _numbers(joint.child_point))
@@ -83,7 +86,8 @@ class FallCheck:
         self._level = float(up @ _numbers(joint.parent_point) / up[2])
         if floor is not None:
             self._level -= floor.height / float(up[2])
-        self._lowest = _LOW * self.height(x)
+        first_height = self.height(x)
+        self._lowest = _LOW * first_height if first_height > 0.0 else -np.inf
 
     def height(self, x: Vector) -> float:
         """Height of the base in the state x (nx,) above the ground below it [m]."""
@@ -104,9 +108,25 @@ class FallCheck:
         return height + self._level - float(self._hill.height(place[0], place[1]))
 
 
-def _floor(mechanism: Mechanism) -> Contact | None:
-    """The first contact with a ground that can be the floor."""
-    return next((c for c in mechanism.contacts if c.terrain is not None or np.asarray(c.normal)[2] > _FLOOR), None)
+class _Floor(NamedTuple):
+    """The ground below a robot."""
+
+    normal: Vector  # (3,) outward normal of the plane
+    height: float  # of the plane along it, above the origin [m]
+    terrain: Terrain | None = None  # instead of the plane
+
+
+def _floor(mechanism: Mechanism) -> _Floor | None:
+    """The first ground of a contact that can be the floor, or else the first such half-space of a collision."""
+    for c in mechanism.contacts:
+        if c.terrain is not None or np.asarray(c.normal)[2] > _FLOOR:
+            return _Floor(np.asarray(c.normal), c.height, c.terrain)
+    for plane in (c.shape_b for c in mechanism.collisions if c.b == WORLD):
+        if isinstance(plane, HalfSpace):
+            normal = rotation_matrix(plane.orientation)[:, 2]
+            if normal[2] > _FLOOR:
+                return _Floor(normal, float(normal @ _numbers(plane.center)))
+    return None
 
 
 def _numbers(value: ArrayLike) -> Vector:

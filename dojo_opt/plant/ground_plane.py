@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.pose import quat_product
 from sim.mechanism.rising_bases import rising_bases
 from sim.model.state_columns import BaseState
 from solvers.types import Matrix, Vector
@@ -59,7 +60,7 @@ class GroundPlane(NamedTuple):
         n = self.normal
         out[:, 2] = self.height + out[:, :2] @ np.asarray(self.slope) + out[:, 2] / n[2]
         turn = _upright(n)
-        out[:, BaseState.QUATERNION] = _product(turn, out[:, BaseState.QUATERNION])
+        out[:, BaseState.QUATERNION] = quat_product(turn, out[:, BaseState.QUATERNION])
         out[:, nq : nq + 3] = _turned(turn, out[:, nq : nq + 3])
         return out
 
@@ -68,12 +69,6 @@ def _upright(n: Vector) -> Vector:
     """(4,) quaternion of the shortest turn from the vertical to n."""
     half = np.array([1.0 + n[2], -n[1], n[0], 0.0])
     return np.asarray(half / np.linalg.norm(half))
-
-
-def _product(a: Vector, b: Matrix) -> Matrix:
-    """Hamilton products of a quaternion (4,) with others (..., 4)."""
-    w, r, x, s = a[0], a[1:], b[..., :1], b[..., 1:]
-    return np.concatenate([w * x - (s @ r)[..., None], w * s + x * r + np.cross(r, s)], axis=-1)
 
 
 def _turned(q: Vector, v: Matrix) -> Matrix:

@@ -35,7 +35,8 @@ class Plant:
     Args:
         sim: mechanism, time step and smoothing of the plant before the perturbation: usually those of the model with a
             time step five to fifty times shorter and kappa=1e-8.
-        start: (nx,) state at time zero on level ground (default None: the neutral one).
+        start: (nx,) state at time zero on the ground of `sim` (default None: the neutral one). On other ground it is as
+            high above it; on terrain a robot that begins in the ground is put on it.
         perturbation: differences from `sim` (default None: none).
         **fields: fields of `dojo.Perturbation` by name, instead of one:  Plant(sim, payload=3.0, delay=0.02)
 
@@ -79,9 +80,21 @@ class Plant:
             x = sim.integrate(x, checks.array("Plant(offset=...)", p.offset, (sim.ndx,)))
         self._x0 = p.on_ground(sim.mechanism, x)
         if p.terrain is not None:
-            self._x0 = Feet(self.simulator, self.simulator.mechanism.ground_contact_names).put_down(x)
+            self._x0 = self._above_terrain(x)
         self.fall_check = FallCheck(self.simulator.mechanism, self._x0, self.normal)
         self.reset()
+
+    def _above_terrain(self, x: Vector) -> Vector:
+        """The state x (nx,), as high above the terrain as above the ground of the model."""
+        names = self.simulator.mechanism.ground_contact_names
+        if not names:  # nothing feels it
+            return x
+        try:
+            model, out = Feet(self.nominal, names), Feet(self.simulator, names).put_down(x)
+        except ValueError as error:
+            raise ValueError(f"Plant(terrain=...): {error}") from error
+        out[2] += max(float((model.gaps(x) / model.normals(x)[:, 2]).min()), 0.0)
+        return out
 
     def perturbed(self, perturbation: Perturbation) -> Plant:
         """The same robot under another perturbation.

@@ -159,7 +159,10 @@ def _path(sim: Simulator, first: Floats, q: Floats, horizon: int, substeps: int)
     share = np.arange(horizon + 1) / horizon
     moved = np.zeros((horizon + 1, sim.ndx))
     moved[:, : sim.nv] = along(share)[:, None] * way
-    rates = (along(share) - along(np.maximum(share - step, 0.0))) / sim.time_step
+    if sim.mean_over:
+        rates = (along(share) - along(np.maximum(share - step, 0.0))) / sim.time_step
+    else:
+        rates = 30.0 * (share * (1.0 - share)) ** 2 * step / sim.time_step
     states = sim.integrate(np.concatenate([first[: sim.nq], np.zeros(sim.nv)]), moved)
     states[:, sim.nq :] = rates[:, None] * way
     states[0] = first

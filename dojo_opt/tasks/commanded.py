@@ -41,8 +41,10 @@ class _Stride:
         return _Place.of(self._rows([phase])[0])
 
     def states(self, phase: Vector) -> Matrix:
-        """(n, nx) states at times of the period, with the mean velocities over a time step of the model."""
+        """(n, nx) states at times of the period, with the velocities that states of the model have."""
         sim, before = self._sim, phase - self._sim.time_step
+        if not sim.mean_over:
+            return self._rows(phase)
         early = before < 0.0
         x, then = self._rows(phase), self._rows(np.where(early, before + self.period, before))
         then[early] = self.move.back().carry(sim, then[early])

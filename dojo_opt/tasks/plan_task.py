@@ -13,6 +13,8 @@ from dojo_opt.planning.ilqr import ilqr
 from dojo_opt.planning.options import Stage
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
+from dojo_opt.tasks.same_robot import check_same_robot
+from sim.mechanism.checks import shown
 from sim.mechanism.short_repr import short_repr
 
 __all__ = ["PlannedOutcome", "PlanTask", "continuation"]
@@ -79,7 +81,15 @@ class PlanTask:
 
         Returns:
             Its outcome.
+
+        Raises:
+            TypeError: for anything but a Plan.
+            ValueError: for a plan of a robot with other coordinates than those of the task.
         """
+        if not isinstance(plan, Plan):
+            raise TypeError(f"PlanTask.outcome(plan): expected a Plan, as from run(), got {shown(plan)}")
+        call = "PlanTask.outcome(plan): expected a plan"
+        check_same_robot(call, self.name, self.problem.sim, plan.simulator, plan.x)
         done, measures = self.judge(plan)
         return PlannedOutcome(plan.success and done, measures, float(plan.fun), int(plan.nit), float(plan.gap))
 

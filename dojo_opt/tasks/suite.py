@@ -15,7 +15,8 @@ from dojo_opt.mpc.servo import ModelServo
 from dojo_opt.plant.closed_loop import ClosedLoop, closed_loop
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import milliseconds
-from sim.mechanism.checks import whole_number
+from dojo_opt.tasks.same_robot import check_same_robot
+from sim.mechanism.checks import shown, whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.overlaps import overlaps
 from sim.mechanism.short_repr import short_repr
@@ -130,7 +131,7 @@ class SuiteTask:
         """Run the task in closed loop.
 
         Args:
-            seed: seed of the start (default None: the given one).
+            seed: seed of the start (default None: the given one); not with a plant, which has its own start.
             plant: another plant (default None: that of `plant(seed)`).
             seconds: length of the run [s] (default None: that of the task).
 
@@ -138,9 +139,13 @@ class SuiteTask:
             The record of the run.
 
         Raises:
-            ValueError: for an argument out of range.
+            ValueError: for an argument out of range, or both a seed and a plant.
             Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the run so far.
         """
+        if seed is not None and plant is not None:
+            raise ValueError(
+                "SuiteTask.run(seed=..., plant=...): expected one of them; use plant=task.plant(seed, ...)"
+            )
         plant = self.plant(seed) if plant is None else plant
         duration = self.duration if seconds is None else seconds
         return closed_loop(self.mpc, plant, duration, fallen=self.lost, finished=self.finished)
@@ -153,7 +158,14 @@ class SuiteTask:
 
         Returns:
             Its outcome.
+
+        Raises:
+            TypeError: for anything but a ClosedLoop.
+            ValueError: for a run of a robot with other coordinates than those of the task.
         """
+        if not isinstance(loop, ClosedLoop):
+            raise TypeError(f"SuiteTask.outcome(loop): expected a ClosedLoop, as from run(), got {shown(loop)}")
+        check_same_robot("SuiteTask.outcome(loop): expected a run", self.name, self.model, loop.simulator, loop.x)
         done, measures = self.judge(loop)
         ms = milliseconds(loop.log, cpu=True)
         times = (float(np.median(ms)), float(np.percentile(ms, 99))) if ms.size else (np.nan, np.nan)

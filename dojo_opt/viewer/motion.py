@@ -95,10 +95,10 @@ class Motion:
 
 
 def motion(result: Any, simulator: Simulator | None = None) -> Motion:
-    """Motion of a result. The contact forces of a plan come from its steps, solved again.
+    """Motion of a result. The contact forces of a plan, or a FeedbackRollout, come from its steps, solved again.
 
     Args:
-        result: Trajectory, Plan or ClosedLoop; or a Mechanism, at rest in its neutral state.
+        result: Trajectory, Plan, FeedbackRollout or ClosedLoop; or a Mechanism, at rest in its neutral state.
         simulator: simulator of the result, for one that was read from a file (default None: that of the result).
 
     Returns:
@@ -121,7 +121,9 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
     x, u = np.asarray(result.x, dtype=np.float64), np.asarray(result.u, dtype=np.float64)
     known = getattr(result, "contacts", None)  # a plan has none
     substeps = 1 if isinstance(result, Trajectory) else getattr(result, "substeps", 1)  # per knot
-    normal, friction, force, point = _contact_forces(sim, x, u, substeps) if known is None else _of(known)
+    wrenches = getattr(result, "wrenches", None)
+    forces = _contact_forces(sim, x, u, substeps, wrenches) if known is None else _of(known)
+    normal, friction, force, point = forces
     z = sim.maximal(x)
     end = _goal(result, sim)
     return Motion(
@@ -202,9 +204,13 @@ def _standing(mech: Mechanism) -> Motion:
     )
 
 
-def _contact_forces(sim: Simulator, x: Floats, u: Floats, substeps: int) -> tuple[Floats, ...]:
-    """Forces of every simulation step, as `_of`; a knot spans `substeps` of them."""
-    knots = [_of(sim.rollout(x[t], np.tile(u[t], (substeps, 1)), throw=True).contacts) for t in range(len(u))]
+def _contact_forces(sim: Simulator, x: Floats, u: Floats, substeps: int, wrenches: Floats | None) -> tuple[Floats, ...]:
+    """Forces of every simulation step, as `_of`; a knot spans `substeps` of them, under its external wrenches."""
+    knots: list[tuple[Floats, ...]] = [tuple(np.zeros((0, sim.ncontact, *more)) for more in ((), (), (3,), (3,)))]
+    for t in range(len(u)):
+        held = None if wrenches is None else np.tile(wrenches[t], (substeps, 1, 1))
+        path = sim.rollout(x[t], np.tile(u[t], (substeps, 1)), wrenches=held, throw=True)
+        knots.append(_of(path.contacts))
     return tuple(np.concatenate(parts) for parts in zip(*knots, strict=True))
 
 

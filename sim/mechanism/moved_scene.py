@@ -7,11 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from sim.mechanism.collision import Collision
 from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.joint_coordinates import joint_places
+from sim.mechanism.pose import quat_product
 from sim.mechanism.shapes import rotation_matrix
 from sim.mechanism.visual import Visual
 from solvers.types import Floats
@@ -29,7 +29,7 @@ def moved_joint(joint: Joint, point: Floats, quat: Floats) -> Joint:
     if joint.parent != WORLD or floats(joint):
         return joint
     place = point + rotation_matrix(quat) @ np.asarray(joint.parent_point)
-    return replace(joint, parent_point=place, orientation=_product(quat, joint.orientation))
+    return replace(joint, parent_point=place, orientation=quat_product(quat, joint.orientation))
 
 
 def moved_obstacle(collision: Collision, point: Floats, quat: Floats) -> Collision:
@@ -38,14 +38,14 @@ def moved_obstacle(collision: Collision, point: Floats, quat: Floats) -> Collisi
     if collision.b != WORLD or shape is None:
         return collision
     center = point + rotation_matrix(quat) @ np.asarray(shape.center)
-    return replace(collision, shape_b=replace(shape, center=center, orientation=_product(quat, shape.orientation)))
+    return replace(collision, shape_b=replace(shape, center=center, orientation=quat_product(quat, shape.orientation)))
 
 
 def moved_visual(visual: Visual, point: Floats, quat: Floats) -> Visual:
     """A picture of the world, moved."""
     part: Any = visual if visual.shape is None else visual.shape
     center = point + rotation_matrix(quat) @ np.asarray(part.center)
-    moved = replace(part, center=center, orientation=_product(quat, part.orientation))
+    moved = replace(part, center=center, orientation=quat_product(quat, part.orientation))
     return moved if visual.shape is None else replace(visual, shape=moved)
 
 
@@ -58,7 +58,7 @@ def moved_coordinates(joints: Sequence[Joint], q: Floats, point: Floats, quat: F
             back = frame * (1.0, -1.0, -1.0, -1.0)
             place = rotation_matrix(quat) @ (origin + rotation_matrix(frame) @ out[at][:3]) + point
             out[at.start : at.start + 3] = rotation_matrix(back) @ (place - origin)
-            out[at.start + 3 : at.stop] = _product(back, _product(quat, _product(frame, out[at][3:])))
+            out[at.start + 3 : at.stop] = quat_product(back, quat_product(quat, quat_product(frame, out[at][3:])))
     return out
 
 
@@ -70,10 +70,3 @@ def turned_velocities(joints: Sequence[Joint], v: Floats, quat: Floats) -> Float
             frame = rotation_matrix(joint.orientation)
             out[at.start : at.start + 3] = frame.T @ rotation_matrix(quat) @ frame @ out[at][:3]
     return out
-
-
-def _product(a: ArrayLike, b: ArrayLike) -> Floats:
-    """Hamilton product of two quaternions."""
-    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
-    scalar = a[0] * b[0] - a[1:] @ b[1:]
-    return np.concatenate([[scalar], a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])])

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solvers.rotation import quat_mul
 from solvers.types import Floats
 
 
@@ -52,6 +53,12 @@ def turn(axis: ArrayLike, angle: float) -> Floats:
     a = np.asarray(axis, dtype=np.float64)
     cross = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
     return np.asarray(np.cos(angle) * np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * np.outer(a, a))
+
+
+def quat_product(a: ArrayLike, b: ArrayLike) -> Floats:
+    """Hamilton products of quaternions (..., 4), those of `quat_mul` with NumPy's arrays, broadcast."""
+    parts = (*np.moveaxis(np.asarray(a, dtype=np.float64), -1, 0), *np.moveaxis(np.asarray(b, dtype=np.float64), -1, 0))
+    return np.stack(getattr(quat_mul, "py_func", quat_mul)(*parts), axis=-1)
 
 
 def quaternion(rotation: Floats) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from sim.mechanism.body import Body
 from sim.mechanism.collision import Collision
 from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.joint import WORLD, Joint
-from sim.mechanism.pose import Pose
+from sim.mechanism.pose import HERE, Pose
 from sim.mechanism.shapes import HalfSpace, Solid, String
 from solvers.types import Floats
 
@@ -23,7 +23,7 @@ _TOUCHING = 1e-5  # of the size of two shapes: nearer ones overlap
 
 
 def self_collisions(
-    bodies: Sequence[Body], joints: Sequence[Joint], loops: Sequence[Joint], q: Floats
+    bodies: Sequence[Body], joints: Sequence[Joint], loops: Sequence[Joint], q: Floats, world: Sequence[Solid] = ()
 ) -> tuple[list[Collision], list[str]]:
     """Collisions of all pairs of shapes, but those of links that a joint connects, and those that overlap.
 
@@ -34,6 +34,7 @@ def self_collisions(
         joints: the joints of the tree, parents first.
         loops: the joints that close loops.
         q: (nq,) coordinates at which shapes may not overlap.
+        world: shapes of parts that are fixed to the world, world axes (default: none).
 
     Returns:
         (the collisions, the names of the pairs that overlap).
@@ -49,6 +50,14 @@ def self_collisions(
             if separation(at[a.name], one, at[b.name], other) > 0.0:
                 shapes = (None if len(a.shapes) == 1 else one), (None if len(b.shapes) == 1 else other)
                 found.append(Collision(a.name, b.name, *shapes, name=name, reach=reach))
+            else:
+                overlapping.append(name)
+    for body in (body for body in bodies if body.shapes and frozenset((body.name, WORLD)) not in near):
+        for (one, label), (number, part) in product(_labeled(body), enumerate(world)):
+            name = f"{part.name or f'{WORLD}.{number}'}-{label}"
+            if separation(at[body.name], one, HERE, part) > 0.0:
+                own = None if len(body.shapes) == 1 else one
+                found.append(Collision(body.name, None, own, part, name=name, reach=reach))
             else:
                 overlapping.append(name)
     return found, overlapping
@@ -72,10 +81,10 @@ def _labeled(body: Body) -> Iterator[tuple[Solid, str]]:
 
 
 def _neighbors(bodies: Sequence[Body], joints: Sequence[Joint], loops: Sequence[Joint]) -> set[frozenset[str]]:
-    """Pairs of bodies that a joint connects, or that are one."""
+    """Pairs of bodies, or of a body and the world, that a joint connects, or that are one."""
     solid = {body.name: body.mass > 0.0 for body in bodies}
     parent = {joint.child: joint for joint in joints}
-    home: dict[str, str] = {}  # the first body that a body is fixed to
+    home = {WORLD: WORLD}  # the first body that a body is fixed to
     for joint in joints:
         fixed = joint.nv == 0 and joint.parent != WORLD
         home[joint.child] = home[joint.parent or ""] if fixed else joint.child

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
-from sim.mechanism.short_repr import short_repr
 from sim.model.record_columns import ContactRow
 from sim.simulator.results import Contacts
 from sim.simulator.simulator import Simulator
@@ -40,7 +39,8 @@ class ContactGroups:
         self.sim, self.count, self._numbers = sim, len(groups), numbers
         self._space = sim.task_space()
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return f"ContactGroups({self.count} of {self.sim.mechanism.name!r})"
 
     def wrenches(self, X: ArrayLike, contacts: Contacts) -> Floats:
         """Forces of groups on the robot, and their torques about its centre of mass, in world axes.

@@ -79,8 +79,8 @@ def ik(
             a quaternion (w, x, y, z) or a rotation matrix, as from `Kinematics.pose`. "center of mass" is a place,
             too.
         start: coordinates (nq,), by default those of the neutral state.
-        fixed: names of joints that keep their coordinates, "floating_base" for one.
-        limits: whether joint limits hold; cone limits are ignored.
+        fixed: names of joints that keep their coordinates, also those beyond their limits; "floating_base" for one.
+        limits: whether joint limits hold of joints that are not fixed; cone limits are ignored.
         tolerance: largest error of a success [m, rad].
         max_iterations: limit of the iterations from one start.
         attempts: number of starts; further ones are random, around the best coordinates so far, because arms have
@@ -279,7 +279,7 @@ def _bounds(kin: Kinematics, fixed: Sequence[str], limits: bool) -> tuple[Floats
     for joint in mech.joints:
         at = mech.v_slice(joint.name)
         free[at] = joint.name not in fixed
-        if limits and joint.limits:
+        if limits and joint.limits and joint.name not in fixed:  # a fixed one stays where it is, beyond them too
             low[at], high[at] = np.array(joint.limits, dtype=np.float64).T
     return low, high, np.flatnonzero(free)
 

@@ -346,6 +346,9 @@ class FeedbackRollout(Result):
         solved_knots: number of solved knots.
         residual: largest error of an equation in the last step that was tried [N s, m].
         detail: sentence about an unsolved step, with its numbers.
+        simulator: the Simulator that made it, with the kappa of the call.
+        substeps: number of its time steps per knot.
+        wrenches: (T, nbody, 6) external wrenches [N, N m]; None without any.
     """
 
     x: Floats
@@ -354,16 +357,25 @@ class FeedbackRollout(Result):
     solved_knots: int
     residual: float
     detail: str = ""
+    simulator: Any = field(default=None, repr=False)
+    substeps: int = 1
+    wrenches: Floats | None = None
     knot = renamed("solved_knots")
 
     __repr__ = short_repr
 
+    @property
+    def time(self) -> Floats:
+        """(T + 1,) times of the knots [s]."""
+        return self.simulator.time_step * self.substeps * np.arange(float(len(self.x)))
+
     @classmethod
-    def of(cls, found: tuple[int, Path]) -> FeedbackRollout:
+    def of(cls, found: tuple[int, Path], **made_with: Any) -> FeedbackRollout:
         """The result of a rollout.
 
         Args:
             found: (number of solved knots, all of them).
+            **made_with: simulator, substeps, wrenches.
 
         Returns:
             The result.
@@ -371,7 +383,7 @@ class FeedbackRollout(Result):
         knot, path = found
         status, residual = Status(int(path.report[StepReport.STATUS])), float(path.report[StepReport.RESIDUAL])
         detail = reservation(path.report[None], "") if status == Status.SOLVED else ""
-        return cls(path.xs[: knot + 1], path.us[:knot], status, knot, residual, detail)
+        return cls(path.xs[: knot + 1], path.us[:knot], status, knot, residual, detail, **made_with)
 
 
 @dataclass(frozen=True)
@@ -478,7 +490,7 @@ def reservation(reports: Floats, noun: str = "step") -> str:
     where = f"{noun} {worst}" if noun else "a step"
     return (
         f"Solved, but the estimated error of {where} is {errors[worst]:.2g} times the one that the accuracy allows: "
-        "sub-steps in contact have a shortest length. Ask for less of it, or compare two accuracies."
+        "sub-steps in contact have a shortest length. Give a larger accuracy=..., or compare the motions of two."
     )
 
 

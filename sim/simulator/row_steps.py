@@ -84,8 +84,14 @@ class RowSteps:
         if alone and engine.in_one_kernel:
             return self.stepper(steps, contacts).step(states, inputs)
         kappas = self._kappas(kappa, count)
-        if contacts and (derivatives or not engine.in_one_kernel):
-            raise ValueError(f"{_CALL}(contacts=True): expected no derivatives, and a simulator without an accuracy")
+        if contacts and derivatives:
+            raise ValueError(f"{_CALL}(contacts=True): expected no derivatives")
+        if contacts and not engine.in_one_kernel:
+            s = engine.settings
+            raise ValueError(
+                f"{_CALL}(contacts=True): expected a simulator of order 2, got {s.kind}; use {s.way_to_order_two}, or "
+                "step(...).contacts of each row"
+            )
         rows = self._models.of(f"{_CALL}(parameters=...)", parameters, count)
         touched = np.zeros((count if contacts else 0, *engine.no_outputs[0].shape[1:]))
         settings = row_settings(rows, kappas)
@@ -153,9 +159,10 @@ class RowSteps:
         if key not in self._steppers:
             steps = room_for("Simulator.stepper(substeps)", substeps, 8.0 * (engine.nx + engine.nu + REPORT))
             if not engine.in_one_kernel:
+                s = engine.settings
                 raise ValueError(
-                    "Simulator.stepper: expected a simulator without an accuracy, and of order 2 where there are "
-                    "contacts or limits"
+                    "Simulator.stepper: expected a simulator of order 2, or of a higher one without contacts, limits "
+                    f"and stiff joints, got {s.kind}; use {s.way_to_order_two}"
                 )
             self._steppers[key] = KnotStepper(self._mechanism, engine, steps, contacts)
         return self._steppers[key]

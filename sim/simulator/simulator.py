@@ -248,7 +248,7 @@ class Simulator(StateSpace):
             parameters: {name: (n,) or (n, components), or one row for all}, as in `parameters`: the rows are those of
                 `with_parameters`, with the kappa of this simulator. A model is made once for each row of new values,
                 and kept.
-            contacts: whether to return those of the last step of every row, too; without derivatives.
+            contacts: whether to return those of the last step of every row, too. Order 2 only, without derivatives.
             impulses: those with which the last steps of these rows ended, of `row_impulses`; written, so that a motion
                 of many calls starts each knot where the last one ended, with fewer iterations. `forget` rows that jump
                 (default None: every row starts from its state alone).
@@ -346,7 +346,9 @@ class Simulator(StateSpace):
         policy = self._arguments.policy(name, state, inputs, external, (xs, ks, Ks, gaps))
         count, level = whole_number(f"{name}(substeps=...)", substeps), self._arguments.kappa(call, kappa)
         roll = partial(self._engine.roll_feedback, state, policy, factor, bounds, count, level)
-        return checked(converted(roll, FeedbackRollout.of), throw)
+        sim = self if level is None else self.replace(kappa=level)
+        made = partial(FeedbackRollout.of, simulator=sim, substeps=count, wrenches=external)
+        return checked(converted(roll, made), throw)
 
     closed_loop = renamed("rollout_feedback")
 

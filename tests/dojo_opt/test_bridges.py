@@ -56,6 +56,12 @@ def jax() -> Iterator[Any]:
     jax.config.update("jax_enable_x64", before)
 
 
+@pytest.mark.parametrize("setting", [{"order": 4}, {"accuracy": 1e-3}])
+def test_parameters_without_derivatives_are_refused(setting: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=r"f\(parameters=\.\.\.\): expected a simulator of order 2"):
+        Rollouts("f", PENDULUM.replace(**setting), None, dojo.ParameterSpace(PENDULUM, ("mass",)))
+
+
 def test_pullback_is_the_gradient_of_the_rollout_from_states_made_unit() -> None:
     core = Rollouts("here", HOPPER, None, SPACE)
     (x0,), (us,), (weight,) = motions(1)

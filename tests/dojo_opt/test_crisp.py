@@ -73,6 +73,14 @@ def test_forces_at_the_ends_of_a_face_are_a_force_on_it():
     assert turned[6] < -0.05
 
 
+def test_a_plan_of_another_robot_has_no_outcome():
+    task, plan = (getattr(dojo.tasks.crisp, name)() for name in ("cart_pole", "hopper"))
+    with pytest.raises(ValueError, match=r"PlanTask\.outcome\(plan\): expected a plan of 'crisp\.cart_pole'"):
+        task.outcome(dojo.ilqr(plan.problem, max_iterations=1))
+    with pytest.raises(TypeError, match="expected a Plan"):
+        task.outcome(plan)
+
+
 def test_an_angle_is_judged_modulo_a_turn():
     judge = pushing.Placed((1.0, 2.0, 4.0), 0.01, 0.01)
     plan = type("P", (), {"x": pushing.flat_pose((1.0, 2.0, 4.0 - 2.0 * np.pi))[None]})

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from dojo_opt.learn.network import Network
+from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.randomization import Drawn
 from dojo_opt.learn.registration import task_of
 from support.robot_files import has_robots
@@ -46,6 +48,31 @@ def test_the_ant_of_dojo_observes_its_attitude_and_normal_impulses():
     low = x[:1].copy()
     low[0, 2] = 0.19
     assert task.ends(np.concatenate([x[:1], low])).tolist() == [False, True]
+
+
+@pytest.mark.slow
+def test_a_policy_feels_the_contacts_of_the_plant():
+    """In a closed loop as in an environment, where the forces are part of the state."""
+    task = task_of("AntArs")
+    net, rng = Network((task.observations, task.sim.nu)), np.random.default_rng(2)
+    weights = 0.3 * rng.standard_normal(net.count)
+    policy = LearnedPolicy(net, weights, np.zeros(task.observations), np.ones(task.observations), task)
+    model, x = Drawn.of(task), task.starts([rng])
+    plant, states = dojo.Plant(task.sim, x[0, : task.sim.nx]), []
+    for _ in range(20):
+        states.append(x[0, : task.sim.nx])
+        x = model.step(x, policy(x[0])[None]).x
+    assert np.abs(x[0, -54:]).max() > 1.0  # [N]
+    controller = policy.controller
+    with pytest.raises(ValueError, match=r"forces of contacts.*call reset\(\)"):
+        controller(0.0, plant.x)
+    for _ in range(2):  # a second run begins without forces
+        loop = dojo.closed_loop(
+            controller, plant, 20 * task.knot_time, control_step=task.knot_time, fallen=lambda x: False
+        )
+        np.testing.assert_allclose(loop.x[:: task.substeps][:20], states, atol=1e-9)
+    with pytest.raises(ValueError, match=r"commanded\(command\): expected shape \(0,\)"):
+        policy.commanded((1.0,))
 
 
 @pytest.mark.slow

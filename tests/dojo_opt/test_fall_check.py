@@ -45,6 +45,24 @@ def test_it_agrees_with_the_pose_of_the_base(build):
     assert 20 < fallen < 190
 
 
+@pytest.mark.parametrize("rise", [0.0, -1.0, 1.0])
+def test_the_ground_is_a_half_space_of_a_collision_as_of_a_contact(rise):
+    """A ball rests on it, and falls beside it; one without ground that begins below the origin has no height to lose."""
+    ball, free = dojo.Body("ball", 1.0, shape=dojo.Sphere(0.1)), dojo.Joint("floating", None, "ball")
+    place, up = [0.0, 0.0, rise + 0.1, 1.0, 0.0, 0.0, 0.0], np.array([0.0, 0.0, 1.0])
+    plane = dojo.Collision("ball", shape_b=dojo.HalfSpace(center=(0.0, 0.0, rise)))
+    given = ({"contacts": [dojo.Contact("ball", radius=0.1, height=rise)]}, {"collisions": [plane]})
+    checks = [
+        FallCheck(dojo.Mechanism([ball], [free], neutral={"ball": place}, **ground), np.array(place + 6 * [0.0]), up)
+        for ground in (*given, {})
+    ]
+    for height in (0.06, 0.04):
+        x = np.array([0.0, 0.0, rise + height, 1.0, *9 * [0.0]])
+        assert [check(x) for check in checks[:2]] == 2 * [height < 0.05]
+        assert checks[0].height(x) == pytest.approx(checks[1].height(x), abs=1e-12)
+    assert not checks[2](np.array([*place, *6 * [0.0]]))
+
+
 def test_a_held_command_takes_the_steps_of_a_plant():
     sim = dojo.Simulator(dojo.models.hopper(), time_step=5e-3)
     u = np.linspace(-1.0, 1.0, sim.nu)

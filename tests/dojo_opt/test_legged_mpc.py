@@ -1,11 +1,15 @@
 """A robot of any make under a velocity command: its reference, and closed loops with pushes and steering."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 import dojo_opt as dojo
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.mpc.settings import OPTIONS
+from dojo_opt.tasks.commanded import CommandedGait
+from dojo_opt.tasks.legged import _period
 
 
 def steering(time):
@@ -36,6 +40,20 @@ def test_the_reference_of_a_turning_robot_goes_on_and_its_feet_stand_still(mpc):
     assert 0.4 < still.mean() < 0.6, still.mean(axis=0)
     gait.anchor(0.0, mpc.start)
     np.testing.assert_array_equal(gait([0.0])[0], mpc.start)
+
+
+def test_references_of_a_model_of_higher_order_have_the_velocities_of_their_times(mpc):
+    """Those over a time step are half a step late, which accelerations show."""
+    robot = mpc.sim.mechanism
+    make = partial(_period, "trot", period=0.48, step_height=0.05)
+    sims = [dojo.Simulator(robot, 0.04), dojo.Simulator(robot, 0.04, order=4)]
+    t, e = 0.48 + 0.04 * np.arange(12), 2.5e-3  # at samples of the gait
+    mean, node = (CommandedGait(sim, make, (0.2, 0.0, 0.3)) for sim in sims)
+    nq, nv = sims[0].nq, sims[0].nv
+    np.testing.assert_allclose(mean(t)[:, :nq], node(t)[:, :nq], atol=1e-9)
+    actual = sims[0].difference(node(t + e), node(t - e))[:, :nv] / (2.0 * e)
+    off = [np.abs(gait(t)[:, nq:] - actual)[:, 6:].mean() for gait in (mean, node)]
+    assert off[1] < 0.1 * off[0], off
 
 
 def test_a_robot_is_steered_and_pushed(mpc):

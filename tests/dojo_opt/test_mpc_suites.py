@@ -400,6 +400,17 @@ def test_the_step_of_a_compensated_arm_is_differentiated_by_mass_gravity_and_tim
         np.testing.assert_allclose(slope.ravel(), (ends[0] - ends[1]) / (2.0 * e), rtol=1e-5, atol=1e-7)
 
 
+def test_a_run_of_another_robot_has_no_outcome_and_a_plant_its_own_seed():
+    task, sim = dojo.tasks.idto.acrobot(), dojo.Simulator(arm(), time_step=0.01)
+    loop = dojo.closed_loop(lambda t, x: [0.0], dojo.Plant(sim), 0.01)
+    with pytest.raises(ValueError, match=r"expected a run of 'idto\.acrobot', with the coordinates of 'acrobot'"):
+        task.outcome(loop)
+    with pytest.raises(TypeError, match="expected a ClosedLoop"):
+        task.outcome(sim)
+    with pytest.raises(ValueError, match=r"SuiteTask\.run\(seed=\.\.\., plant=\.\.\.\): expected one"):
+        task.run(1, plant=task.plant())
+
+
 def test_a_task_runs_from_the_command_line(tmp_path, capsys):
     page = tmp_path / "spinner.html"
     command = ["run", "idto.spinner", "--set", "seed=1", "--seconds", "0.05", "--json", "--html", str(page)]

@@ -6,6 +6,7 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt import problems
 from dojo_opt.planning.ilqr import ilqr
+from dojo_opt.viewer.motion import motion
 
 pytestmark = pytest.mark.slow
 
@@ -60,7 +61,10 @@ def test_replays_with_shorter_steps_keep_the_stiffness_of_contacts():
     assert off < 3e-3 < 3e-2 < soft
     same = plan.replay(time_step=plan.time_step)
     assert np.abs(same.x - plan.x).max() < 1e-5
-    with pytest.raises(ValueError, match="whole part of the knot"):
+    shown = motion(same)
+    np.testing.assert_allclose(shown.time, plan.time, atol=1e-12)
+    assert len(shown.normal_force) == len(plan.u) * plan.substeps
+    with pytest.raises(ValueError, match="whole part of the knot of .* s, such as"):
         plan.replay(time_step=0.7 * plan.time_step)
     with pytest.raises(ValueError, match="no accuracy beside it"):
         plan.replay(time_step=h, accuracy=1e-4)

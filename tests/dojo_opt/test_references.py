@@ -42,6 +42,8 @@ def test_sampled_velocities_over_the_step_of_a_model():
     cycle[0] = 0.1
     mean = SampledReference(time, rows, HOPPER, cycle).with_mean_velocities(0.05)
     np.testing.assert_allclose(mean.rows[:, 8], [0.7, 0.3, 0.7], atol=1e-9)
+    with pytest.raises(ValueError, match="with_mean_velocities: expected a simulator of order 2"):
+        SampledReference(time, rows, HOPPER.replace(order=4), cycle).with_mean_velocities(0.05)
 
 
 @pytest.mark.parametrize(

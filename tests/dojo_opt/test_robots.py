@@ -181,6 +181,11 @@ def test_an_arm_reaches_a_pose_within_its_limits():
     np.testing.assert_allclose(kin.pose("link7", plan.x[-1, : sim.nq])[0], at + (0.1, 0.2, -0.1), atol=1e-3)
     np.testing.assert_allclose(plan.x[-1, sim.nq :], 0.0, atol=1e-3)
     assert plan.nit < 30 and R.shape == (3, 3)
+    means, nodes = (
+        dojo.problems.reach(one, "link7", at + (0.1, 0.2, -0.1), duration=1.0, time_step=0.05).states0[:, sim.nq :]
+        for one in (sim, sim.replace(order=4))
+    )
+    np.testing.assert_allclose(means[1:-1], 0.5 * (nodes[:-2] + nodes[1:-1]), atol=0.02)  # of 0.6 rad/s
 
 
 @pytest.mark.slow

@@ -62,6 +62,11 @@ def test_a_plant_stands_on_terrain_and_refuses_a_slope_of_its_own():
     plant = dojo.Plant(dojo.Simulator(ball(radius=0.1), time_step=0.02), terrain=hill)
     assert plant.simulator.mechanism.contacts[0].height == pytest.approx(np.cos(0.2))
     assert plant.x[2] == pytest.approx(hill.height(*plant.start[:2]) + 0.1 / np.cos(0.2))  # it touches
+    high = plant.start.copy()
+    high[2] = 0.6  # and falls from half a metre, as on level ground
+    assert dojo.Plant(plant.nominal, high, terrain=hill).x[2] == pytest.approx(plant.x[2] + 0.5)
+    smooth = dataclasses.replace(ball(), contacts=())
+    assert dojo.Plant(dojo.Simulator(smooth, time_step=0.02), high, terrain=hill).x[2] == high[2]
     far = plant.x.copy()
     far[[0, 2]] += 5.0, 5.0 * np.tan(0.2)
     assert not plant.fallen(far)

@@ -189,6 +189,20 @@ def test_a_plant_with_short_steps_does_not_make_a_long_file(tmp_path):
     assert abs(short - long) < 5_000
 
 
+def test_a_rollout_with_feedback_is_shown_at_its_times():
+    """With the forces of its steps, under its wrenches; also one that ends at once."""
+    sim = dojo.Simulator(dojo.models.raiberthopper(), time_step=0.01)
+    us, lift = np.tile([0.0, 0.0, 41.0], (3, 1)), {"body": (0.0, 0.0, 20.0, 0.0, 0.0, 0.0)}
+    found = sim.rollout_feedback(sim.neutral(), us, substeps=4, kappa=1e-4, wrenches=lift)
+    steps = sim.replace(kappa=1e-4).rollout(sim.neutral(), np.repeat(us, 4, axis=0), wrenches=lift)
+    shown = motion(found)
+    np.testing.assert_allclose(shown.time, found.time)
+    assert shown.time[-1] == pytest.approx(0.12) and shown.contact_time[-1] == pytest.approx(0.12)
+    np.testing.assert_allclose(shown.force, steps.contacts.force, atol=1e-5)
+    np.testing.assert_allclose(shown.x, steps.x[::4], atol=1e-7)
+    assert motion(dataclasses.replace(found, x=found.x[:1], u=found.u[:0])).force.shape == (0, 1, 3)
+
+
 def test_obstacles_are_drawn():
     ball = dojo.Body("ball", 1.0, shape=dojo.Sphere(0.1))
     walls = [

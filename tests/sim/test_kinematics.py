@@ -160,6 +160,10 @@ def test_inverse_kinematics_of_a_floating_robot(tmp_path: Path) -> None:
     np.testing.assert_allclose(kin.center_of_mass(found.q), com, atol=1e-7)
     held = dojo.ik(sim, {"hand": kin.pose("hand", start)[0] + (0.01, 0.01, 0.01)}, start, fixed=["floating_base"])
     np.testing.assert_array_equal(held.q[:7], start[:7])
+    beyond = start + np.r_[np.zeros(7), 1.7, np.zeros(len(start) - 8)]  # the first hinge, of 1.5
+    joint = sim.mechanism.joints[1].name
+    held = dojo.ik(sim, {"hand": kin.pose("hand", beyond)[0] + (0.01, 0.01, 0.01)}, beyond, fixed=[joint])
+    assert held.success and held.q[7] == beyond[7]
     with pytest.raises(ValueError, match=r"ik\(fixed=\.\.\.\): 'base' is not one of"):
         dojo.ik(sim, {"hand": (0, 0, 0)}, fixed=["base"])
     again = dojo.ik(sim, {"hand": kin.pose("hand", found.q)}, start)

@@ -78,6 +78,13 @@ def test_a_file_collides_with_itself_where_it_can(tmp_path: Path) -> None:
     assert listed == {"d-e"}
     again = replace(mech, collisions="self")
     assert {collision.name for collision in again.collisions} == found
+    held = dojo.load_urdf(file, floating=False, position=(1.0, 0.0, 0.5), collisions="self")  # a is part of the world
+    assert {(c.name, c.b == "world") for c in held.collisions} == {
+        (name.removeprefix("a."), name.startswith("a.")) for name in found
+    }
+    tool = next(c.shape_b for c in held.collisions if c.name == "tool-c")
+    assert tool is not None
+    np.testing.assert_allclose(tool.center, (0.8, 0.0, 0.5), atol=1e-12)
     with pytest.raises(ValueError, match="all"):
         dojo.load_urdf(file, collisions="all")
 

@@ -197,6 +197,20 @@ def test_bad_arguments_are_named(sim, change, message):
         sim.step_batch(X, U, **change)
 
 
+@pytest.mark.parametrize(
+    ("setting", "kind"),
+    [({"order": 4}, r"order 4; use replace\(order=2\)"), ({"accuracy": 1e-3}, "accuracy 0.001; use")],
+)
+def test_steps_of_other_kinds_have_no_contacts_in_batches(setting, kind):
+    """Nor tasks that need them, which say so at once."""
+    other = dojo.Simulator(dojo.models.raiberthopper(), 0.01, **setting)
+    for call in (lambda: other.step_batch(*_rows(other, 2), contacts=True), lambda: other.stepper(contacts=True)):
+        with pytest.raises(ValueError, match=rf"expected a simulator of order 2.*, got {kind}"):
+            call()
+    with pytest.raises(ValueError, match=r"Task\(touch=\.\.\.\): expected a simulator of order 2"):
+        dojo.learn.Task(other, 1, print, 1, print, -np.ones(3), np.ones(3), print, touch=(("foot",),))
+
+
 def test_a_collision_that_moved_beyond_its_reach_keeps_nothing_of_the_step_before() -> None:
     bodies = [dojo.Body(name, 1.0, (0.1, 0.1, 0.1)) for name in "ab"]
     joints = [dojo.Joint("floating", None, name) for name in "ab"]

@@ -156,14 +156,17 @@ def test_mimics_become_gears_or_move_freely_with_a_warning_or_are_locked(tmp_pat
 
 
 def test_dry_friction_and_unread_elements_are_in_the_report(tmp_path: Path) -> None:
-    extra = '<transmission name="t"/>'
-    mech = dojo.load_urdf(arm(tmp_path, extra, inside=(AXIS, '<dynamics friction="0.2"/>')))
+    extra = '<transmission name="t"/><link name="ball"><contact><stiffness value="9"/></contact></link>'
+    fixed = joint("weld", "forearm", "ball", "fixed", "<calibration rising='0'/>", "<actuator name='a'/>")
+    inside = (AXIS, '<dynamics friction="0.2" armature="0.1"/>')
+    mech = dojo.load_urdf(arm(tmp_path, extra, fixed, inside=inside))
     texts = [str(note) for note in mech.report.notes]
     assert any("dry friction" in text and text.endswith("elbow") for text in texts)
-    assert "not read: <transmission> (1)" in texts
+    places = ("<joint><dynamics armature>", "<transmission>", "<link><contact><stiffness>", "<joint><actuator>")
+    assert f"not read: {', '.join(f'{place} (1)' for place in places)}" in texts
     rubbing = dojo.load_urdf(tmp_path / "robot.urdf", joint_friction=True)
     assert rubbing.joints[1].friction == (0.2,) and not any("dry" in str(note) for note in rubbing.report.notes)
-    assert str(mech.report).startswith("robot.urdf: 2 links, 0 of them")
+    assert str(mech.report).startswith("robot.urdf: 3 links, 1 of them")
 
 
 def test_the_report_stays_with_the_mechanism(tmp_path: Path) -> None:

@@ -18,6 +18,8 @@ def test_a_fixed_base_stands_where_it_is_put(tmp_path: Path) -> None:
         assert mech.nv == 1
         np.testing.assert_allclose(body_poses(mech.joints, np.zeros(1))["forearm"].point, (1.1, 1.8, 3.3), atol=1e-15)
         assert mech.joint_names == (("elbow",) if merge else ("fixed_base", "elbow"))
+        root = dojo.Kinematics(dojo.Simulator(mech, time_step=0.01)).pose(next(iter(mech.report.links)), np.zeros(1))
+        np.testing.assert_allclose(root[0], (1.0, 2.0, 3.0), atol=1e-15)
 
 
 def test_a_root_called_world_is_the_world(tmp_path: Path) -> None:

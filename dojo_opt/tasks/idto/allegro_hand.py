@@ -14,8 +14,8 @@ from sim.mechanism.collision import Collision
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.pose import quat_product
 from sim.mechanism.shapes import Box, Sphere, rotation_matrix
-from solvers.types import Vector
 
 __all__ = ["JOINTS", "STIFFNESS", "Angles", "mechanism"]
 
@@ -45,7 +45,9 @@ def _finger(name: str, side: float, limits: bool) -> list[FileLink]:
     last = (1.263e-5, 1.182e-5, 2.484e-6, 2.1e-9, -9.8e-9, -1.3e-8)
     zero, y = (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)
     links = [
-        FileLink(f"{name}_0", None, 0.0119, zero, first, pos=place, quat=_product(_UP, turn), axis=(0.0, 0.0, -1.0)),
+        FileLink(
+            f"{name}_0", None, 0.0119, zero, first, pos=place, quat=quat_product(_UP, turn), axis=(0.0, 0.0, -1.0)
+        ),
         FileLink(f"{name}_1", f"{name}_0", 0.065, zero, second, pos=(0.0, 0.0, 0.0164), axis=y),
         FileLink(f"{name}_2", f"{name}_1", 0.0355, zero, third, pos=(0.0, 0.0, 0.054), axis=y),
         FileLink(f"{name}_3", f"{name}_2", 0.0264, zero, last, pos=(0.0, 0.0, 0.0384), axis=y),
@@ -63,19 +65,13 @@ def _thumb(limits: bool) -> list[FileLink]:
     last = (7.054e-5, 6.564e-5, 1.954e-5, 0.0, 0.0, -3.3e-8)
     zero, y = (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)
     links = [
-        FileLink("thumb_0", None, 0.0176, zero, first, pos=place, quat=_product(_UP, turn), axis=(1.0, 0.0, 0.0)),
+        FileLink("thumb_0", None, 0.0176, zero, first, pos=place, quat=quat_product(_UP, turn), axis=(1.0, 0.0, 0.0)),
         FileLink("thumb_1", "thumb_0", 0.0119, zero, second, pos=(-0.027, -0.005, 0.0399), axis=(0.0, 0.0, -1.0)),
         FileLink("thumb_2", "thumb_1", 0.038, zero, third, pos=(0.0, 0.0, 0.0177), axis=y),
         FileLink("thumb_3", "thumb_2", 0.0556, (0.0, 0.0, 0.012781), last, pos=(0.0, 0.0, 0.0514), axis=y),
     ]
     ranges = zip(links, _THUMB_RANGES, strict=True)
     return [link._replace(damping=0.015, limits=r if limits else None) for link, r in ranges]
-
-
-def _product(p: Any, q: Any) -> Vector:
-    """Quaternion of q followed by p."""
-    a, b = np.asarray(p, dtype=np.float64), np.asarray(q, dtype=np.float64)
-    return np.array([a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
 
 
 _SPHERES: dict[str, tuple[tuple[int, float, float], ...]] = {  # of a link: number, height [m], radius [m]

@@ -13,6 +13,7 @@ from sim.derivatives.parameters.terrain_parameters import terrains
 from sim.mechanism.loop_joints import parts_of
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.polytope import Polytope
+from sim.mechanism.pose import quat_product
 from sim.mechanism.shapes import String
 from solvers.types import Floats
 
@@ -166,6 +167,4 @@ def _moved(part: Any, d: Floats, field: str = "center") -> Any:
 def _turned(quat: Floats, turn: Floats) -> Floats:
     """quat exp(turn)"""
     angle = float(np.linalg.norm(turn))
-    w, v = np.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / np.pi) * turn
-    scalar = quat[0] * w - quat[1:] @ v
-    return np.concatenate([[scalar], quat[0] * v + w * quat[1:] + np.cross(quat[1:], v)])
+    return quat_product(quat, (np.cos(0.5 * angle), *(0.5 * np.sinc(0.5 * angle / np.pi) * turn)))

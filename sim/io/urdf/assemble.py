@@ -26,9 +26,8 @@ from sim.mechanism.composite_inertia import composite
 from sim.mechanism.contact import Contact
 from sim.mechanism.input import Input
 from sim.mechanism.joint import KINDS, WORLD, Joint
-from sim.mechanism.pose import HERE, Pose
+from sim.mechanism.pose import Pose
 from sim.mechanism.stance import gaps, lifted, resting
-from sim.mechanism.visual import Visual
 from solvers.types import Floats
 
 ROOT_JOINT = {
@@ -68,6 +67,7 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
     inertias = _inertias(groups, choices, notes)
     coms = {name: part.com for name, part in inertias.items()}
     joints = _joints(groups, places, coms, choices, root)
+    still, away = _part_of_world(places, coms), -np.asarray(choices.position)
     closing = _closing(loops, places, coms, zero_poses(root, order), choices, notes)
     given = {**robot.joints, **{name: loop.joint for name, loop in loops.items()}}
     mech = UrdfMechanism(
@@ -78,7 +78,7 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
         gravity=choices.shared.gravity,
         name=robot.name,
         neutral=_neutral_state(robot, joints, choices),
-        scenery=_scenery(places, coms, choices),
+        scenery=body_visuals(still, away),
         gears=mimic_gears(robot, choices.geared, {j.name: j.nv for j in joints}),
     )
     bases = [j.name for j in joints if j.kind == "floating" and j.parent == WORLD]
@@ -86,8 +86,9 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
         mech = replace(mech, neutral=lifted(mech, bases[0]))
     _ground_notes(mech, choices, bool(bases), notes)
     _friction_notes([body.joint for body in groups if body.joint and not body.fixed], loops, choices, notes)
-    mech = with_self_collisions(mech, choices.shared, notes) if choices.shared.itself else mech
-    report = _report(given, mech, places, coms, choices.file, notes)
+    if choices.shared.itself:
+        mech = with_self_collisions(mech, choices.shared, notes, collision_shapes(still, away))
+    report = _report(given, mech, places, coms, away, choices.file, notes)
     for note in report.notes:
         if note.warn:
             warnings.warn(f"load_urdf: {choices.file}: {note}", UrdfWarning, stacklevel=3)
@@ -242,11 +243,9 @@ def _body(body: MergedLinks, part: RigidInertia) -> Body:
     return Body(body.name, part.mass, part.inertia, body_shapes(body, part.com), visuals=body_visuals(body, part.com))
 
 
-def _scenery(places: Mapping[str, Place], coms: Mapping[str, Floats], choices: Choices) -> list[Visual]:
-    """Pictures of the links that are part of the world."""
-    still = [(p.link, p.pose) for p in places.values() if p.group.name not in coms]
-    world = MergedLinks(None, None, links=still)
-    return list(body_visuals(world, -np.asarray(choices.position)))
+def _part_of_world(places: Mapping[str, Place], coms: Mapping[str, Floats]) -> MergedLinks:
+    """The links that are part of the world."""
+    return MergedLinks(None, None, links=[(p.link, p.pose) for p in places.values() if p.group.name not in coms])
 
 
 def _closing(
@@ -319,14 +318,15 @@ def _report(
     mech: UrdfMechanism,
     places: Mapping[str, Place],
     coms: Mapping[str, Floats],
+    away: Floats,
     file: str,
     notes: Notes,
 ) -> UrdfReport:
-    """Where the links are, and the bounds of the inputs."""
+    """Where the links are, and the bounds of the inputs; away: (3,) origin of the world, from that of its links."""
     links = {}
     for name, place in places.items():
         body = place.group.name if place.group.name in coms else None
-        pose = Pose(place.pose.rotation, place.pose.point - (coms[body] if body else HERE.point))
+        pose = Pose(place.pose.rotation, place.pose.point - (coms[body] if body else away))
         links[name] = LinkFrame(body, tuple(float(x) for x in pose.point), pose.quaternion)
     driven = [joints[part.joint or ""] for part in mech.inputs or ()]
     return UrdfReport(

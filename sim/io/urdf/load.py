@@ -81,8 +81,9 @@ def load_urdf(
             the file has it, else 0.
         law: law of contacts of shapes and of self-collisions, see `dojo.Contact`.
         rim_points: number of points per rim of a cylinder.
-        collisions: "self" lets all links collide but those that a joint connects; `report` lists pairs of shapes that
-            overlap in the neutral state, which do not. None: the robot does not touch itself.
+        collisions: "self" lets all links collide but those that a joint connects, with links that are part of the
+            world, too; `report` lists pairs of shapes that overlap in the neutral state, which do not. None: the robot
+            does not touch itself.
         meshes: replacement of a collision mesh: "hull", its convex hull reduced to `mesh_corners`; "decompose", several
             such hulls, by CoACD; "sphere", "box" or "capsule", fitted ones, for feet and for speed; "none"; or a dict
             of these by link, with "*" for all others. `report` has the largest distances from the meshes. Needs trimesh

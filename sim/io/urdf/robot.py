@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
@@ -10,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from sim.io.urdf.report import Notes
+from sim.io.urdf.unread import unread
 from sim.io.urdf.xml import Element
 from sim.mechanism.joint import KINDS as JOINT_KINDS
 from sim.mechanism.pose import HERE, Pose, roll_pitch_yaw
@@ -45,8 +45,6 @@ KINDS = {
 }
 KINDS |= {kind: kind for kind in JOINT_KINDS if kind not in (*KINDS, "screw")}
 SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
-# elements without effect on the motion of bodies, or without use in a step
-READ = {"link", "joint", "loop_joint"}
 
 
 @dataclass(frozen=True)
@@ -128,9 +126,8 @@ def read_robot(root: Element, notes: Notes) -> Robot:
     joints = _by_name(root.all("joint"), lambda e: _joint(e, notes))
     if not links:
         raise root.error("expected at least one <link>")
-    others = Counter(e.tag for e in root.children if e.tag not in READ)
-    if others:
-        notes.add("not read", (f"<{tag}> ({count})" for tag, count in others.items()))
+    if others := unread(root):
+        notes.add("not read", (f"{place} ({count})" for place, count in others.items()))
     mimics = tuple(name for name, joint in joints.items() if joint.element.one("mimic"))
     return Robot(root.attributes.get("name") or "robot", links, joints, mimics)
 
