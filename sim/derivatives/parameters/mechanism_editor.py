@@ -32,6 +32,9 @@ class Draft:
         self.gears = {g.name: g for g in mech.gears}
         self.inputs = {i.name: i for i in mech.inputs or ()}
         self.gravity = np.array(mech.gravity, dtype=np.float64)
+        self.report: Any = getattr(
+            mech, "report", None
+        )  # of the file that it was loaded from, with frames of its parts
 
     def change(self, kind: str, part: str, entries: Entries) -> None:
         """Give one number, or some components of a vector, their values."""
@@ -105,6 +108,8 @@ class Draft:
                 shape = getattr(collision, field)
                 if side == name and shape is not None:
                     self.collisions[label] = replace(self.collisions[label], **{field: _moved(shape, -d)})
+        if self.report is not None:
+            self.report = _with_moved_frames(self.report, name, -d)
 
     def _change_shape(self, name: str, kind: str, entries: Entries) -> None:
         """The shape of a collision sits elsewhere in its body, or has another size; other collisions keep theirs."""
@@ -136,8 +141,10 @@ class Draft:
     def finish(self) -> Mechanism:
         """The changed mechanism."""
         mech = self.mech
+        report = {} if self.report is None else {"report": self.report}
         return replace(
             mech,
+            **report,
             bodies=tuple(self.bodies.values()),
             joints=tuple(self.joints[j.name] for j in mech.joints),
             loops=tuple(self.joints[j.name] for j in mech.loops),
@@ -162,6 +169,16 @@ def _entries(values: Any, entries: Entries) -> Any:
 def _moved(part: Any, d: Floats, field: str = "center") -> Any:
     """The part with its point moved by d."""
     return replace(part, **{field: np.asarray(getattr(part, field)) + d})
+
+
+def _with_moved_frames(report: Any, body: str, d: Floats) -> Any:
+    """The report of a URDF or MJCF file with the frames on a body moved by d."""
+    field = "links" if hasattr(report, "links") else "bodies"
+    frames = dict(getattr(report, field))
+    for name, at in frames.items():
+        if at.body == body:
+            frames[name] = replace(at, point=tuple((np.asarray(at.point) + d).tolist()))
+    return replace(report, **{field: frames})
 
 
 def _turned(quat: Floats, turn: Floats) -> Floats:

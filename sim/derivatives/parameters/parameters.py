@@ -46,8 +46,8 @@ class Parameters:
     that adds the same to all parts, at the mean of their values. Kinds:
 
         mass [kg], inertia [kg m^2]        of bodies; a mass changes alone
-        com [m]                            displacement of a centre of mass; joints, contacts and shapes stay where they
-                                           are on the body
+        com [m]                            displacement of a centre of mass; joints, contacts, shapes and frames of a
+                                           file stay where they are on the body, forces of inputs go with its centre
         parent_point, child_point [m]      of joints, also of those that close loops
         orientation [rad], axis            rotation vector of the joint frame, from where it is; direction
         spring [N/m, N m/rad], damper [N s/m, N m s/rad], rest [m, rad], armature [kg, kg m^2], lower, upper [m, rad],
