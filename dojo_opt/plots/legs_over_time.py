@@ -116,10 +116,17 @@ def dof_limits(mech: Mechanism) -> list[tuple[float, float]]:
     return out
 
 
-def draw_limits(ax: Axes, limits: Any) -> None:
+def draw_limits(ax: Axes, limits: Any) -> str:
     """Dashed lines at the limits, a pair per curve, that are no further from the curves than half their range.
 
     They have the colours of their curves; a limit of several curves is grey.
+
+    Args:
+        ax: the axes.
+        limits: (lower, upper) of each curve.
+
+    Returns:
+        A line that says so, for the label of the axis; empty without such limits.
     """
     low, high = ax.get_ylim()
     room = 0.5 * (high - low)
@@ -127,6 +134,8 @@ def draw_limits(ax: Axes, limits: Any) -> None:
     for k, pair in enumerate(limits):
         for bound in {round(float(b), 9) for b in pair if np.isfinite(b)}:
             colors[bound] = "0.3" if bound in colors else f"C{k % 10}"
-    for bound, color in colors.items():
-        if low - room <= bound <= high + room:
-            ax.axhline(bound, color=color, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
+    near = {bound: color for bound, color in colors.items() if low - room <= bound <= high + room}
+    for bound, color in near.items():
+        ax.axhline(bound, color=color, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
+    grey = ", grey of several" if "0.3" in near.values() else ""
+    return f"\n(dashed: limits{grey})" if near else ""

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 
 _MOST, _DOTS = 8, 80  # lines of a panel of contacts; points of a path that are marked
+_LIGHT = 1e-4  # times the weight: a force of a contact that does not touch
 _FEW_DOFS, _COLUMNS = 10, 6  # up to so many degrees of freedom share a panel; so many branches fit beside one another
 
 
@@ -35,7 +36,7 @@ def trajectory(
 ) -> Figure | SubFigure:
     """The panels of a motion: state, controls, contact forces, path of body and feet.
 
-    A mechanism without contacts shows its velocities instead of their forces. A robot with legs or arms on a base shows
+    A motion without contacts shows its velocities instead of their forces. A robot with legs or arms on a base shows
     the base, then joints and inputs leg by leg: grey while the leg stands, with the limits that are near.
 
     Args:
@@ -64,9 +65,15 @@ def trajectory(
     axes = np.ravel(figure.subplots(2, 2))
     state(m, axes[0])
     controls(m, axes[1])
-    (contact_forces if m.mechanism.contact_names else velocities)(m, axes[2])
+    (contact_forces if _touches(m) else velocities)(m, axes[2])
     paths(m, axes[3])
     return figure
+
+
+def _touches(m: Motion) -> bool:
+    """Whether a contact is loaded: the forces kappa/(gap h) of far ones are far below the weight."""
+    weight = sum(body.mass for body in m.mechanism.bodies) * float(np.linalg.norm(m.mechanism.gravity))
+    return bool(m.normal_force.max(initial=0.0) > _LIGHT * weight)
 
 
 def _by_branches(m: Motion, parts: list[Branch], figure: Any) -> None:
@@ -82,7 +89,7 @@ def _by_branches(m: Motion, parts: list[Branch], figure: Any) -> None:
         for dof in dofs:
             ax.plot(m.time, values[dof], label=names[dof].removeprefix(f"{base.name} "))
         _finish(ax, label, "time [s]", at_lines=True)
-    (contact_forces if m.mechanism.contact_names else velocities)(m, forces)
+    (contact_forces if _touches(m) else velocities)(m, forces)
     paths(m, way)
     rows = below.subplots(2, len(parts), sharex=True, sharey="row", squeeze=False)
     for k, part in enumerate(parts):
@@ -103,8 +110,8 @@ def state(m: Motion, ax: Axes) -> Axes:
             ax.plot(m.time, values, label=label)
             drawn.append(dof)
     bounds = dof_limits(m.mechanism)
-    draw_limits(ax, [bounds[dof] for dof in drawn])
-    return _finish(ax, f"coordinates {units(m.mechanism, 'm', 'rad', drawn)}", "time [s]", at_lines=True)
+    note = draw_limits(ax, [bounds[dof] for dof in drawn])
+    return _finish(ax, f"coordinates {units(m.mechanism, 'm', 'rad', drawn)}{note}", "time [s]", at_lines=True)
 
 
 @panel
@@ -120,8 +127,8 @@ def controls(m: Motion, ax: Axes) -> Axes:
     """Inputs over time, each constant over its knot."""
     for k, name in enumerate(m.mechanism.input_names):
         ax.stairs(m.u[:, k], m.time, baseline=None, label=name)
-    draw_limits(ax, np.transpose(m.mechanism.input_limits))
-    return _finish(ax, f"inputs {input_units(m.mechanism)}", "time [s]", at_lines=True)
+    note = draw_limits(ax, np.transpose(m.mechanism.input_limits))
+    return _finish(ax, f"inputs {input_units(m.mechanism)}{note}", "time [s]", at_lines=True)
 
 
 @panel
