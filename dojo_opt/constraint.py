@@ -57,6 +57,10 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    return list(__all__)
+
+
 @dataclass(frozen=True)
 class Goal(Spec):
     """(x_t (-) target)_i = 0 for chosen tangent components i at chosen knots.

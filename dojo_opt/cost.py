@@ -44,6 +44,10 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    return list(__all__)
+
+
 def _checked_weight(call: str, value: ArrayLike, rows: int, columns: int, scale: float) -> NDArray[np.float64]:
     """scale * value as a table (rows, columns) of numbers >= 0."""
     weight = table(f"{call}(weight=...)", value, rows, columns)

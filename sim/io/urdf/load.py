@@ -57,7 +57,8 @@ def load_urdf(
             either case, unless nothing could move then: the rest floats without it. The joint is called
             "floating_base": its coordinates are the position of the root's frame and its quaternion, its speeds that of
             the frame's origin (world) and of rotation (body).
-        ground: whether collision shapes cannot enter the half-space z < 0.
+        ground: whether collision shapes cannot enter the half-space z < 0. Plans of an arm that stays away from it are
+            better without: they begin with smooth contacts, which push from afar.
         friction: coefficient of friction of all contacts, but for a dojo.Contact of the caller, and of self-collisions;
             None: <lateral_friction> of the link if the file has it, else 0.8; of self-collisions the larger one of both
             links, 0.5 where neither has one.
