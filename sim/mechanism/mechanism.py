@@ -269,7 +269,8 @@ class Mechanism:
         """The same mechanism on other ground; its neutral state stands on it with the lowest contact.
 
         Bases move up or down for that: those that float, and those of planar robots and on vertical slides, unless
-        their height has limits. Others stay where they are.
+        their height has limits. Others stay where they are, and so do obstacles, also a half-space that collides with
+        shapes in place of the ground.
 
         Args:
             terrain: the ground. Contacts keep their friction; their normal and height are replaced.

@@ -424,6 +424,10 @@ class StateSpace:
     def momentum(self, x: ArrayLike) -> tuple[Floats, Floats]:
         """Momentum of all bodies at the node.
 
+        Of order 2 it is that of the discrete Legendre transform, conserved to the last digits in flight. Joints on the
+        world act between nodes and are not part of it, as contacts are not: a pendulum at rest has -h/2 m g.
+        `Kinematics.centroidal_momentum(q, sim.velocity(x))` is that of the velocities at the node.
+
         Args:
             x: state (..., nx).
 
