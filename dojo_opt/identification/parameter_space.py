@@ -50,8 +50,9 @@ class ParameterSpace:
         bodies: names of bodies whose mass, centre of mass and inertia are fitted together, in ten coordinates in which
             every value is a physical body (inertia_coordinates.py). With `inertia` among the names instead, theta may
             leave the set of physical bodies; `simulator` then raises a ValueError.
-        bounds: {label: (low, high)} within those that mechanisms have: masses, sizes, friction > 0, springs, dampers,
-            armatures, radii >= 0, restitution from 1e-6 to 1 (default None: the latter).
+        bounds: {name: (low, high)} of a label, or of all that begin with the name, as "damper"; within those that
+            mechanisms have: masses, sizes, friction > 0, springs, dampers, armatures, radii >= 0, restitution from 1e-6
+            to 1 (default None: the latter).
 
     Raises:
         ValueError: for an unknown name, a name given twice, no name at all, or bounds that exclude the value of `sim`.
@@ -237,15 +238,37 @@ class ParameterSpace:
 
     def _narrow(self, call: str, bounds: Any) -> None:
         """Bounds of single coordinates."""
-        for label, pair in checks.mapping(call, bounds).items():
-            k = self.labels.index(checks.one_of(call, label, self.labels))
-            given = checks.floats(f"{call}: {label!r}", pair)
+        for name, pair in checks.mapping(call, bounds).items():
+            rows = rows_of(call, name, self.labels)
+            given = checks.floats(f"{call}: {name!r}", pair)
             if given.shape != (2,):
-                raise ValueError(f"{call}: {label!r}: expected (low, high), got {checks.shown(pair)}")
-            low, high = max(float(given[0]), self.low[k]), min(float(given[1]), self.high[k])
-            if not low <= self.values[k] <= high or not low < high:
-                raise ValueError(f"{call}: {label!r} is {self.values[k]:g}, outside of {low:g} to {high:g}")
-            self.low[k], self.high[k] = low, high
+                raise ValueError(f"{call}: {name!r}: expected (low, high), got {checks.shown(pair)}")
+            for k in rows:
+                low, high = max(float(given[0]), self.low[k]), min(float(given[1]), self.high[k])
+                if not low <= self.values[k] <= high or not low < high:
+                    label = self.labels[k]
+                    raise ValueError(f"{call}: {label!r} is {self.values[k]:g}, outside of {low:g} to {high:g}")
+                self.low[k], self.high[k] = low, high
+
+
+def rows_of(call: str, name: Any, labels: Sequence[str]) -> list[int]:
+    """The coordinates that a name stands for: that of this label, or all of its parts and components.
+
+    Args:
+        call: beginning of the message.
+        name: a label, or the part of it before ":" or "[".
+        labels: of all coordinates.
+
+    Returns:
+        Their numbers.
+
+    Raises:
+        ValueError: there is none.
+    """
+    rows = [k for k, label in enumerate(labels) if label == name or label.startswith((f"{name}:", f"{name}["))]
+    if not rows:
+        checks.one_of(call, name, labels)
+    return rows
 
 
 def _kind(name: str) -> str:

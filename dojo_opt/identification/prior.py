@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dojo_opt.identification.delayed_space import DelayedSpace
+from dojo_opt.identification.parameter_space import rows_of
 from sim.mechanism import checks
 from solvers.types import Floats
 
@@ -24,11 +25,7 @@ class Prior:
         self.mean, self.precision = space.values.copy(), np.zeros(len(space.values))
         for name, value in checks.mapping("identify(prior=...)", given).items():
             call = f"identify(prior=...): {name!r}"
-            rows = [
-                k for k, label in enumerate(space.labels) if label == name or label.startswith((f"{name}:", f"{name}["))
-            ]
-            if not rows:
-                checks.one_of("identify(prior=...)", name, space.labels)
+            rows = rows_of("identify(prior=...)", name, space.labels)
             mean, deviation = value if isinstance(value, tuple) else (self.mean[rows], value)
             self.mean[rows] = np.broadcast_to(checks.floats(call, mean), (len(rows),))
             self.precision[rows] = checks.number(call, deviation, above=0.0) ** -2

@@ -102,22 +102,25 @@ class CommandedGait:
         sim: simulator of the model, whose time step divides the period.
         make: function of (simulator, command) -> Gait of one period.
         command: (3,) velocity of the base forward and to the left, and rate of its heading [m/s, m/s, rad/s].
+        place: (3,) where the base begins, x and y [m], and its heading [rad] (default: at the origin, along x).
 
     Raises:
-        ValueError: for a command of the wrong shape, or one that the legs cannot follow.
+        ValueError: for an argument of the wrong shape, or a command that the legs cannot follow.
     """
 
-    def __init__(self, sim: Simulator, make: Maker, command: ArrayLike) -> None:
+    def __init__(self, sim: Simulator, make: Maker, command: ArrayLike, place: ArrayLike = (0.0, 0.0, 0.0)) -> None:
         self._sim, self._make = sim, make
+        x, y, heading = checks.array("legged_mpc(place=...)", place, (3,)).tolist()
+        self._first = _Place(complex(x, y), heading)
         self.begin(checks.array("CommandedGait(command)", command, (3,)))
 
     def begin(self, command: Vector) -> None:
-        """Begin at the origin, at time zero.
+        """Begin at the first place, at time zero.
 
         Args:
             command: (3,) command.
         """
-        self.command, self._time, self._origin = command, 0.0, _Place(0.0, 0.0)
+        self.command, self._time, self._origin = command, 0.0, self._first
         self._stride = _Stride(self._sim, self._make, command)
 
     def _lap(self, times: ArrayLike) -> tuple[Vector, Vector]:
@@ -163,17 +166,24 @@ class SteeredGait(CommandedGait):
         sim: simulator of the model, whose time step divides the period.
         make: function of (simulator, command) -> Gait of one period.
         command: function of a time [s] -> (3,) command, see `CommandedGait`.
+        place: (3,) where the base begins, see there.
 
     Raises:
-        ValueError: for a command of the wrong shape, or one that the legs cannot follow.
+        ValueError: for an argument of the wrong shape, or a command that the legs cannot follow.
     """
 
-    def __init__(self, sim: Simulator, make: Maker, command: Callable[[float], ArrayLike]) -> None:
+    def __init__(
+        self,
+        sim: Simulator,
+        make: Maker,
+        command: Callable[[float], ArrayLike],
+        place: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
         self._function, self._now = command, 0.0
-        super().__init__(sim, make, command(0.0))
+        super().__init__(sim, make, command(0.0), place)
 
     def reset(self) -> None:
-        """Begin anew, at the origin with the command of time zero."""
+        """Begin anew, at the first place with the command of time zero."""
         command, self._now = self._asked(0.0), 0.0
         if self._time != 0.0 or np.any(command != self.command):
             self.begin(command)

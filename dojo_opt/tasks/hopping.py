@@ -105,7 +105,7 @@ class Hopping:
 def hopper_mpc(
     velocity: ArrayLike = (0.2, 0.0), height: float = 0.25, stance: float = 0.2, *, substeps: int = 5, **settings: Any
 ) -> MPC:
-    """Raibert's hopper hops along the ground: 20 knots of 50 ms.
+    """Raibert's hopper hops along the ground: 20 knots of 50 ms. Its path begins at the origin, where it has to start.
 
     Squares of position weigh 100, attitude 20 (yaw 1), leg 15, velocities along x and y 4, the others .01, impulses
     .001 per (N s)^2. Inputs are limited to 50 N m, 50 N m, 500 N.

@@ -40,7 +40,7 @@ _SHORT = 0.2
 
 
 @checked_numbers("tasks")
-def legged_mpc(
+def legged_mpc(  # noqa: PLR0913
     robot: Any,
     gait: str = "trot",
     *,
@@ -51,6 +51,7 @@ def legged_mpc(
     step_height: float | None = None,
     duty: float | None = None,
     damping: float | None = None,
+    place: ArrayLike = (0.0, 0.0, 0.0),
     substeps: int = 1,
     **settings: Any,
 ) -> MPC:
@@ -61,7 +62,8 @@ def legged_mpc(
     Torques stay within the limits of its inputs. The cost tracks the gait with its torques by inverse dynamics; plans
     assume half the friction of the feet, and the height of the ground is estimated from the stance feet. Where a push
     leaves the line search of a tick only short steps, a step of all states at once (multiple shooting) is tried, but on
-    two feet.
+    two feet. The path of the reference begins at `place`, where `tasks.plant(mpc)` has the robot begin, too: from
+    elsewhere the robot is thrown towards it.
 
     Args:
         robot: the mechanism, on a floating base that looks along x, or its simulator.
@@ -76,6 +78,7 @@ def legged_mpc(
         step_height: lift of a swinging foot [m] (default None: 0.05 m for the A1's height).
         duty: share of the period that a foot is on the ground (default None: that of the gait).
         damping: least damper of the joints of model and plant [N m s/rad] (default None: see `Legs`).
+        place: (3,) where the base begins, x and y [m], and its heading [rad].
         substeps: steps of the model per knot.
         **settings: settings of `dojo.MPC`.
 
@@ -98,7 +101,7 @@ def legged_mpc(
     shape: dict[str, Any] = {"period": _KNOTS * knot, "step_height": lift} | ({} if duty is None else {"duty": duty})
     make = partial(_period, gait, **shape)
     command: Any = (_SPEED * slow, 0.0, 0.0) if velocity is None else velocity
-    reference = SteeredGait(sim, make, command) if callable(command) else CommandedGait(sim, make, command)
+    reference = (SteeredGait if callable(command) else CommandedGait)(sim, make, command, place)
     times = knot * np.arange(_HORIZON + 1)
     states, torques = reference(times), reference.torques(times[:-1])
     gains = np.array([part.gain for part in sim.mechanism.inputs or ()])

@@ -38,6 +38,8 @@ def quadruped_mpc(
 ) -> MPC:
     """The quadruped trots: 20 knots of 40 ms, with the ground learnt from the standing feet.
 
+    Its path begins at the origin, along x, where the robot has to start.
+
     The cost tracks the gait of `gaits.trot` with its torques as reference. Squares of position and attitude of the
     trunk weigh 10, of joint angles 1, of velocities .1 and .01, of the torques 1e-4 per (N m)^2. Torques are limited to
     33.5 N m. Plans are made at a kappa of 1e-3, where the ground acts on feet before they touch it. They assume a

@@ -54,6 +54,12 @@ def test_references_of_a_model_of_higher_order_have_the_velocities_of_their_time
     actual = sims[0].difference(node(t + e), node(t - e))[:, :nv] / (2.0 * e)
     off = [np.abs(gait(t)[:, nq:] - actual)[:, 6:].mean() for gait in (mean, node)]
     assert off[1] < 0.1 * off[0], off
+    placed, turn = CommandedGait(sims[0], make, (0.2, 0.0, 0.3), place=(2.0, -1.0, 1.3)), np.exp(1.3j)
+    x, there = mean(t), placed(t)
+    for first, shift in ((0, 2.0 - 1.0j), (nq, 0.0)):  # the base, and its velocity
+        moved = turn * (x[:, first] + 1j * x[:, first + 1]) + shift
+        np.testing.assert_allclose(there[:, first] + 1j * there[:, first + 1], moved, atol=1e-12)
+    np.testing.assert_allclose(there[:, 7:nq], x[:, 7:nq], atol=1e-12)
 
 
 def test_a_robot_is_steered_and_pushed(mpc):

@@ -182,3 +182,9 @@ def test_a_fit_of_a_body_stays_among_bodies() -> None:
 def test_refusals(names, bodies, bounds, message) -> None:
     with pytest.raises(ValueError, match=message):
         dojo.ParameterSpace(block(), names, bodies, bounds)
+
+
+def test_bounds_of_a_name_are_those_of_all_its_parts() -> None:
+    space = dojo.ParameterSpace(block(), ("friction", "mass"), bounds={"friction": (0.4, 0.6)})
+    rough = [label.startswith("friction:") for label in space.labels]
+    assert sum(rough) > 1 and np.array_equal(space.high == 0.6, rough) and np.array_equal(space.low == 0.4, rough)
