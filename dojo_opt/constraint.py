@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -75,6 +75,8 @@ class Goal(Spec):
     components: Any = None
     knots: Any = -1
 
+    kind: ClassVar[str] = "constraint"  # alone
+
     __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
@@ -121,6 +123,8 @@ class StateBounds(Spec):
     components: Any = None
     knots: Any = None
 
+    kind: ClassVar[str] = "constraint"  # alone
+
     __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
@@ -149,6 +153,8 @@ class SpeedLimits(Spec):
 
     share: float = 1.0
     knots: Any = None
+
+    kind: ClassVar[str] = "constraint"  # alone
 
     __repr__ = short_repr
 
@@ -184,6 +190,8 @@ class ControlBounds(Spec):
     components: Any = None
     knots: Any = None
 
+    kind: ClassVar[str] = "constraint"  # alone
+
     __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
@@ -213,6 +221,8 @@ class ResidualConstraint(Spec):
     equality: bool = True
     jacobian: Callable[..., Any] | None = None
     knots: Any = None
+
+    kind: ClassVar[str] = "constraint"  # alone
 
     __repr__ = short_repr
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,6 +76,8 @@ class Tracking(Spec):
     knots: Any = None
     scale: float = 1.0
 
+    kind: ClassVar[str] = "cost"  # alone
+
     __repr__ = short_repr
 
     def bind(self, sim: Simulator, horizon: int, layout: Integers) -> Term:
@@ -99,6 +101,8 @@ class Effort(Spec):
     weight: ArrayLike | Mapping[str, float]
     reference: ArrayLike = 0.0
     scale: float = 1.0
+
+    kind: ClassVar[str] = "cost"  # alone
 
     __repr__ = short_repr
 
@@ -137,6 +141,8 @@ class ResidualCost(Spec):
     jacobian: Callable[..., Any] | None = None
     knots: Any = None
     scale: float = 1.0
+
+    kind: ClassVar[str] = "cost"  # alone
 
     __repr__ = short_repr
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -195,7 +195,8 @@ class LearnedPolicy:
         call = "LearnedPolicy.load"
         with reading(call, path, "policy"):
             shape, arrays = read_npz(call, path, "network")
-            return policy_of(shape, arrays, task)
+            alone = policy_of(shape, arrays, None)
+        return replace(alone, task=task)
 
 
 def policy_of(shape: Mapping[str, Any], arrays: Mapping[str, Any], task: Task | None) -> LearnedPolicy:

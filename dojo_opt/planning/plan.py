@@ -192,7 +192,7 @@ class Plan:
         limits = sim.mechanism.input_limits if problem is None else problem.control_limits
         smoothing = {} if kappa is None else {"kappa": kappa}
         if time_step is None:
-            accuracy = 1e-5 if accuracy is None else accuracy
+            accuracy = 1e-5 if accuracy is None else checks.number("Plan.replay(accuracy=...)", accuracy, above=0.0)
             shot = sim.replace(time_step=self.time_step * self.substeps, order=2, accuracy=accuracy, **smoothing)
             start = self._start(sim)
         else:

@@ -159,8 +159,8 @@ class Problem:
         }
         for argument, specs in arguments.items():
             for i, spec in enumerate(specs):
-                if not hasattr(spec, "bind"):
-                    kind = argument.removeprefix("refined_").removesuffix("s")
+                kind = argument.removeprefix("refined_").removesuffix("s")
+                if not hasattr(spec, "bind") or getattr(spec, "kind", kind) != kind:
                     found = f"a {type(spec).__name__}, not a term of dojo.{kind}"
                     raise TypeError(f"Problem({argument}=...): entry {i} is {found}")
         self.bind()

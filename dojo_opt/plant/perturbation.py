@@ -46,7 +46,7 @@ class Push:
     duration: float = 0.02
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "time", checks.number("Push(time=...)", self.time))
+        object.__setattr__(self, "time", checks.number("Push(time=...)", self.time, at_least=0.0))
         object.__setattr__(self, "impulse", checks.vector("Push(impulse=...)", self.impulse, 3))
         if self.body is not None:
             checks.name("Push(body=...)", self.body)

@@ -121,7 +121,8 @@ def _periodic(legs: Legs, name: str, period: float, speed: float, settings: dict
     """The problem to follow two periods of a gait; period [s] and speed [m/s] of a robot as high as the A1."""
     check_settings(name, getattr(gaits, name), settings, ("damping",))
     slow = legs.size**0.5
-    step = _rounded(settings.pop("period", period * slow) / _KNOTS)
+    cycle = checks.number(f"problems.{name}(period=...)", settings.pop("period", period * slow), above=0.0)
+    step = _rounded(cycle / _KNOTS)
     follows, rest = _shared_out({"substeps": _SUBSTEPS, **settings})
     usual = {"step_height": _LIFT * legs.size, "cycles": 1 if follows.get("periodic") else 2}
     if rest.get("distance") is None:

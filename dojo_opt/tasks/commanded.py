@@ -112,7 +112,7 @@ class CommandedGait:
         self._sim, self._make = sim, make
         x, y, heading = checks.array("legged_mpc(place=...)", place, (3,)).tolist()
         self._first = _Place(complex(x, y), heading)
-        self.begin(checks.array("CommandedGait(command)", command, (3,)))
+        self.begin(checks.array("legged_mpc(velocity=...)", command, (3,)))
 
     def begin(self, command: Vector) -> None:
         """Begin at the first place, at time zero.

@@ -6,6 +6,7 @@ from typing import Any
 
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.plant.plant import Plant
+from sim.mechanism import checks
 
 __all__ = ["plant"]
 
@@ -28,4 +29,7 @@ def plant(mpc: MPC, time_step: float = 1e-3, kappa: float = 1e-8, **perturbation
     """
     if not isinstance(mpc, MPC):
         raise TypeError(f"tasks.plant(mpc): expected an MPC, got {mpc!r}")
+    call, longest = "tasks.plant(time_step=...)", mpc.nominal.time_step
+    if checks.number(call, time_step, above=0.0) > longest * (1.0 + 1e-9):
+        raise ValueError(f"{call}: expected at most that of the model, {longest:g} s, got {time_step}")
     return Plant(mpc.nominal.replace(time_step=time_step, kappa=kappa), mpc.start, **perturbation)

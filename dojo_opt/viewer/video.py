@@ -120,7 +120,10 @@ def save_picture(
     target = checks.path("save_picture(path)", path)
     checks.one_of("save_picture(path): ending", target.suffix, (".png",))
     m = motion(result, simulator)
-    checks.number("save_picture(time=...)", time, at_least=0.0)
+    if checks.number("save_picture(time=...)", time, at_least=0.0) > float(m.time[-1]) * (1.0 + 1e-9):
+        raise ValueError(
+            f"save_picture(time=...): expected up to {m.time[-1]:g} s, the end of the motion, got {time:g}"
+        )
     pixels = _sizes("save_picture(size=...)", size)
 
     def record() -> None:

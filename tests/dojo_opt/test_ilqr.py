@@ -205,6 +205,10 @@ def test_bad_problems(change, message):
 def test_terms_must_be_terms():
     with pytest.raises(TypeError, match=r"Problem\(cost=...\): entry 0 is a float, not a term"):
         Problem(DoubleIntegrator(), [1.0, 0.0], 5, cost=[1.0])
+    with pytest.raises(TypeError, match=r"Problem\(cost=...\): entry 1 is a Goal, not a term of dojo.cost"):
+        Problem(DoubleIntegrator(), [1.0, 0.0], 5, cost=[Effort(1.0), Goal([0.0, 0.0])])
+    with pytest.raises(TypeError, match=r"Problem\(constraints=...\): entry 0 is a Effort, not a term"):
+        Problem(DoubleIntegrator(), [1.0, 0.0], 5, constraints=[Effort(1.0)])
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
