@@ -137,5 +137,5 @@ def draw_limits(ax: Axes, limits: Any) -> str:
     near = {bound: color for bound, color in colors.items() if low - room <= bound <= high + room}
     for bound, color in near.items():
         ax.axhline(bound, color=color, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
-    grey = ", grey of several" if "0.3" in near.values() else ""
-    return f"\n(dashed: limits{grey})" if near else ""
+    gray = ", grey of several" if "0.3" in near.values() else ""
+    return f"\n(dashed: limits{gray})" if near else ""

@@ -52,7 +52,7 @@ def test_coordinates_have_the_names_of_their_directions(walker):
     figure = dojo.plots.trajectory(walker)
     names = labels(figure.axes[0])
     assert {"base x", "base z", "base angle"} <= set(names) and "base y" not in names
-    assert figure.axes[0].get_ylabel() == "coordinates [m, rad]"
+    assert figure.axes[0].get_ylabel() == "coordinates [m, rad]\n(dashed: limits, grey of several)"
     assert figure.axes[1].get_ylabel() == "inputs [N m]"
 
 

@@ -200,7 +200,7 @@ def test_a_rollout_with_feedback_is_shown_at_its_times():
     assert shown.time[-1] == pytest.approx(0.12) and shown.contact_time[-1] == pytest.approx(0.12)
     np.testing.assert_allclose(shown.force, steps.contacts.force, atol=1e-5)
     np.testing.assert_allclose(shown.x, steps.x[::4], atol=1e-7)
-    assert motion(dataclasses.replace(found, x=found.x[:1], u=found.u[:0])).force.shape == (0, 1, 3)
+    assert motion(dataclasses.replace(found, x=found.x[:1], u=found.u[:0])).force.shape == (0, sim.ncontact, 3)
 
 
 def test_obstacles_are_drawn():

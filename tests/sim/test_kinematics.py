@@ -174,7 +174,7 @@ def test_inverse_kinematics_of_a_floating_robot(tmp_path: Path) -> None:
         dojo.ik(sim, {"hand": (None, 2.0 * np.eye(3))})
 
 
-def test_frames_of_a_file_stay_where_they_are_when_a_centre_of_mass_moves(tmp_path: Path) -> None:
+def test_frames_of_a_file_stay_where_they_are_when_a_center_of_mass_moves(tmp_path: Path) -> None:
     sim = dojo.Simulator(robot(tmp_path), 0.01)
     q = np.r_[0.1, 0.2, 0.9, 0.8, 0.0, 0.6, 0.0, 0.3, -0.4, 0.5]
     moved = sim.with_parameters({"com:c[0]": 0.1, "com:a[2]": -0.2})

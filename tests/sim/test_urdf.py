@@ -187,3 +187,22 @@ def test_bodies_are_drawn_with_their_largest_shape(tmp_path: Path) -> None:
     mech = dojo.load_urdf(write(tmp_path, link("base", inertial(xyz="0 0 0.5"), shapes)), ground=False)
     assert mech.bodies[0].shape == dojo.Box(1, 2, 3, center=(0, 0, 0.5))
     assert SKEWED[0] == mech.bodies[0].inertia[0][0]
+
+
+def test_materials_are_those_of_the_file_or_of_another_link(tmp_path: Path) -> None:
+    def drawn(material: str) -> str:
+        return f'<visual><geometry><sphere radius="0.1"/></geometry>{material}</visual>'
+
+    parts = [
+        '<material name="sky"><color rgba="0 0.5 1 1"/></material>',
+        link("a", inertial(), drawn('<material name="own"><color rgba="1 0 0 1"/></material>')),
+        link("b", inertial(), drawn('<material name="own"/>') + drawn('<material name="sky"/>')),
+        joint("ab", "a", "b"),
+    ]
+    mech = dojo.load_urdf(write(tmp_path, *parts), contacts=[])
+    assert [visual.color for body in mech.bodies for visual in body.visuals] == [
+        (1.0, 0.0, 0.0, 1.0),
+        (1.0, 0.0, 0.0, 1.0),
+        (0.0, 0.5, 1.0, 1.0),
+    ]
+    assert not any("not read" in note.text for note in mech.report.notes)

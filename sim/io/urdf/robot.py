@@ -209,8 +209,10 @@ def _scale(mesh: Element) -> tuple[float, ...]:
 
 
 def _palette(root: Element) -> Palette:
-    """Colours of the materials that links refer to by name."""
-    found = {e.attributes.get("name", ""): _color(e, {}) for e in root.all("material")}
+    """Colours of the materials that links refer to by name: those of the file, and of the links that define one."""
+    own = [m for link in root.all("link") for visual in link.all("visual") for m in visual.all("material")]
+    given = [*(m for m in own if m.all("color")), *root.all("material")]
+    found = {e.attributes.get("name", ""): _color(e, {}) for e in given}
     return {name: color for name, color in found.items() if color is not None}
 
 

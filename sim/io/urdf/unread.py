@@ -20,7 +20,10 @@ _READ = {
     "limit": (),
 }
 # elements for pictures and drivers, which do nothing to the motion
-_IDLE = {("link", "visual"), ("collision", "material"), ("joint", "calibration"), ("joint", "safety_controller")}
+_IDLE = {
+    *(("robot", "material"), ("link", "visual"), ("collision", "material")),
+    *(("joint", "calibration"), ("joint", "safety_controller")),
+}
 _ATTRIBUTES = {"dynamics": {"damping", "friction"}, "limit": {"lower", "upper", "effort", "velocity"}}
 
 
