@@ -95,7 +95,7 @@ def test_gaits_with_a_flight_have_references_within_the_stops_of_the_joints(gait
 def test_an_unknown_gait_or_command_is_refused():
     with pytest.raises(ValueError, match="gallop"):
         dojo.tasks.legged_mpc(dojo.models.quadruped(), "gallop")
-    with pytest.raises(ValueError, match="command"):
+    with pytest.raises(ValueError, match="velocity"):
         dojo.tasks.legged_mpc(dojo.models.quadruped(), velocity=(0.1, 0.2))
 
 

@@ -148,7 +148,19 @@ def test_mimics_become_gears_or_move_freely_with_a_warning_or_are_locked(tmp_pat
         assert dojo.load_urdf(path, ground=False, mimic="free").nv == 8
     with pytest.warns(dojo.UrdfWarning, match="are held where they are: wrist"):
         assert dojo.load_urdf(path, ground=False, mimic="locked").joint_names == ("floating_base", "elbow")
-    assert dojo.load_urdf(path, ground=False, locked=["wrist"]).joint_names == ("floating_base", "elbow")
+    held = dojo.load_urdf(path, floating=False, locked=["wrist"], neutral={"elbow": 0.3})
+    assert held.joint_names == ("elbow",)
+    assert "joints that are held do not hold those that they follow: elbow" in map(str, held.report.notes)
+    hand = dojo.Kinematics(dojo.Simulator(held, 0.01)).pose("hand", held.neutral)
+    for name in ("elbow", "wrist"):  # one says where both are
+        both = dojo.load_urdf(path, floating=False, neutral={name: 0.3})
+        assert both.neutral == pytest.approx((0.3, 0.3))
+        there = dojo.Kinematics(dojo.Simulator(both, 0.01)).pose("hand", both.neutral)
+        np.testing.assert_allclose(there[1], hand[1], atol=1e-12)
+    with pytest.raises(
+        ValueError, match=r"neutral=\.\.\.\): joint 'wrist' follows 'elbow', which puts it at 0.3, got 0.1"
+    ):
+        dojo.load_urdf(path, neutral={"elbow": 0.3, "wrist": 0.1})
     with pytest.raises(
         ValueError, match=r"load_urdf\(mimic=\.\.\.\): 'follow' is not one of: auto, free, locked, gear"
     ):

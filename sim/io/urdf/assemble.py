@@ -14,7 +14,7 @@ from sim.io.self_collisions import with_self_collisions
 from sim.io.urdf.contacts import find_contacts
 from sim.io.urdf.inertia import RigidInertia, combined, fault, repaired
 from sim.io.urdf.loops import UrdfLoop, closing_joint, zero_poses
-from sim.io.urdf.mimic import follower_value, leader_of, mimic_gears
+from sim.io.urdf.mimic import follower_value, leader_of, loose_leaders, mimic_gears, with_leaders
 from sim.io.urdf.report import LinkFrame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
 from sim.io.urdf.robot import Robot, UrdfJoint
 from sim.io.urdf.solids import body_shapes, body_visuals, collision_shapes
@@ -59,9 +59,12 @@ class Choices:
 
 def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, notes: Notes) -> UrdfMechanism:
     """The mechanism, with its report."""
+    choices = replace(choices, neutral=with_leaders("load_urdf(neutral=...)", robot, choices.geared, choices.neutral))
     locked = {name: _neutral(robot, choices, name) for name in choices.locked}
     if locked:
         notes.add("joints that are held where they are", locked)
+    if loose := loose_leaders(robot, locked):
+        notes.add("joints that are held do not hold those that they follow", loose)
     robot, root, order = _rooted(robot, choices, locked, notes)
     groups, places = group(robot, root, order, choices.fixed_base, choices.merge, locked)
     inertias = _inertias(groups, choices, notes)
@@ -129,7 +132,8 @@ def _neutral(robot: Robot, choices: Choices, name: str, depth: int = 0) -> float
     """Neutral coordinate of a joint with one degree of freedom; of one with more, which is to be locked, zero."""
     if name not in choices.neutral:
         # a circle of followers ends; one without a leader is refused later
-        if name in choices.geared and depth < len(choices.geared) and leader_of(robot, name) in robot.joints:
+        follows = name in choices.geared or (name in choices.locked and name in robot.mimics)
+        if follows and depth < len(robot.mimics) and leader_of(robot, name) in robot.joints:
             return follower_value(robot, name, lambda leader: _neutral(robot, choices, leader, depth + 1))
         return resting(robot.joints[name].limits)
     if robot.joints[name].kind not in ("revolute", "prismatic"):
