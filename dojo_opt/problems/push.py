@@ -62,9 +62,11 @@ def push(
     The object stands with its x axis in the direction of the push. The hand is a ball at a frame of the arm; it begins
     1 cm behind the object, at the height of its centre of mass. In the guess the hand moves straight ahead with the
     object in front of it, under the torques that hold the arm, without contact. The links of the arm have no contacts
-    with the object and the table. They stay outside of both where the arm can; a warning tells where it cannot. Place
-    and heading of the object at the end are constraints, and both are at rest there. Each shape of the object has its
-    own friction, 0.5 where it has none, at the table and at the ball.
+    with the object and the table. In the guess their joints and centres of mass stay outside of both where the arm can;
+    a warning tells where it cannot. Nothing keeps their shapes outside: a hand that is wider than the object is high
+    reaches into the table, unless `offset` and `at` have it stand off. Place and heading of the object at the end are
+    constraints, and both are at rest there. Each shape of the object has its own friction, 0.5 where it has none, at
+    the table and at the ball.
 
     Args:
         arm: the mechanism, or its simulator, whose time step is then `time_step`; its own contacts are omitted.

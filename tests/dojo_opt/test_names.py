@@ -14,7 +14,8 @@ X = SIM.neutral()
 
 
 def bound(spec):
-    return dojo.Problem(SIM, X, 10, cost=[spec]).costs[0]
+    problem = dojo.Problem(SIM, X, 10, **{"cost" if spec.kind == "cost" else "constraints": [spec]})
+    return (problem.costs + problem.constraints)[0]
 
 
 def test_weights_by_name_are_those_by_number():

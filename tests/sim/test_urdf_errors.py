@@ -40,7 +40,7 @@ BROKEN: dict[str, tuple[tuple[str, ...], str]] = {  # parts from line 2 on, and 
     "no type": ((*TWO, '<joint name="j"/>'), "line 4, <joint name='j'>: expected an attribute type="),
     "unknown type": (
         (*TWO, joint("j", "base", "arm", "helical")),
-        "line 4, .*type 'helical' is not one of: fixed, rev",
+        "line 4, .*type 'helical' is not one of: fixed, rev.*did you mean 'spherical'",
     ),
     "two parents": (
         (*TWO, link("c"), joint("i", "base", "c"), joint("j", "arm", "c"), joint("k", "base", "arm")),

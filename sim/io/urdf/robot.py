@@ -11,6 +11,7 @@ import numpy as np
 from sim.io.urdf.report import Notes
 from sim.io.urdf.unread import unread
 from sim.io.urdf.xml import Element
+from sim.mechanism import checks
 from sim.mechanism.joint import KINDS as JOINT_KINDS
 from sim.mechanism.pose import HERE, Pose, roll_pitch_yaw
 from sim.mechanism.short_repr import short_repr
@@ -235,7 +236,7 @@ def read_joint(element: Element, ends: tuple[str, str], pose: Pose, notes: Notes
     """A joint between the links that the two elements `ends` name, with its frame at `pose` in the first."""
     name, given = element.text("name"), element.text("type")
     if given not in KINDS:
-        raise element.error(f"type {given!r} is not one of: {', '.join(KINDS)}")
+        raise element.error(f"type {given!r} is not one of: {', '.join(KINDS)}{checks.nearest(given, KINDS)}")
     kind = KINDS[given]
     axis = np.array([1.0, 0.0, 0.0])
     if (line := element.one("axis")) is not None and kind not in ("fixed", "floating", "spherical"):

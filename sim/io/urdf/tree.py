@@ -10,6 +10,7 @@ import numpy as np
 from sim.io.urdf.inertia import RigidInertia
 from sim.io.urdf.robot import Robot, UrdfJoint, UrdfLink
 from sim.io.urdf.xml import UrdfError
+from sim.mechanism import checks
 from sim.mechanism.joint import WORLD
 from sim.mechanism.pose import HERE, Pose, turn
 
@@ -57,6 +58,7 @@ def ordered(robot: Robot, file: str) -> tuple[str, list[UrdfJoint]]:
             if link not in robot.links:
                 raise joint.element.need(role).error(
                     f"joint {joint.name!r} has a {role} {link!r}, which is not a link of the file"
+                    f"{checks.nearest(link, robot.links)}"
                 )
         if joint.child in above:
             other = above[joint.child]
