@@ -163,6 +163,9 @@ def closed_loop(
     """
     if not isinstance(plant, Plant):
         raise TypeError(f"closed_loop(plant): expected a Plant, such as Plant(simulator), got {plant!r}")
+    if isinstance(getattr(type(controller), "controller", None), property):
+        name = type(controller).__name__
+        raise TypeError(f"closed_loop(controller): expected the controller of a {name}, such as policy.controller")
     if not callable(controller):
         raise TypeError(f"closed_loop(controller): expected an MPC or a function of (time, x), got {controller!r}")
     h, steps = plant.nominal.time_step, steps_of("closed_loop(duration)", plant, duration)

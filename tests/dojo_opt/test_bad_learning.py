@@ -91,6 +91,7 @@ CALLS = {
                                "LearnedPolicy(task=...)", "3"),
     "network without outputs": (lambda: Network((2,)), "Network(sizes)"),
     "half a layer": (lambda: Network((2, 1.5)), "Network(sizes)"),
+    "policy as a controller": (lambda: dojo.closed_loop(POLICY, dojo.Plant(SIM), 1.0), "closed_loop(controller)", "policy.controller"),
     "command of a number": (lambda: POLICY.commanded(3)(0.0, np.zeros(2)), "commanded(command)"),
 }
 # fmt: on
