@@ -221,6 +221,20 @@ def test_an_exception_of_a_signal_is_heard_and_loses_no_code(filled: FilledCache
     assert filled.run() == ["2.0", "1"]
 
 
+def test_a_value_that_cannot_be_pickled_is_one_warning(tmp_path: Path) -> None:
+    """Functions without a module are pickled with all values beside them."""
+    program = (
+        "import threading, dojo_opt as dojo\nlock = threading.Lock()\n"
+        "@dojo.jit\ndef f(x): return x + 1.0\n@dojo.jit\ndef g(h, x): return h(x)\nprint(g(f, 1.0))"
+    )
+    counted = (
+        "import warnings\nwith warnings.catch_warnings(record=True) as told:\n    warnings.simplefilter('always')\n"
+        f"    exec({program!r}, {{}})\nprint(*told)"
+    )
+    value, told = python(counted, NUMBA_CACHE_DIR=str(tmp_path)).splitlines()
+    assert value == "2.0" and told.count("compiled code cannot be stored") == 1 and "cannot pickle" in told
+
+
 def test_a_full_disk_is_one_warning(filled: FilledCache) -> None:
     filled.file.unlink()
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"  # the system's own error for a write

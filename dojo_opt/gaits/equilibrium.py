@@ -20,6 +20,7 @@ from solvers.types import Floats
 __all__ = ["equilibrium", "potential_gradient"]
 
 _STEP = 1e-5
+_NOISE = 1e-7  # singular values below this part of the largest are those of differences in Jacobians
 _EVEN = 1e-6  # weight of the sharing of the load against its balance
 _RANK = 1e-7  # singular values below are the noise of differences: balls under one rigid foot do not move one by one
 _ROUNDS = 20
@@ -62,7 +63,16 @@ def least_pushes(pushes: Floats, load: Floats, even: float) -> Floats:
     from scipy.optimize import nnls  # .3 s, which only legged robots at rest or on a gait need
 
     rows = np.concatenate([pushes.T, even * np.eye(len(pushes))])
-    return np.asarray(nnls(rows, np.concatenate([load, np.zeros(len(pushes))]))[0])
+    factors = np.asarray(nnls(rows, np.concatenate([load, np.zeros(len(pushes))]))[0])
+    # two feet cannot turn a robot about the line between them: once more for the factors that are not zero, without the
+    # singular value of that turn, which is zero but for the noise of the Jacobian
+    free = factors > 0.0
+    U, sizes, Vt = np.linalg.svd(pushes[free].T, full_matrices=False)
+    large = sizes > _NOISE * sizes.max(initial=0.0)
+    found = Vt[large].T @ (sizes[large] / (sizes[large] ** 2 + even * even) * (U.T[large] @ load))
+    if np.all(found >= 0.0):
+        factors[free] = found
+    return factors
 
 
 def _stop_distances(sim: Simulator, x: Floats) -> tuple[Floats, Floats]:

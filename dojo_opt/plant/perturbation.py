@@ -59,7 +59,8 @@ class Perturbation:
     no differences.
 
     Attributes:
-        offset: (ndx,) change of the initial state [m, rad, m/s, rad/s] (default (): none).
+        offset: (ndx,) change of the initial state [m, rad, m/s, rad/s] (default (): none); loops and gears are closed
+            after it.
         pushes: one `Push`, or several (default (): none).
         payload: mass added to `payload_body` at its centre of mass [kg] (default 0).
         payload_body: name of that body (default None: the first one).
@@ -247,7 +248,7 @@ class Perturbation:
             ValueError: the ground is moved, and a body hangs on the world by a joint that is not floating.
         """
         changed = [name for name in ("slope", "ground_height", "terrain") if getattr(self, name)]
-        for joint in mechanism.joints:
+        for joint in (*mechanism.joints, *mechanism.loops):
             if changed and joint.parent == WORLD:
                 require_floating_base(f"Perturbation({changed[0]}=...)", joint)
         if not (self.slope or self.ground_height):

@@ -77,7 +77,7 @@ class Plant:
         self._direct = self.simulator.has_stepper and not self._late and not p.pushes  # commands act as they are given
         x = self.start
         if np.size(p.offset):
-            x = sim.integrate(x, checks.array("Plant(offset=...)", p.offset, (sim.ndx,)))
+            x = _moved(sim, x, checks.array("Plant(offset=...)", p.offset, (sim.ndx,)))
         self._x0 = p.on_ground(sim.mechanism, x)
         if p.terrain is not None:
             self._x0 = self._above_terrain(x)
@@ -218,6 +218,16 @@ class Plant:
         """
         plain = is_plain(x, (self.nominal.nx,))
         return self.fall_check(x if plain else checks.array("Plant.fallen(x)", x, (self.nominal.nx,)))
+
+
+def _moved(sim: Simulator, x: Vector, offset: Vector) -> Vector:
+    """The state after a displacement; its loops and gears are closed, where it has any."""
+    if not offset.any():
+        return x
+    try:
+        return np.asarray(sim.close(sim.integrate(x, offset)))
+    except ValueError as error:
+        raise ValueError(f"Plant(offset=...): {error}") from None
 
 
 def _spread(call: str, value: ArrayLike, size: int) -> Vector:

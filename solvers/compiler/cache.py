@@ -405,7 +405,12 @@ class KernelCache(FunctionCache):
         if not STORE.wanted:  # the cache is off, and shipped code is looked for only
             return
         key, name = self._key(sig, data.codegen)
-        STORE.write(name, dumps((key, data._reduce())))
+        try:
+            payload = dumps((key, data._reduce()))
+        except Exception as error:  # of whatever kind: a value among its constants or types has the say in its pickling
+            STORE.tell(f"{self._py_func.__name__} holds a value that cannot be kept: {error}")
+            return
+        STORE.write(name, payload)
         if self._form != INNER and crossings():
             self._save_crossings(sig, data)
 

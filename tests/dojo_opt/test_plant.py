@@ -242,6 +242,21 @@ def test_slope_needs_a_floating_base():
         Plant(sim, slope=0.1)
 
 
+def test_a_body_pinned_to_the_world_stays_on_its_pin():
+    """Ground that moves would leave the pin behind, and an offset would open the loop."""
+    ends = {"parent_point": (0.5, 0.0, 0.1), "child_point": (0.1, 0.0, 0.0)}
+    pin = dojo.Joint("spherical", None, "b", name="pin", close=True, **ends)
+    body, base = dojo.Body("b", 1.0, (0.01, 0.01, 0.01)), dojo.Joint("floating", None, "b")
+    sim = dojo.Simulator(dojo.Mechanism([body], [base, pin], neutral={"b": [0.4, 0, 0.1, 1, 0, 0, 0]}), 0.005)
+    for ground in ({"slope": 0.3}, {"ground_height": 0.4}, {"terrain": dojo.Terrain(np.zeros((2, 2)))}):
+        with pytest.raises(ValueError, match="floating base"):
+            Plant(sim, **ground)
+    moved = Plant(sim, offset=np.eye(12)[2] * 0.2)
+    assert abs(moved.x[:3] - sim.neutral()[:3]).max() > 1e-3
+    assert max(np.abs(gap).max() for gap in sim.loop_gaps(moved.x).values()) < 1e-9
+    np.testing.assert_array_equal(Plant(sim, offset=np.zeros(12)).x, sim.neutral())
+
+
 def test_ground_is_learnt_from_a_foot_that_stands():
     sim = HOPPER.replace()
     ground = Ground(sim)
