@@ -15,7 +15,7 @@ from sim.io.meshes.fitted_shapes import fit
 from sim.io.meshes.paths import find_mesh
 from sim.io.meshes.reduced_hull import CORNERS, distances, reduced_hull
 from sim.io.meshes.triangles import read_mesh
-from support.urdf_files import collision, inertial, link, write
+from support.urdf_files import collision, inertial, joint, link, write
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -205,6 +205,13 @@ def test_choices_of_meshes(tmp_path: Path) -> None:
         dojo.load_urdf(path, meshes="hulls")
     with pytest.raises(ValueError, match=r"load_urdf\(meshes=\.\.\.\): link: 'b' is not one of: \*, a"):
         dojo.load_urdf(path, meshes={"b": "hull"})
+    limbs = (link("hip"), link("shank"), link("rotor", ""), link("foot", ""), joint("knee", "hip", "shank"))
+    welds = (
+        joint("r", "shank", "rotor", "fixed", "", at='xyz="0 0 0"'),
+        joint("f", "shank", "foot", "fixed", "", at='xyz="0 0 -0.2"'),
+    )
+    with pytest.warns(dojo.UrdfWarning, match=r"contacts=\[dojo\.Contact\('foot', radius=0\.02\)\] puts"):
+        dojo.load_urdf(write(tmp_path, *limbs, *welds))
 
 
 def test_large_distances_from_a_mesh_have_whole_millimeters(tmp_path: Path) -> None:

@@ -87,7 +87,7 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
     bases = [j.name for j in joints if j.kind == "floating" and j.parent == WORLD]
     if len(bases) == 1 and bases[0] not in choices.neutral:
         mech = replace(mech, neutral=lifted(mech, bases[0]))
-    _ground_notes(mech, choices, bool(bases), notes)
+    _ground_notes(mech, choices, _ends(mech, places) if bases else None, notes)
     _friction_notes([body.joint for body in groups if body.joint and not body.fixed], loops, choices, notes)
     if choices.shared.itself:
         mech = with_self_collisions(mech, choices.shared, notes, collision_shapes(still, away))
@@ -286,12 +286,21 @@ def _inputs(joints: list[Joint], closing: list[Joint], given: Mapping[str, UrdfJ
     ]
 
 
-def _ground_notes(mech: UrdfMechanism, choices: Choices, floating: bool, notes: Notes) -> None:
-    """Notes on the ground for the user, before the first step."""
+def _ends(mech: UrdfMechanism, places: Mapping[str, Place]) -> list[str]:
+    """Of each body at the end of the tree, the link whose origin is farthest from the joint that the body hangs on."""
+    carrying = {joint.parent for joint in mech.joints}
+    farthest: dict[str, tuple[float, str]] = {}
+    for name, place in places.items():
+        away = float(np.linalg.norm(place.pose.point))
+        if away > farthest.get(place.group.name, (-1.0, ""))[0]:
+            farthest[place.group.name] = away, name
+    return [farthest[body][1] for body in mech.body_names if body not in carrying]
+
+
+def _ground_notes(mech: UrdfMechanism, choices: Choices, ends: list[str] | None, notes: Notes) -> None:
+    """Notes on the ground for the user, before the first step; ends: last links of a robot that floats."""
     wanted = choices.contacts is None or len(choices.contacts) > 0
-    if floating and wanted and not mech.contacts:
-        carrying = {j.parent for j in mech.joints}
-        ends = [name for name in mech.body_names if name not in carrying]
+    if ends is not None and wanted and not mech.contacts:
         balls = ", ".join(f"dojo.Contact({name!r}, radius=0.02)" for name in ends[:_ENDS_SHOWN])
         more = f", ... for all {len(ends)} of them" if len(ends) > _ENDS_SHOWN else ""
         notes.add(
