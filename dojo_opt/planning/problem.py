@@ -16,6 +16,7 @@ from dojo_opt.planning.manifold import tangent_layout
 from dojo_opt.planning.term import Spec, check_order, largest_violation, numbers, state_table, table
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
+from sim.mechanism.joint import WORLD
 from sim.mechanism.memory_limit import check_room
 from sim.simulator.simulator import Simulator
 from solvers.types import Matrix, Vector
@@ -75,6 +76,17 @@ def _accuracy(asked: float | None, sim: Simulator) -> float | None:
     return number
 
 
+def _advice(sim: Simulator) -> str:
+    """A sentence about the ground of a robot that the world holds, which may not need it."""
+    joints, contacts = (getattr(sim.mechanism, name, ()) for name in ("joints", "contacts"))
+    if not contacts or any(joint.parent == WORLD and joint.ntrans for joint in joints):
+        return ""
+    return (
+        "Plans begin with smooth contacts, which push from afar: where the robot stays away from the ground, omit its "
+        "contacts, as load_urdf(ground=False) does."
+    )
+
+
 def _terms(given: Any) -> tuple[Spec, ...]:
     """One term, or several, as a tuple."""
     return tuple(given) if isinstance(given, Iterable) else (given,)
@@ -106,7 +118,8 @@ class Problem:
         gain_regularization: weight of the controls in the gains of the plan, beyond that in the plan itself, in units
             of the mean of their weights (default 0). Where the cost hardly weighs the controls, gains are so high that
             the plan may not survive shorter time steps.
-        advice: what to change where no plan is found: a sentence for the message of such a plan (default none).
+        advice: what to change where no plan is found: a sentence for the message of such a plan (default: one about the
+            ground, of robots that the world holds above it).
 
     Attributes:
         wanted: (T, nu) `controls0` before it was clipped [N, N m].
@@ -137,7 +150,7 @@ class Problem:
     ) -> None:
         _check_simulator("Problem(sim)", sim)
         self.sim = sim
-        self.advice = advice
+        self.advice = advice or _advice(sim)
         call = "Problem(gain_regularization=...)"
         self.gain_regularization = checks.number(call, gain_regularization, at_least=0.0)
         self.horizon = whole_number("Problem(horizon=...)", horizon)

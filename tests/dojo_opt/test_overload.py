@@ -51,6 +51,13 @@ def test_a_guess_beyond_the_limits_is_told_where_no_plan_is_found(swing):
     assert plan.success and plan.message == "Solved to the requested tolerance."
 
 
+def test_an_arm_above_ground_is_told_to_omit_it():
+    arm, leg = dojo.models.pendulum(), dojo.models.raiberthopper()
+    grounded = replace(arm, contacts=[dojo.Contact(arm.body_names[0], height=-9.0)])
+    found = [dojo.Problem(sim, sim.neutral(), 5).advice for sim in map(dojo.Simulator, (arm, leg, grounded))]
+    assert found[:2] == ["", ""] and "ground=False" in found[2]
+
+
 def test_a_jump_that_is_too_high_names_the_weakest_joint():
     """It used to end with its iteration limit, and no word on the torques of such a jump."""
     plan = dojo.ilqr(dojo.problems.jump(height=2.0), max_iterations=2)
