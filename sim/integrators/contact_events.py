@@ -20,7 +20,7 @@ from solvers.types import Vector
 NEVER = 1e300  # [s]
 UNKNOWN, BEGINS = -1.0, -2.0  # in place of a slip
 _ACCELERATION = 1e3  # [m/s^2] of impacts at least that forget the slip
-LANDED = 0.25  # error of a contact at its node before it lands, in accuracies
+LANDED = 0.05  # error of a contact at its node before it lands, in accuracies
 _HIT = 1e2  # [m/s^2, rad/s^2] of impacts at least
 
 
@@ -76,6 +76,14 @@ def _time_to_land(model: Model, data: Data, h: float, c: int, on_ground: bool) -
 
 
 @kernel
+def _jumps(h: float, accuracy: float, push: float, gap: float) -> bool:
+    """Whether a velocity jumps: by more than _HIT, or by more than the accuracy in a step that closes a gap. A foot may
+    land gently in the midst of a long one.   push: way of the jump in the time of the step [m, rad].
+    """
+    return push > h * h * _HIT or min(2.0 * gap, push) > h * accuracy
+
+
+@kernel
 def landing(
     model: Model, data: Data, options: StepOptions, accuracy: float, mean: Vector, slips: Vector
 ) -> Landing:  # fmt: skip
@@ -95,7 +103,7 @@ def landing(
             jump = h * abs(data.nu[model.limit_dof[k]] - mean[nq + model.limit_dof[k]])
             error, ahead = max(error, min(2.0 * gap, jump)), min(ahead, time)
             apart = min(apart, time if min(2.0 * gap, jump) > least else NEVER)
-            hits = hits or jump > h * h * _HIT
+            hits = hits or _jumps(h, accuracy, jump, gap)
     if data.active_count[0] == 0:
         return Landing(error, apart if apart < NEVER else ahead, longest, depth, hits)
     look_back(model, data, h, 1)
@@ -114,5 +122,5 @@ def landing(
             ahead, apart = min(ahead, time), min(apart, time if min(2.0 * gap, push) > least else NEVER)
             if push > h * h * _ACCELERATION:
                 slips[c] = UNKNOWN
-            hits = hits or push > h * h * _HIT
+            hits = hits or _jumps(h, accuracy, push, gap)
     return Landing(error, apart if apart < NEVER else ahead, longest, depth, hits)
