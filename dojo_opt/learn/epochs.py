@@ -17,6 +17,11 @@ from solvers.status import Status
 
 __all__ = ["learn"]
 
+_UNTRAINED = (
+    "All epochs are done, but the policy before the first is the best. Actions at their limits have no gradient: try a "
+    "smaller range (low, high), another reward, a smaller rate, or another seed."
+)
+
 
 def learn(
     search: Any,
@@ -51,7 +56,9 @@ def _check_state(call: str, own: dict[str, Any], given: dict[str, Any]) -> None:
 
 
 def _run_epochs(search: Any, resume: Learned | None) -> Learned:
-    """All epochs of an algorithm, evaluated at its marks, from the start or from where `resume` ended."""
+    """All epochs of an algorithm, evaluated before the first and at its marks, from the start or from where `resume`
+    ended.
+    """
     o, name = search.options, search.algorithm
     if resume is not None:
         if resume.algorithm != name or resume.seed != search.seed or (
@@ -67,6 +74,8 @@ def _run_epochs(search: Any, resume: Learned | None) -> Learned:
     marks = {round((k + 1) * o.epochs / count) for k in range(count)} | {o.epochs}
     status, state = Status.SOLVED, search.state()
     try:
+        if resume is None:
+            search.assess()
         while search.epoch < o.epochs and status == Status.SOLVED:
             record = search.train()
             if search.epoch in marks:
@@ -79,9 +88,13 @@ def _run_epochs(search: Any, resume: Learned | None) -> Learned:
     if not np.isfinite(search.best):
         search.assess()
     status = Status.SOLVED if success else status
+    message = progress.message(status)
+    if success and search.chosen_at == 0:
+        message = _UNTRAINED
     if not np.isfinite(search.best):  # a reward that is no number is none to learn from
         success, status = False, Status.NOT_FINITE
+        message = progress.message(status)
     return Learned(
-        search.chosen, success, status, progress.message(status), name, search.seed, search.best, search.steps,
+        search.chosen, success, status, message, name, search.seed, search.best, search.steps,
         search.unsolved, search.infinite, progress.seconds, progress.records, state,
     )  # fmt: skip

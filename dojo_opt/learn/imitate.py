@@ -47,7 +47,8 @@ class ImitationOptions:
         norm: largest length of the gradient (default 1).
         hidden: sizes of the hidden layers (default (64, 64)).
         activation: "tanh" or "elu" (default "tanh").
-        evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 4).
+        evaluations: number of evaluations on the way, evenly spaced, after one before the first epoch; the best policy
+            is kept (default 4).
         episodes: of an evaluation (default 8).
         time_limit: of the processor time [s] (default inf).
         callback: function of the record of each epoch; it may raise StopIteration to end (default None).

@@ -53,7 +53,8 @@ class RandomSearchOptions:
         activation: "tanh" or "elu" (default "tanh").
         shift: number that is subtracted from the reward of every step, to offset the reward of survival (default 0).
         randomization: models that the policy learns on (default: that of the task).
-        evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
+        evaluations: number of evaluations on the way, evenly spaced, after one before the first epoch; the best policy
+            is kept (default 10).
         episodes: of an evaluation (default 8).
         time_limit: of the processor time [s] (default inf).
         callback: function of the record of each epoch; it may raise StopIteration to end (default None).
@@ -102,7 +103,8 @@ class GradientSearchOptions:
         costate: largest length of the costate of a row; longer ones are shortened and counted (default 1e3).
         kappa_grad: smoothing of the derivatives [N s m] (default None: that of the motion).
         randomization: models that the policy learns on (default: that of the task).
-        evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
+        evaluations: number of evaluations on the way, evenly spaced, after one before the first epoch; the best policy
+            is kept (default 10).
         episodes: of an evaluation (default 8).
         time_limit: of the processor time [s] (default inf).
         callback: function of the record of each epoch; it may raise StopIteration to end (default None).

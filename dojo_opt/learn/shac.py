@@ -75,7 +75,8 @@ class ShacOptions:
         cutoff: that of the simulators it learns on, as of `Simulator` (default None: that of the task): at a large
             kappa all contacts of a robot act, and far ones hardly count. Evaluations have that of the task.
         start: policy to begin with, of `imitate` or another run; it brings its network and scaling (default None).
-        evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
+        evaluations: number of evaluations on the way, evenly spaced, after one before the first epoch; the best policy
+            is kept (default 10).
         episodes: of an evaluation (default 8).
         time_limit: of the processor time [s] (default inf).
         callback: function of the record of each epoch; it may raise StopIteration to end (default None).

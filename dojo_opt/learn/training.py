@@ -29,14 +29,14 @@ class Training:
     policy: LearnedPolicy  # moves in place
     chosen: LearnedPolicy  # the best so far
 
-    NUMBERS: tuple[str, ...] = ("epoch", "steps", "unsolved", "infinite", "best", "score")
+    NUMBERS: tuple[str, ...] = ("epoch", "steps", "unsolved", "infinite", "best", "score", "chosen_at")
 
     def __init__(self, task: Task, options: Any, seed: int) -> None:
         self.task, self.options, self.seed = task, options, seed
         self._check_memory()
         self.rng = np.random.default_rng((seed, 1))
         self.epoch, self.steps, self.unsolved, self.infinite, self.best = 0, 0, 0, 0, -np.inf
-        self.score = -np.inf
+        self.score, self.chosen_at = -np.inf, 0  # epochs before the policy that was chosen
 
     def _check_memory(self) -> None:
         """Refuse rollouts of an epoch, with their derivatives, that do not fit the memory."""
@@ -73,7 +73,7 @@ class Training:
         value = float(found.returns.mean())
         score = self.rating(policy, value)
         if score > self.score:
-            self.score, self.best, self.chosen = score, value, policy
+            self.score, self.best, self.chosen, self.chosen_at = score, value, policy, self.epoch
         return value
 
     def rating(self, policy: LearnedPolicy, value: float) -> float:

@@ -43,7 +43,7 @@ class Learned:
 
     Attributes:
         policy: the best policy.
-        success: whether all epochs were done.
+        success: whether all epochs were done; `message` tells if the policy before the first is the best.
         status: SOLVED, or the reason for an early end.
         message: the same as a sentence.
         algorithm: its name.

@@ -387,6 +387,18 @@ def test_workers_find_the_same_policies(task):
     assert np.abs(runs[0].policy.weights - runs[1].policy.weights).max() > 1e-6
 
 
+def test_a_policy_that_was_better_before_is_kept_and_the_message_tells(task):
+    """Updates far too long, where an arm without actions has the best return."""
+    still = replace(task, steps=9, reward=lambda x, a, after: -(a[0] ** 2))
+    spoilt = dojo.learn.ars(still, epochs=2, directions=2, best=1, rate=50.0, noise=0.5, evaluations=2, episodes=1)
+    assert spoilt.success and "before the first is the best" in spoilt.message and spoilt.best == 0.0
+    assert not spoilt.policy.weights.any() and spoilt.history[-1]["evaluated"] < -1.0
+    resumed = dojo.learn.ars(
+        still, epochs=2, directions=2, best=1, rate=50.0, noise=0.5, evaluations=2, episodes=1, resume=spoilt
+    )
+    assert resumed.message == spoilt.message and resumed.best == 0.0
+
+
 @pytest.mark.slow
 def test_policies_learn_and_hold_the_pendulum_down_in_a_closed_loop(task, tmp_path):
     lines = io.StringIO()
