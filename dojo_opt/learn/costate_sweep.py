@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import copysign, sqrt
 from typing import NamedTuple
 
-from dojo_opt.learn.network_rows import BLOCK, PART, WIDTH, Packed, backward
+from dojo_opt.learn.network_rows import PART, WIDTH, Packed, backward
 from solvers.compiler import kernel, parallel_kernel, prange
 from solvers.types import Cube, Flags, Integers, Matrix, Vector
 
@@ -113,13 +113,12 @@ def _sweep_part(net: Packed, s: CostateSweep, limits: SweepLimits, p: int) -> No
     """The sweep of the rows of part p."""
     n, steps = s.costates.shape[0], s.layers.shape[0]
     first, last = p * PART, min(p * PART + PART, n)
-    rows = (first, first + (last - first + BLOCK - 1) // BLOCK * BLOCK)
     outputs = s.slopes.shape[1] - net.shape[net.shape.shape[0] - 1, WIDTH]
     for t in range(steps - 1, -1, -1):
         for i in range(first, last):
             _through_step(s, t * n + i, i)
             _by_outputs(s, limits, outputs, t * n + i, i)
-        backward(net, s.layers[t], s.slopes, s.sums, p, rows, True)
+        backward(net, s.layers[t], s.slopes, s.sums, p, (first, last), True)
         for i in range(first, last):
             _through_observation(s, limits.costate, t * n + i, i, p)
 

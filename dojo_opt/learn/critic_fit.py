@@ -14,7 +14,6 @@ import numpy as np
 
 from dojo_opt.learn.network import Adam, Network
 from dojo_opt.learn.network_rows import (
-    BLOCK,
     FIRST,
     PART,
     SIZE,
@@ -67,18 +66,17 @@ def _fit_part(net: Packed, samples: Samples, buffers: FitBuffers, span: tuple[in
     """Gradient of the mean square error of a minibatch, samples span[0] up to span[1] of the order, by part p of it."""
     count, width = span[1] - span[0], net.shape[0, SIZE]
     first, last = p * PART, min(p * PART + PART, count)
-    end = first + (last - first + BLOCK - 1) // BLOCK * BLOCK
     layers, slopes = buffers.layers, buffers.slopes
     y = layers.shape[1] - net.shape[net.shape.shape[0] - 1, WIDTH]
-    for r in range(first, end):
+    for r in range(first, last):
         for k in range(width):
-            layers[r, k] = samples.inputs[samples.order[span[0] + r], k] if r < last else 0.0
-    forward(net, layers, (first, end))
-    for r in range(first, end):
-        slopes[r, y] = 2.0 * (layers[r, y] - samples.goals[samples.order[span[0] + r]]) / count if r < last else 0.0
+            layers[r, k] = samples.inputs[samples.order[span[0] + r], k]
+    forward(net, layers, (first, last))
+    for r in range(first, last):
+        slopes[r, y] = 2.0 * (layers[r, y] - samples.goals[samples.order[span[0] + r]]) / count
     for k in range(buffers.sums.shape[1]):
         buffers.sums[p, k] = 0.0
-    backward(net, layers, slopes, buffers.sums, p, (first, end), False)
+    backward(net, layers, slopes, buffers.sums, p, (first, last), False)
 
 
 @kernel

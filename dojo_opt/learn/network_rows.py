@@ -3,10 +3,11 @@
 Rows are divided into parts of PART, whatever the number of threads. A part adds up its own gradient, and those of the
 parts are added in their order, so that results are the same to the last bit on any number of threads.
 
-Rows of matrices are filled up with zeros to a multiple of LANES, rows of observations to one of BLOCK. `layers`
-(n, sum of whole(size)) has the inputs, then the outputs of each layer, side by side. Packed weights (1, count) are
-those of a layer after the other: the rows of W (inputs, outputs), then b. `shape` has a row for the inputs and for
-each layer: its size, and its width, which is whole(size).
+Rows of matrices are filled up with zeros to a multiple of LANES. Observations have rows for whole blocks of BLOCK:
+those beyond the last observation are scratch. `layers` (in_blocks(n), sum of whole(size)) has the inputs, then the
+outputs of each layer, side by side. Packed weights (1, count) are those of a layer after the other: the rows of W
+(inputs, outputs), then b. `shape` has a row for the inputs and for each layer: its size, and its width, which is
+whole(size).
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from solvers.lanes import LANES, load, store, whole
 from solvers.types import IntegerMatrix, Integers, Matrix
 
 __all__ = [
-    "BLOCK", "FIRST", "PART", "SIZE", "STRIDE", "TURNED", "WIDTH", "Packed", "backward", "backward_rows", "forward",
-    "forward_rows", "in_blocks", "parts", "places", "shape_of", "turned_places", "weight_rows",
+    "BLOCK", "FIRST", "PART", "SIZE", "STRIDE", "TURNED", "WIDTH", "Packed", "backward", "backward_rows", "blocks",
+    "forward", "forward_rows", "in_blocks", "parts", "places", "shape_of", "turned_places", "weight_rows",
 ]  # fmt: skip
 
 Span = tuple[int, int]
@@ -54,9 +55,14 @@ def parts(rows: int) -> int:
     return -(-rows // PART)
 
 
+def blocks(rows: int) -> int:
+    """Number of blocks of so many rows."""
+    return -(-rows // BLOCK)
+
+
 def in_blocks(rows: int) -> int:
     """Number of rows, filled up to whole blocks."""
-    return -(-rows // BLOCK) * BLOCK
+    return blocks(rows) * BLOCK
 
 
 def weight_rows(sizes: tuple[int, ...]) -> IntegerMatrix:
@@ -87,7 +93,10 @@ def turned_places(sizes: tuple[int, ...]) -> tuple[Integers, Integers]:
 
 @kernel
 def _affine(w: Matrix, first: int, n: int, layers: Matrix, places: tuple[int, int, int], rows: Span) -> None:
-    """y = x W + b of rows; W begins at `first`; places in `layers`: of x (n), of y, and its end."""
+    """y = x W + b of rows, and of the rest of their last block; W begins at `first`.
+
+    places: in `layers`, of x (n), of y, and its end.
+    """
     x, y, width = places[0], places[1], places[2] - places[1]
     for c in range(0, width, LANES):
         b = load(w, 0, first + n * width + c)

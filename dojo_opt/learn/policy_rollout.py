@@ -12,7 +12,7 @@ import numpy as np
 from dojo_opt.learn.action_delay import ActionDelay
 from dojo_opt.learn.costate_sweep import CostateSweep, SweepLimits, sweep_rows
 from dojo_opt.learn.network import Network
-from dojo_opt.learn.network_rows import BLOCK, parts
+from dojo_opt.learn.network_rows import blocks, parts
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.randomization import Drawn, Randomization, draw_pushes
 from dojo_opt.learn.rollout_rows import Acting, Judging, act_rows, judge_rows
@@ -121,8 +121,8 @@ class PolicyRollout:
         self.A, self.B = np.zeros((steps, kept, ndx, ndx)), np.zeros((steps, kept, ndx, nu))
         self._inside = np.zeros((steps, kept, no), dtype=np.bool_)
         self._layers = np.zeros((steps if slopes else 1, *policy.network.rows(rows).shape))
-        blocks = -(-rows // BLOCK)
-        self._work, self._failed = self.task.room(blocks), np.zeros(blocks, dtype=np.int64)
+        count = blocks(rows)
+        self._work, self._failed = self.task.room(count), np.zeros(count, dtype=np.int64)
 
     def acting(self, noise: Noise | None) -> Acting:
         """What `act` needs in every step.

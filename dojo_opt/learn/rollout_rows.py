@@ -96,7 +96,7 @@ def _act_block(net: Packed, a: Acting, linear: bool, t: int, p: int) -> None:
     a.failed[p] = OBSERVATION(a.observation, arguments)
     for i in range(first, last):
         _look(a, layers, t, i)
-    forward(net, layers, (first, first + BLOCK))
+    forward(net, layers, (first, last))
     outputs = layers.shape[1] - net.shape[net.shape.shape[0] - 1, WIDTH]
     for i in range(first, last):
         _act(a, layers, outputs, linear, t, i)
