@@ -16,6 +16,7 @@ from solvers.types import Matrix, Vector
 _SWEEPS, _SMALL = 40, 1e-2
 _EVERY, _SLOW = 5, 0.7  # sweeps between leaps; how much each moves w over the one before it, where they are slow
 _ROOM = 0.9  # of the way to where a normal impulse ends
+_FLAT = 1e-9  # share of the product of its diagonal below which the determinant of two tangents is rounding
 _STILL = 0.1  # of the tolerance of the sweeps: a row that would move less stays, and moves no others
 
 
@@ -35,12 +36,21 @@ def relax_normal(columns: Matrix, j: int, kappa: float, still: float, size: int,
 
 @kernel
 def relax_friction(columns: Matrix, j: int, bound: float, still: float, size: int, w: Vector, l: Vector) -> float:
-    """(l_j, l_j+1) such that the slip vanishes, or at the bound against it; as relax_normal with the slip."""
+    """(l_j, l_j+1) such that the slip vanishes, or at the bound against it; as relax_normal with the slip.
+
+    A contact of a planar robot slips along one line only, and the block of a tangent across it has no inverse: of
+    g t t^T, with a slip along t, it is t t^T/g.
+    """
     g, f = columns[j], columns[j + 1]
     a, b, c, d = g[j], f[j], g[j + 1], f[j + 1]
-    i = 1.0 / (a * d - b * c)
-    x = l[j] - i * (d * w[j] - b * w[j + 1])
-    y = l[j + 1] - i * (a * w[j + 1] - c * w[j])
+    if not a + d > 0.0:
+        return 0.0
+    if a * d - b * c > _FLAT * a * d:
+        i = 1.0 / (a * d - b * c)
+        x = l[j] - i * (d * w[j] - b * w[j + 1])
+        y = l[j + 1] - i * (a * w[j + 1] - c * w[j])
+    else:
+        x, y = l[j] - w[j] / (a + d), l[j + 1] - w[j + 1] / (a + d)
     if x * x + y * y > bound * bound:
         e = 1.0 / max(a, d)
         x, y = l[j] - e * w[j], l[j + 1] - e * w[j + 1]

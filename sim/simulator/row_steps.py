@@ -112,6 +112,8 @@ class RowSteps:
         name, order = f"{_CALL}(kappa=...)", self._engine.settings.order
         if order > 2:
             raise ValueError(f"{name}: steps of order {order} have none")
+        if isinstance(kappa, float) and 0.0 < kappa < np.inf:  # an array of one number would take as long as two rows
+            return np.full(count, kappa)
         given = checks.array(name, kappa, () if checks.ndim(name, kappa) == 0 else (count,))
         if not np.all(given > 0.0):
             raise ValueError(f"{name}: expected numbers above 0, got {kappa!r}")

@@ -191,6 +191,9 @@ def solve_active(
     data.feature_choice[0] = FeatureChoice.ONCE
     data.overlap_allowed[0] = 0
     known = known_start(model, data, options, inputs, guess)
+    # the motion before chose the active contacts: those that the start brings near take part now, not after a solve
+    if known.found and model.pair_kind.shape[0] == 0 and inequalities_activated(model, data, options):
+        known = known_start(model, data, options, inputs, guess)
     gained, corners = False, False
     for k in range(0 if known.found else UNKNOWN, ATTEMPTS):
         s = strategy(k)

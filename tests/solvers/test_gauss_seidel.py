@@ -11,19 +11,26 @@ SIZE = 3 * POINTS + STOPS
 ROOM = SIZE + 4  # the matrices of a step have room for more
 
 
-def problem(seed):
-    """G of bodies with gaps that change by h times their speeds, and w of a motion that closes some of them."""
+def problem(seed, flat=False):
+    """G of bodies with gaps that change by h times their speeds, and w of a motion that closes some of them.
+
+    flat: contacts slip along one line only, the last one along its first tangent, as those of planar robots.
+    """
     rng = np.random.default_rng(seed)
     J = rng.normal(size=(SIZE, 14))
+    if flat:
+        J[2], J[5], J[8] = 0.5 * J[1], -2.0 * J[4], 0.0
     scale = np.ones(SIZE)
     scale[0 : 3 * POINTS : 3] = scale[3 * POINTS :] = H
     G = scale[:, None] * (J @ J.T)  # impulses act along J, and normal rows are lengths
     w = scale * rng.normal(size=SIZE)
+    if flat:
+        w[2], w[5], w[8] = 0.5 * w[1], -2.0 * w[4], 0.0
     return G, w
 
 
-def solution(seed, kappa, repeat=60):
-    G, w0 = problem(seed)
+def solution(seed, kappa, repeat=60, flat=False):
+    G, w0 = problem(seed, flat)
     columns, friction = np.zeros((ROOM, ROOM)), np.zeros(ROOM)
     columns[:SIZE, :SIZE] = G.T
     friction[0 : 3 * POINTS : 3] = (0.0, 0.4, 2.0)
@@ -45,9 +52,10 @@ def test_gaps_times_impulses_are_kappa(seed, kappa):
     np.testing.assert_allclose(w[normals] * l[normals], kappa, rtol=1e-6)
 
 
+@pytest.mark.parametrize("flat", [False, True])
 @pytest.mark.parametrize("seed", range(6))
-def test_friction_sticks_or_acts_against_the_slip_at_its_bound(seed):
-    w, l, friction = solution(seed, 1e-12)
+def test_friction_sticks_or_acts_against_the_slip_at_its_bound(seed, flat):
+    w, l, friction = solution(seed, 1e-12, flat=flat)
     for j in range(0, 3 * POINTS, 3):
         slip, force, bound = w[j + 1 : j + 3], l[j + 1 : j + 3], friction[j] * l[j]
         assert np.hypot(*force) <= bound * (1.0 + 1e-9) + 1e-15
