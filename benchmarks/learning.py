@@ -237,17 +237,22 @@ def kept_cells(table: dict[str, Any], algorithm: str) -> list[list[Any]]:
 
 def table(folder: Path, names: list[str]) -> Report:
     """Returns of all saved runs: here, and in MuJoCo where Gymnasium has the task. Algorithms without runs in the
-    folder keep the numbers that its learning.json has.
+    folder keep the numbers that its learning.json has, and a note names them.
     """
     report, path = Report("Policies of Gymnasium's tasks, one core"), folder / "learning.json"
     before = json.loads(path.read_text(encoding="utf-8"))["tables"] if path.exists() else []
     known = {found["title"]: found for found in before}
     for name in names:
-        lines = []
+        lines: list[list[Any]] = []
+        kept: list[str] = []
         for algorithm in (*SETTINGS[name], *PEERS):
-            lines += cells(folder, name, algorithm) or kept_cells(
-                known.get(name, {"header": (), "rows": ()}), algorithm
-            )
+            found = cells(folder, name, algorithm)
+            if not found:
+                found = kept_cells(known.get(name, {"header": (), "rows": ()}), algorithm)
+                kept += [algorithm] if found else []
+            lines += found
+        if kept:
+            report.notes.append(f"{name}: not run again for this table: {', '.join(kept)}")
         if lines:
             report.tables.append(Table(name, _HEADER, lines))
             for algorithm in dict.fromkeys(("shac", *(line[0] for line in lines))):
