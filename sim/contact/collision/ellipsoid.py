@@ -27,6 +27,7 @@ from sim.contact.collision.support import (
     farthest_across,
     farthest_apart,
     farthest_from_circle,
+    farthest_from_point,
     solved,
     stiffness,
 )
@@ -223,7 +224,7 @@ def along_element(k: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> 
     o, db = int(sizes[0]), three(sizes, PairSize.B)
     if k <= int(hull[o, Hull.CORNERS]):
         x = placed(row(hull, o + k), R, r)
-        n = farthest_apart(x, NOWHERE, R, db)
+        n = farthest_from_point(x, R, db)
         inside = True
     else:
         z, v, length = edge(hull, o, k - 1 - int(hull[o, Hull.CORNERS]))

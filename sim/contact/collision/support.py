@@ -172,6 +172,30 @@ def farthest_apart(c: Vec3, da: Vec3, R: Vector, db: Vec3) -> Vec3:
 
 
 @inner_kernel
+def farthest_from_point(c: Vec3, R: Vector, d: Vec3) -> Vec3:
+    """`farthest_apart` of a point at c. Outside, n is along c_i/(t + d_i^2), where the surface has its point y:
+
+        y_i = d_i^2 c_i/(t + d_i^2),   1/|p| = 1 with p_i = y_i/d_i
+
+    1/|p| is concave in t, and nearly a line: Newton's method climbs from t = 0 to its root, and does not pass it.
+    """
+    a, b, e = d[0] * d[0], d[1] * d[1], d[2] * d[2]
+    if not c[0] * c[0] / a + c[1] * c[1] / b + c[2] * c[2] / e > 1.0:
+        return farthest_apart(c, (0.0, 0.0, 0.0), R, d)
+    t, least = 0.0, _CONVERGED_LINEARLY * min(a, b, e)
+    n = c
+    for _ in range(_STEPS):
+        n = (c[0] / (t + a), c[1] / (t + b), c[2] / (t + e))
+        x, y, z = a * n[0] * n[0], b * n[1] * n[1], e * n[2] * n[2]
+        square = x + y + z
+        step = (sqrt(square) - 1.0) * square / (x / (t + a) + y / (t + b) + z / (t + e))
+        if not step > _CONVERGED_LINEARLY * t + least:
+            break
+        t += step
+    return unit(n, (0.0, 0.0, 1.0))
+
+
+@inner_kernel
 def farthest_from_circle(c: Vec3, axis: Vec3, rho: float, R: Vector, db: Vec3) -> Vec3:
     """`climbed` of a circle at the end of a cylinder. Along the axis s has a peak like that of a cone: not from there,
     but from the side where the plane touches b.
