@@ -1,6 +1,7 @@
 """Tasks of Gymnasium, version 5: its models, observations, rewards, ends and limits, in this simulator.
 
-The models are the MJCF files in Gymnasium's own package. Ground and limits of joints are hard here: a random first
+The models are the MJCF files in Gymnasium's own package, without the margins of their geoms, into which soft contact
+sinks. Ground and limits of joints are hard here: a random first
 state below the ground is lifted onto it, and joints beyond their limits are as far within them. Ant and humanoid
 observe forces of contacts, and pay for them, only where they are asked to: these forces are those of contacts with the
 ground, in the last time step of an action.
@@ -110,7 +111,9 @@ def _model(file: str) -> MjcfMechanism:
         raise RuntimeError(
             f"{file}: expected {_COORDINATES[file]} coordinates, got {mech.nq}; this Gymnasium is unknown"
         )
-    return mech
+    # on level ground at zero, half of the margin of a contact is its height, see sim/io/mjcf/contacts.py
+    bare = [replace(contact, radius=contact.radius - contact.height, height=0.0) for contact in mech.contacts]
+    return replace(mech, contacts=bare)
 
 
 def _tailed(skipped: int, file: str, fastest: float) -> Callable[..., Any]:

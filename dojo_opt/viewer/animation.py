@@ -250,9 +250,11 @@ def _clips(m: Motion, group: tuple[str, ...], end: float) -> dict[Any, Any]:
 
     clips = {}
     every = sparse(m.time)
-    times, rows = [*m.time[::every]], [*range(0, len(m.time), every)]
+    last = len(m.time) - 1
+    rows = [*range(0, last, every), last]
+    times = [*m.time[rows]]
     if end > times[-1]:
-        times, rows = [*times, end], [*rows, len(m.time) - 1]
+        times, rows = [*times, end], [*rows, last]
     for k, body in enumerate(m.mechanism.bodies):
         clip = AnimationClip(fps=FRAMES)
         for time, row in zip(times, rows, strict=True):

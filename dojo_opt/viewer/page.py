@@ -45,7 +45,7 @@ body {{margin: 0; font: 14px system-ui, sans-serif; color: #223}}
 <body><div id="meshcat-pane" title="drag to turn, scroll to zoom"></div>
 <div id="bar"><b>{title}</b>{legend}<button id="play">pause</button>
 <button id="back" title="one knot back">&lsaquo;</button><button id="ahead" title="one knot ahead">&rsaquo;</button>
-<input id="time" type="range" min="0" max="{duration}" step="0.001" value="0"><span id="clock"></span>
+<input id="time" type="range" min="0" max="{duration}" step="any" value="0"><span id="clock"></span>
 <select id="speed" title="speed"><option value="0.1">1/10</option>
 <option value="0.25">1/4</option><option value="0.5">1/2</option><option value="1" selected>1 x</option>
 <option value="2">2 x</option></select>{boxes}
@@ -67,7 +67,7 @@ for (const part of ["Axes", "Grid"]) viewer.set_property([part], "visible", fals
 viewer.set_dirty();
 const animator = viewer.animator, slider = document.getElementById("time"), button = document.getElementById("play");
 const now = () => animator.actions.length ? animator.actions[0].time : 0;
-const tell = () => {{document.getElementById("clock").textContent = now().toFixed(2) + " of {duration} s"}};
+const tell = () => {{document.getElementById("clock").textContent = now().toFixed(2) + " of {length} s"}};
 button.onclick = () => {{
     animator.playing ? animator.pause() : animator.play();
     button.textContent = animator.playing ? "pause" : "play";
@@ -138,7 +138,8 @@ setInterval(() => {{ if (animator.playing) {{slider.value = now(); tell();}} }},
 const path = [{path}], follow = document.getElementById("follow");  // of the robot, at even times
 let seen = path[0];
 const place = () => {{
-    const k = {duration} > 0 ? now() / {duration} * (path.length - 1) : 0, i = Math.min(Math.floor(k), path.length - 1);
+    const k = {span} > 0 ? Math.min(now() / {span}, 1) * (path.length - 1) : 0;
+    const i = Math.min(Math.floor(k), path.length - 1);
     const next = path[Math.min(i + 1, path.length - 1)];
     return path[i].map((x, axis) => x + (k - i) * (next[axis] - x));
 }};
@@ -297,7 +298,7 @@ def page(
     places = {name: f"{x:.3f}, {z:.3f}, {-y:.3f}" for name, (x, y, z) in (("eye", eye), ("target", path[0]))}
     places["path"] = ",".join(f"[{x:.3f},{z:.3f},{-y:.3f}]" for x, y, z in path)
     places |= {name: ", ".join(map(str, rgb)) for name, rgb in (("sky", _SKY), ("horizon", _HORIZON))}
-    duration = f"{max(float(each.time[-1]) for each in motions):.3g}"
+    duration = max(float(each.time[-1]) for each in motions)
     groups = [group_of(k) for k in range(len(motions))]
     ghosts = [ghost for each, group in zip(motions, groups, strict=True) for ghost in _ghosts(each, group)]
     there = {"forces": any(len(each.contact_time) and each.force.size for each in motions), "ghost": bool(ghosts)}
@@ -313,6 +314,8 @@ def page(
         viewer=viewer,
         commands=encoded,
         duration=duration,
+        length=f"{duration:.2f}" if duration >= 1.0 else f"{duration:.3g}",
+        span=float(m.time[-1]),  # of the path
         knot=f"{m.time[1] - m.time[0] if len(m.time) > 1 else 1.0:.6g}",
         boxes=boxes,
         ghosts=json.dumps(ghosts),

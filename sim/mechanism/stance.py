@@ -11,6 +11,10 @@ from sim.mechanism.shapes import HalfSpace, rotation_matrix
 from solvers.types import Floats
 
 _CLEAR = 1e-9  # [m] above the ground: a gap of zero, or below by rounding, has no interior to start the solver in
+_CARRIES = (
+    0.5  # upward part of the normal of ground that a base stands on; steeper ground is a wall, none that faces down
+)
+_SUNK = 1e-3  # [m] how deep a contact may start in the ground without a warning
 
 
 def resting(limits: tuple[float, float] | None) -> float:
@@ -45,16 +49,35 @@ def plane_heights(mech: Mechanism, q: Floats) -> list[tuple[float, float]]:
     return out
 
 
-def lifted(mech: Mechanism, base: str) -> Floats:
+def lifted(mech: Mechanism, base: str, *, down: bool = True) -> Floats:
     """Neutral q with the joint `base`, floating in the world, so high that the lowest contact touches its ground, or
     the lowest shape a half-space.
+
+    Walls and ceilings neither raise it nor let it down, see `penetrations`.
+
+    Args:
+        mech: the mechanism.
+        base: name of the joint.
+        down: whether a base that is above its ground is set down on it.
+
+    Returns:
+        (nq,) coordinates.
     """
     q = np.array(mech.neutral, dtype=np.float64)
     joint = mech.joints[mech.joint_names.index(base)]
     low = [*zip(gaps(mech, q), mech.contact_normals[:, 2], strict=True), *plane_heights(mech, q)]
-    heights = [gap / rise for gap, rise in low if rise > 0.0]
-    if heights:
+    heights = [gap / rise for gap, rise in low if rise >= _CARRIES]
+    if heights and (down or min(heights) < 0.0):
         up = _CLEAR - min(heights)
         at = mech.q_slice(base).start
         q[at : at + 3] += up * rotation_matrix(joint.orientation)[2]
     return q
+
+
+def penetrations(mech: Mechanism) -> list[str]:
+    """Contacts, and collisions with half-spaces of the world, that start inside of the ground, with their depths."""
+    q = np.asarray(mech.neutral, dtype=np.float64)
+    on_planes = [c.name for c in mech.collisions if c.b == WORLD and isinstance(c.shape_b, HalfSpace)]
+    distances = [*gaps(mech, q), *(gap for gap, _ in plane_heights(mech, q))]
+    names = [*(c.name for c in mech.contacts), *on_planes]
+    return [f"{name} ({-gap:.3g} m)" for name, gap in zip(names, distances, strict=True) if gap < -_SUNK]

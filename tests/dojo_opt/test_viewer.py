@@ -490,3 +490,15 @@ def test_a_page_steps_from_knot_to_knot_and_shows_its_overlays(page, quadruped, 
     page.uncheck("input[data-part=forces]")
     r, g, b = np.moveaxis(before, 2, 0)
     assert changed(settled(page), before) > 12 and ((r > 2 * g) & (r > 2 * b) & (r > 0.3)).sum() > 12
+
+
+def test_a_page_ends_with_its_longest_motion_and_others_stay_at_their_end(quadruped):
+    """The slider reaches an end that is no round number; keys that are left out do not delay the end of a motion."""
+    long = motion(quadruped)
+    short = dataclasses.replace(long, time=0.2 * long.time)
+    text = page_of([short, dataclasses.replace(long, time=24.69 * long.time)], [], {})
+    assert 'max="12.345"' in text and "now() / 0.1, 1)" in text
+    (first, *_) = animation._clips(short, ("meshcat",), 0.5).values()
+    keys = first.tracks["position"]
+    assert [k / animation.FRAMES for k in keys.frames[-2:]] == pytest.approx([0.1, 0.5])
+    assert keys.values[-2] == keys.values[-1] == short.position[-1, 0].tolist()

@@ -7,7 +7,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
-from sim.io.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
+from sim.io.mjcf import MjcfMechanism, MjcfWarning, load_mjcf, omitted
 from sim.simulator.simulator import Simulator
 
 pytest.importorskip("mujoco")
@@ -108,6 +108,21 @@ def test_free_joints_have_the_armature_of_their_translations() -> None:
         load_mjcf(text.format('stiffness="50"'))
 
 
+WALL = """<mujoco><worldbody>{}<geom type="plane" size="2 2 .1" {}/>
+  <body pos="0 0 1"><freejoint/><geom name="ball" type="sphere" size=".1"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("floor", ["", '<geom type="plane" size="2 2 .1"/>'])
+@pytest.mark.parametrize(
+    "turned", ['zaxis="1 0 0"', 'quat="1 0 1 0"', 'pos="0 0 1" zaxis="1 0 .2"', 'pos="0 0 1" zaxis="0 0 -1"']
+)
+def test_a_wall_does_not_raise_a_base(floor: str, turned: str) -> None:
+    """Neither by its depth over the rounding of its normal, nor down to the floor."""
+    with pytest.warns(MjcfWarning, match=r"inside of the ground in the neutral state: ball(@geom_1)? \(0\.1 m\)"):
+        mech = load_mjcf(WALL.format(floor, turned))
+    np.testing.assert_allclose(np.asarray(mech.neutral)[:3], (0.0, 0.0, 1.0))
+
+
 HELD = """
 <mujoco>
   <worldbody>
@@ -150,3 +165,76 @@ def test_every_equality_is_read_or_named(given: str) -> None:
 def test_errors(source: str, error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
         load_mjcf(source)
+
+
+BARE = """<mujoco><compiler angle="radian"/><option{option}/><worldbody><geom name="floor" type="plane" size="5 5 1"{floor}/>
+  <body name="a" pos="0 0 1"{body}><joint name="j" axis="0 1 0" limited="true" range="-1 1"{joint}/>
+    <geom name="g" size=".1" pos=".3 0 0"{geom}/></body></worldbody>
+  <contact>{pairs}</contact><actuator>{actuators}</actuator></mujoco>"""
+OMITTED = {
+    "springs do not yield here .springyield.: j": {"joint": ' stiffness="5" springyield=".2"'},
+    "nonlinear stiffness is omitted: j": {"joint": ' stiffness="5 1"'},
+    "nonlinear damping is omitted: j": {"joint": ' damping="5 1"'},
+    "nonlinear damping is omitted: m": {"actuators": '<motor name="m" joint="j" damping="1 2"/>'},
+    "compensation by actuators is unbounded here .*: j": {
+        "body": ' gravcomp="1"',
+        "joint": ' actuatorgravcomp="true" actuatorfrcrange="-1 1"',
+    },
+    "and limits that MuJoCo's solref lets bounce do not bounce here: j": {"joint": ' solreflimit=".02 .1"'},
+    "limits that give way visibly in MuJoCo are rigid here: j": {"joint": ' solreflimit=".1 1"'},
+    "limits that give way visibly in MuJoCo are rigid here: floor": {"floor": ' solref="-100 -20"'},
+    "solref lets bounce do not bounce here: g": {"geom": ' solref="-1000 -1"'},
+    "torsional and rolling friction is omitted .*: g": {"geom": ' condim="4"'},
+    "torsional and rolling friction is omitted .*: floor": {"floor": ' condim="6" friction="1 0 .1"'},
+    "torsional and rolling friction is omitted .*: p": {"pairs": '<pair name="p" geom1="g" geom2="floor" condim="6"/>'},
+    "that of the first direction in all directions: p": {
+        "pairs": '<pair name="p" geom1="g" geom2="floor" friction="1 .2 0 0 0"/>'
+    },
+    "adhesion of contacts is omitted: g": {"geom": ' adhesion="3"'},
+    "adhesion of contacts is omitted: p": {"pairs": '<pair name="p" geom1="g" geom2="floor" adhesion="2"/>'},
+    "velocities of surfaces are omitted: floor": {"floor": ' surfacevel="1 0 0 0 0 0"'},
+    "delays of actuators are omitted: m": {"actuators": '<motor name="m" joint="j" delay=".1" nsample="60"/>'},
+    "with several controls or forces are omitted: m": {
+        "actuators": '<pid name="m" joint="j" kp="2"/><motor joint="j" gear="3" ctrlrange="-1 2" ctrllimited="true"/>'
+    },
+}
+
+
+@pytest.mark.parametrize("words", OMITTED)
+def test_every_attribute_that_moves_the_robot_is_read_or_named(words: str) -> None:
+    parts = dict.fromkeys(("option", "floor", "body", "joint", "geom", "pairs", "actuators"), "")
+    with pytest.warns(MjcfWarning, match=words):
+        mech = load_mjcf(BARE.format(**parts | OMITTED[words]))
+    if "several" in words:
+        assert mech.report is not None
+        assert [part.tolist() for part in (mech.report.gear, mech.report.low, mech.report.high)] == [[3], [-3], [6]]
+
+
+def test_equalities_that_give_way_are_named() -> None:
+    weld = '<weld name="e" body1="a" body2="b" {}/>'
+    for given, words in (
+        ('solref=".1 1"', "that give way"),
+        ('solimp=".2 .3"', "that give way"),
+        ('torquescale="0"', "torque"),
+    ):
+        with pytest.warns(MjcfWarning, match=f"{words}.*: e"):
+            load_mjcf(HELD.format(weld.format(given)))
+
+
+def test_an_actuator_of_a_ball_leaves_its_armature_out() -> None:
+    text = '<mujoco><worldbody><body><joint name="b" type="ball"/><geom size=".1"/></body></worldbody><actuator>{}'
+    text = text.format('<motor name="m" joint="b" gear="1" armature="1"/></actuator></mujoco>')
+    with pytest.warns(MjcfWarning, match="omitted: m") as caught:
+        load_mjcf(text)
+    assert sum("armature and damping of actuators" in str(w.message) for w in caught) == 1
+
+
+def test_fields_of_a_later_mujoco_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(omitted._ONE_OF_EACH)
+    assert omitted._unknown(model) == []
+    monkeypatch.setitem(omitted._KNOWN, "jnt", omitted._KNOWN["jnt"].replace("springyield ", ""))
+    monkeypatch.setattr(omitted, "_OPTIONS", omitted._OPTIONS.replace("wind ", ""))
+    assert omitted._unknown(model) == []
+    model.jnt_springyield[1], model.opt.wind[2], model.opt.enableflags = 0.1, 2.0, 1 << 8
+    assert omitted._unknown(model) == ["option.wind", "option.enableflags", "jnt_springyield"]

@@ -174,3 +174,48 @@ def test_a_base_starts_with_its_ellipsoid_on_the_plane() -> None:
     mech = quietly(STONES.partition('  <body name="lens"')[0] + "</worldbody></mujoco>")
     gap = Simulator(mech, time_step=1e-9, kappa=1e-18).step(np.r_[mech.neutral, np.zeros(6)]).contacts.gap
     np.testing.assert_allclose(gap, [0.0], atol=1e-8)
+
+
+MARGINS = """<mujoco><compiler angle="radian"/><option cone="elliptic" impratio="100"/><worldbody>
+  <geom type="plane" size="5 5 .1" margin=".01"/>
+  <body pos="0 0 .14"><freejoint/><geom name="ball" size=".1" mass="1" margin=".03" gap=".02"/></body>
+  <body pos="0 2 1"><joint name="j" axis="0 1 0" limited="true" range="-1 .6" margin=".2" damping=".1"/>
+    <geom size=".1" pos=".3 0 0" mass="1"/></body>
+</worldbody><actuator><motor joint="j" gear="2" armature=".05" damping=".1"/></actuator></mujoco>"""
+
+
+def test_margins_and_the_inertia_of_actuators_act_as_in_mujoco() -> None:
+    """A ball that slides, then rolls on its margin, and an arm that falls to that of its range against its actuator."""
+    model = mujoco.MjModel.from_xml_string(MARGINS)
+    model.opt.timestep = 1e-3
+    data = mujoco.MjData(model)
+    data.qvel[0], data.ctrl[:] = 0.5, -0.2
+    mech = quietly(MARGINS, collisions=True)
+    assert (
+        mech.joints[1].armature == (0.2,)
+        and mech.joints[1].damper == (0.5,)
+        and mech.joints[1].limits == ((-0.8, 0.4),)
+    )
+    sim = Simulator(mech, time_step=1e-3)
+    x = sim.state_from_velocity(sim.neutral()[: sim.nq], data.qvel)
+    t = sim.rollout(x, np.tile(mech.report.gear * data.ctrl, (800, 1)), throw=True)
+    for steps, error in ((200, 2e-4), (800, 2e-3)):  # MuJoCo's limit and contact give way
+        mujoco.mj_step(model, data, steps - round(data.time / 1e-3))
+        np.testing.assert_allclose(t.x[steps, 7], data.qpos[7], atol=error)
+        np.testing.assert_allclose(t.x[steps, [0, 2]], data.qpos[[0, 2]], atol=2e-3)
+    assert abs(data.qvel[0] / data.qvel[4] - 0.12) < 1e-3 and abs(t.v[-1, 0] / t.v[-1, 4] - 0.12) < 1e-3
+
+
+def test_margins_of_collisions_are_those_of_round_geoms() -> None:
+    text = TABLE.replace('name="ball" size=".1"', 'name="ball" size=".1" margin=".02"')
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        mech = load_mjcf(text, collisions=True)
+    assert not any("margin" in str(w.message) for w in caught)
+    balls = {c.name: max(getattr(c.shape_a, "radius", 0), getattr(c.shape_b, "radius", 0)) for c in mech.collisions}
+    assert balls["table-ball"] == pytest.approx(0.12)
+    assert balls["ball-upper"] == pytest.approx(0.11)
+    boxes = quietly(TABLE.replace('name="cube"', 'name="cube" margin=".01"'), collisions=True).report
+    assert "margins between geoms that are neither spheres nor capsules are omitted: table-cube" in str(boxes)
+    own = quietly(text, collisions="self").report
+    assert "collisions=True has those of others: ball" in str(own)

@@ -1,4 +1,4 @@
-"""Inputs from the actuators of an MJCF file, and notes on its unsupported elements."""
+"""Inputs from the actuators of an MJCF file, and the dry friction of its joints."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from sim.io.mjcf.flags import actuator_disabled, contacts_disabled
+from sim.io.mjcf.flags import actuator_disabled
 from sim.io.mjcf.joints import BALL, FREE
-from sim.io.mjcf.welded_bodies import PLANE, Where, name_of, pose_of
+from sim.io.mjcf.welded_bodies import Where, name_of, pose_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.input import Input
 from sim.mechanism.joint import Joint
@@ -29,10 +29,13 @@ def find_inputs(
     """
     inputs: list[Input] = []
     rows: list[tuple[float, float, float]] = []
-    for a in range(model.nu):
+    for a in range(model.nactuator):
         name, j = name_of(model, "actuator", a), int(model.actuator_trnid[a, 0])
         if actuator_disabled(model, a):
             notes.add("actuators that the file switches off are omitted", [name])
+            continue
+        if int(model.actuator_ctrlnum[a]) != 1 or int(model.actuator_outnum[a]) != 1:
+            notes.add("actuators with several controls or forces are omitted", [name], warn=True)
             continue
         wrench = _at_site(model, a, name, where)
         on_joint = int(model.actuator_trntype[a]) in (_JOINT, _JOINT_IN_PARENT)
@@ -41,9 +44,9 @@ def find_inputs(
             continue
         servo = None if wrench else _servo(model, a)
         if servo is not None:
-            part, ratio = replace(servo, joint=homes[j][0], dof=homes[j][1], name=name), 1.0 / model.actuator_gear[a, 0]
+            part, ratio = replace(servo, joint=homes[j][0], dof=homes[j][1], name=name), 1.0 / _gear(model, a)
             low, high = _ctrl_bounds(model, a, ratio)
-            forces = _within(_force_range(model, a, float(model.actuator_gear[a, 0])), _joint_range(model, j))
+            forces = _within(_force_range(model, a, _gear(model, a)), _joint_range(model, j))
             part = replace(part, force_limits=forces)
             inputs.append(replace(part, limits=(low, high)) if low < high else part)
             rows.append((ratio, low, high))
@@ -55,7 +58,7 @@ def find_inputs(
                 [name],
                 warn=True,
             )
-        ratio = 1.0 if wrench else float(model.actuator_gear[a, 0])
+        ratio = 1.0 if wrench else _gear(model, a)
         gear = ratio * (float(model.actuator_gainprm[a, 0]) if plain else 1.0)
         low, high = _bounds(model, a, gear, ratio, bool(plain))
         if not wrench:
@@ -71,13 +74,35 @@ def find_inputs(
     return inputs, table[:, 0], table[:, 1], table[:, 2]
 
 
+def _gear(model: Any, a: int) -> float:
+    """Force on its joint per unit of the force of an actuator."""
+    return float(model.actuator_gear[model.actuator_outadr[a], 0])
+
+
+def reflect_actuators(model: Any, notes: Notes) -> None:
+    """Give the model's hinges and slides the armature and damping of their actuators, times gear^2.
+
+    MuJoCo has both even where an actuator is switched off.
+    """
+    for a in np.flatnonzero((model.actuator_armature != 0.0) | (model.actuator_damping != 0.0)):
+        j = int(model.actuator_trnid[a, 0])
+        on_joint = int(model.actuator_trntype[a]) in (_JOINT, _JOINT_IN_PARENT)
+        if not on_joint or model.jnt_type[j] in (FREE, BALL):
+            text = "armature and damping of actuators that do not drive a hinge or a slide are omitted"
+            notes.add(text, [name_of(model, "actuator", int(a))], warn=True)
+            continue
+        d, square = int(model.jnt_dofadr[j]), _gear(model, int(a)) ** 2
+        model.dof_armature[d] += square * model.actuator_armature[a]
+        model.dof_damping[d] += square * model.actuator_damping[a]
+
+
 def _servo(model: Any, a: int) -> Input | None:
     """The servo that an actuator of a joint is, for a target in units of the joint; None of others.
 
     Its force is kp ctrl - kp l - kd l' or kd (ctrl - l') of the length l = gear q.
     """
     affine = model.actuator_gaintype[a] == _FIXED_GAIN and model.actuator_biastype[a] == _AFFINE_BIAS
-    gear = float(model.actuator_gear[a, 0])
+    gear = _gear(model, a)
     if not affine or model.actuator_dyntype[a] != _NO_DYNAMICS or gear == 0.0:
         return None
     gain, (constant, place, rate) = float(model.actuator_gainprm[a, 0]), model.actuator_biasprm[a, :3].tolist()
@@ -96,7 +121,7 @@ def _at_site(model: Any, a: int, name: str, where: Where) -> Input | None:
     if int(model.actuator_trntype[a]) != _SITE or reference >= 0:
         return None
     group, frame = where[int(model.site_bodyid[site])]
-    gear = np.array(model.actuator_gear[a], dtype=np.float64)
+    gear = np.array(model.actuator_gear[model.actuator_outadr[a]], dtype=np.float64)
     if group is None or not gear.any():
         return None
     at = frame.then(pose_of(model.site_pos[site], model.site_quat[site]))
@@ -135,7 +160,7 @@ def _within(bounds: tuple[float, float], outer: tuple[float, float]) -> tuple[fl
 
 def _note_shared_ranges(model: Any, notes: Notes) -> None:
     """A note on the joints where an actuatorfrcrange bounds a sum, which here bounds each part of it."""
-    active = [a for a in range(model.nu) if not actuator_disabled(model, a)]
+    active = [a for a in range(model.nactuator) if not actuator_disabled(model, a)]
     on_joint = [a for a in active if int(model.actuator_trntype[a]) in (_JOINT, _JOINT_IN_PARENT)]
     driven = [int(model.actuator_trnid[a, 0]) for a in on_joint]
     limited = np.flatnonzero(model.jnt_actfrclimited).tolist()
@@ -147,9 +172,10 @@ def _note_shared_ranges(model: Any, notes: Notes) -> None:
 
 def _ctrl_bounds(model: Any, a: int, gear: float) -> tuple[float, float]:
     """Bounds of an input from those of its control."""
-    if not model.actuator_ctrllimited[a]:
+    c = int(model.actuator_ctrladr[a])
+    if not model.actuator_ctrllimited[c]:
         return -np.inf, np.inf
-    low, high = sorted(float(gear * x) for x in model.actuator_ctrlrange[a])
+    low, high = sorted(float(gear * x) for x in model.actuator_ctrlrange[c])
     return low, high
 
 
@@ -170,27 +196,3 @@ def with_friction(
         text = "dry friction of joints is omitted; joint_friction=True adds that of hinges and slides"
         notes.add(text, missing, warn=True)
     return [replace(joint, friction=forces[joint.name]) if forces[joint.name].any() else joint for joint in joints]
-
-
-def note_omitted(model: Any, collisions: bool | str, notes: Notes) -> None:
-    """Notes on the elements of the file that the mechanism lacks."""
-    pairs = range(0 if contacts_disabled(model) else model.npair)
-    if model.ntendon:
-        forces = (model.tendon_stiffness, model.tendon_damping, model.tendon_limited, model.tendon_frictionloss)
-        felt = any(np.any(field) for field in forces)
-        notes.add("tendons are omitted", [name_of(model, "tendon", k) for k in range(model.ntendon)], warn=felt)
-    ends = [(int(model.geom_type[model.pair_geom1[k]]), int(model.geom_type[model.pair_geom2[k]])) for k in pairs]
-    missing = [name_of(model, "pair", k) for k in pairs if PLANE not in ends[k]]
-    if missing and collisions is not True:
-        notes.add("explicit contact pairs, but for those with planes, are omitted (collisions=True has them)", missing)
-    for field, feature in (("dof_dampingpoly", "nonlinear damping"), ("jnt_stiffnesspoly", "nonlinear stiffness")):
-        if np.any(getattr(model, field, 0.0)):
-            notes.add(f"{feature} is omitted", warn=True)
-    if model.opt.density or model.opt.viscosity:
-        notes.add("the drag of a fluid is omitted", warn=True)
-    moving = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] != 0]
-    types, affinities = model.geom_contype[moving], model.geom_conaffinity[moving]
-    if collisions or not len(moving) or contacts_disabled(model):
-        return
-    if np.any(types[:, None] & affinities[None, :]):
-        notes.add("bodies do not collide with one another (collisions=True lets them)")

@@ -10,6 +10,7 @@ collide with a half-space.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -20,14 +21,14 @@ from sim.io.mjcf.welded_bodies import NO_SHAPE, PLANE, GeomGroup, Where, name_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.collision import Collision
 from sim.mechanism.joint import WORLD
-from sim.mechanism.shapes import HalfSpace, Solid
+from sim.mechanism.shapes import Capsule, HalfSpace, Solid, Sphere
 
 
 def find_collisions(model: Any, where: Where, choices: LoaderChoices, notes: Notes) -> list[Collision]:
     """The collisions of all geoms that may meet."""
     chosen, law = choices.friction, choices.law
     out = []
-    for a, b, (friction, slippery) in _pairs(model, where):
+    for a, b, rubbed in _pairs(model, where):
         names = [name_of(model, "geom", g) for g in (a, b)]
         first, second = (_solid(model, where, g) for g in (a, b))
         for g, name, solid in zip((a, b), names, (first, second), strict=True):
@@ -36,9 +37,11 @@ def find_collisions(model: Any, where: Where, choices: LoaderChoices, notes: Not
         if first is None or second is None:
             continue
         one, other = (group.name if group else WORLD for group in (_owner(model, where, a), _owner(model, where, b)))
-        mu = friction if chosen is None else chosen
-        name = f"{names[0]}-{names[1]}"
-        out.append(Collision(one, other, first, second, friction=mu, law="impact" if slippery else law, name=name))
+        mu, name = rubbed.friction if chosen is None else chosen, f"{names[0]}-{names[1]}"
+        if rubbed.margin:
+            first, second = _grown(first, second, rubbed.margin, name, notes)
+        kind = "impact" if rubbed.slippery else law
+        out.append(Collision(one, other, first, second, friction=mu, law=kind, name=name))
     return out
 
 
@@ -52,19 +55,30 @@ def find_on_planes(model: Any, where: Where, choices: LoaderChoices) -> list[Col
         if group is None or solid is None or int(model.geom_type[g]) in STANDING:
             continue
         rough = {p: rubbed for p in planes if (rubbed := rubbing(model, pairs, g, p))}
-        for p, (friction, slippery) in rough.items():
+        for p, rubbed in rough.items():
             plane = plane_pose(model, p)
-            ground = HalfSpace(center=plane.point, orientation=plane.quaternion)
-            mu = friction if chosen is None else chosen
+            center = plane.point + rubbed.margin * plane.rotation[:, 2]
+            ground = HalfSpace(center=center, orientation=plane.quaternion)
+            mu, kind = rubbed.friction if chosen is None else chosen, "impact" if rubbed.slippery else law
             name = label_on(model, g, p, list(rough))
-            out.append(
-                Collision(group.name, None, solid, ground, friction=mu, law="impact" if slippery else law, name=name)
-            )
+            out.append(Collision(group.name, None, solid, ground, friction=mu, law=kind, name=name))
     return out
 
 
+def _grown(a: Solid, b: Solid, margin: float, name: str, notes: Notes) -> tuple[Solid, Solid]:
+    """Two shapes that touch at a distance: the round ones among them are larger, by half of the margin if both are."""
+    count = isinstance(a, Sphere | Capsule) + isinstance(b, Sphere | Capsule)
+    if not count:
+        notes.add("margins between geoms that are neither spheres nor capsules are omitted", [name], warn=True)
+    first, second = (
+        replace(shape, radius=shape.radius + margin / count) if isinstance(shape, Sphere | Capsule) else shape
+        for shape in (a, b)
+    )
+    return first, second
+
+
 def _pairs(model: Any, where: Where) -> Iterator[tuple[int, int, Rubbing]]:
-    """Geoms a < b that may meet, planes aside, and their (friction, whether there is none)."""
+    """Geoms a < b that may meet, planes aside, and how they touch."""
     named, apart = listed(model), parents_apart(model)
     for a, b in combinations(range(model.ngeom), 2):
         owners = _owner(model, where, a), _owner(model, where, b)

@@ -9,14 +9,15 @@
 
 A plane counts where it is fixed to the world; a geom touches it if MuJoCo's contype and conaffinity allow it and no
 <exclude> names both bodies, or if a <pair> names both geoms. Friction is the larger of both, or that of the geom with
-priority, or of the <pair>; condim 1 is without.
+priority, or of the <pair>; condim 1 is without. The margins of both geoms keep their surfaces as far apart, and the
+contact is in the middle between them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,8 +43,15 @@ from sim.mechanism.pose import Pose
 from solvers.types import Floats
 
 STANDING = (SPHERE, CAPSULE, BOX, CYLINDER, MESH)  # on balls and points
-Rubbing = tuple[float, bool]  # friction, and whether there is none
 _UNLESS = "are no obstacles (collisions=True makes them)"
+
+
+class Rubbing(NamedTuple):
+    """How two geoms touch."""
+
+    friction: float
+    slippery: bool  # whether there is no friction
+    margin: float  # distance of their surfaces [m]
 
 
 def find_contacts(model: Any, where: Where, choices: LoaderChoices, collisions: bool, notes: Notes) -> list[Contact]:
@@ -129,7 +137,7 @@ def _excluded(model: Any, a: int, b: int) -> bool:
 
 
 def rubbing(model: Any, pairs: Mapping[tuple[int, int], int], a: int, b: int) -> Rubbing | None:
-    """(friction, whether there is none) of two geoms that may touch, wherever their bodies are; None of others.
+    """How two geoms touch, if they may, wherever their bodies are; None of others.
 
     pairs: those of the file, see `listed`.
     """
@@ -137,15 +145,18 @@ def rubbing(model: Any, pairs: Mapping[tuple[int, int], int], a: int, b: int) ->
         return None
     pair = pairs.get((min(a, b), max(a, b)))
     if pair is not None:
-        return float(model.pair_friction[pair, 0]), int(model.pair_dim[pair]) == 1
+        friction, margin = float(model.pair_friction[pair, 0]), float(model.pair_margin[pair])
+        return Rubbing(friction, int(model.pair_dim[pair]) == 1, margin)
     return _mixed(model, a, b) if _meet(model, a, b) and not _excluded(model, a, b) else None
 
 
 def _mixed(model: Any, a: int, b: int) -> Rubbing:
-    """(friction, whether there is none) of two geoms: the larger ones, or those of the geom with priority."""
+    """The larger friction and dimension of two geoms, or those of the geom with priority; the sum of their margins."""
     own, other = int(model.geom_priority[a]), int(model.geom_priority[b])
     first = [x for x, wins in ((a, own >= other), (b, other >= own)) if wins]
-    return max(float(model.geom_friction[x, 0]) for x in first), max(int(model.geom_condim[x]) for x in first) == 1
+    friction = max(float(model.geom_friction[x, 0]) for x in first)
+    slippery = max(int(model.geom_condim[x]) for x in first) == 1
+    return Rubbing(friction, slippery, float(model.geom_margin[a] + model.geom_margin[b]))
 
 
 def _contact(
@@ -154,15 +165,15 @@ def _contact(
     """One ball of a geom against a plane."""
     chosen, law = choices.friction, choices.law
     normal = plane.rotation[:, 2]
-    friction, slippery = rubbed
+    half = 0.5 * rubbed.margin  # on either surface: the contact is in the middle between them
     return Contact(
         group.name,
         ball[0] - group.com,
-        ball[1],
-        friction=friction if chosen is None else chosen,
-        law="impact" if slippery else law,
+        ball[1] + half,
+        friction=rubbed.friction if chosen is None else chosen,
+        law="impact" if rubbed.slippery else law,
         normal=normal,
-        height=float(normal @ plane.point),
+        height=float(normal @ plane.point) + half,
         name=name,
     )
 

@@ -14,8 +14,8 @@ _FIELDS = {  # what each flag sets to zero
     _EQUALITY: ("eq_active0",),
     _FRICTIONLOSS: ("dof_frictionloss", "tendon_frictionloss"),
     _LIMIT: ("jnt_limited", "tendon_limited"),
-    _SPRING: ("jnt_stiffness", "jnt_stiffnesspoly", "tendon_stiffness"),
-    _DAMPER: ("dof_damping", "dof_dampingpoly", "tendon_damping"),
+    _SPRING: ("jnt_stiffness", "jnt_stiffnesspoly", "tendon_stiffness", "tendon_stiffnesspoly"),
+    _DAMPER: ("dof_damping", "dof_dampingpoly", "actuator_dampingpoly", "tendon_damping", "tendon_dampingpoly"),
     _CLAMPCTRL: ("actuator_ctrllimited",),
 }
 _NAMES = {
@@ -67,4 +67,9 @@ def actuator_disabled(model: Any, a: int) -> bool:
     """Whether an actuator, or its group, is switched off."""
     group = int(model.actuator_group[a])
     grouped = 0 <= group <= 30 and bool(int(model.opt.disableactuator) >> group & 1)
-    return grouped or bool(int(model.opt.disableflags) & _ACTUATION)
+    return grouped or actuation_disabled(model)
+
+
+def actuation_disabled(model: Any) -> bool:
+    """Whether the file switches off all actuators."""
+    return bool(int(model.opt.disableflags) & _ACTUATION)

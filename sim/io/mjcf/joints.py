@@ -22,6 +22,7 @@ from solvers.types import Floats
 
 FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
 _CLOSE = 1e-9
+_NARROWEST = 0.499  # share of a range that its margin leaves free at each end, at most
 
 
 class Carried(NamedTuple):
@@ -128,7 +129,7 @@ def _joint(model: Any, run: list[int], parent: str, child: str, frame: Pose, com
     if pad:
         _ball_notes(model, last, armature[-3:], notes)
         armature[-3:] = 0.0
-    bounds = [tuple(float(x) for x in model.jnt_range[j]) if model.jnt_limited[j] else None for j in scalar]
+    bounds = [range_of(model, j) if model.jnt_limited[j] else None for j in scalar]
     return Joint(
         kind,
         parent,
@@ -144,6 +145,13 @@ def _joint(model: Any, run: list[int], parent: str, child: str, frame: Pose, com
         armature=armature,
         limits=[*bounds, *(None for _ in pad)] if any(bounds) else None,
     )
+
+
+def range_of(model: Any, j: int) -> tuple[float, float]:
+    """Range of a hinge or slide within its margin, from which on MuJoCo's limit pushes."""
+    low, high = (float(x) for x in model.jnt_range[j])
+    margin = min(float(model.jnt_margin[j]), _NARROWEST * (high - low))
+    return low + margin, high - margin
 
 
 def _dofs(model: Any, field: str, j: int, count: int) -> Floats:

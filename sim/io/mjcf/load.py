@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.io.loader_choices import loader_choices
-from sim.io.mjcf.actuators import find_inputs, note_omitted, with_friction
+from sim.io.mjcf.actuators import find_inputs, reflect_actuators, with_friction
 from sim.io.mjcf.collisions import find_collisions, find_on_planes
 from sim.io.mjcf.contacts import find_contacts
 from sim.io.mjcf.equalities import find_gears, find_loops
 from sim.io.mjcf.flags import heed_flags
-from sim.io.mjcf.joints import BALL, FREE, carry
+from sim.io.mjcf.joints import BALL, FREE, carry, range_of
+from sim.io.mjcf.omitted import note_omitted
 from sim.io.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
 from sim.io.mjcf.welded_bodies import GeomGroup, body_shapes, find_groups
 from sim.io.self_collisions import with_self_collisions
@@ -27,7 +28,7 @@ from sim.mechanism import checks
 from sim.mechanism.body import Body
 from sim.mechanism.joint import Joint
 from sim.mechanism.pose import Pose
-from sim.mechanism.stance import gaps, lifted, plane_heights
+from sim.mechanism.stance import gaps, lifted, penetrations
 
 
 def load_mjcf(
@@ -75,6 +76,7 @@ def load_mjcf(
     model, file = _compile(source)
     with _named(file):
         notes = Notes()
+        reflect_actuators(model, notes)
         heed_flags(model, notes)
         choices = loader_choices(
             "load_mjcf",
@@ -91,7 +93,7 @@ def load_mjcf(
         if not joints:
             raise ValueError(f"load_mjcf: {file}: no joint is free to move")
         inputs, gear, low, high = find_inputs(model, homes, where, notes)
-        note_omitted(model, collisions, notes)
+        note_omitted(model, collisions, choices.ground, notes)
         mech = MjcfMechanism(
             bodies,
             [*with_friction(model, joints, homes, choices.joint_friction, notes), *find_loops(model, where, notes)],
@@ -108,6 +110,7 @@ def load_mjcf(
         )
         mech = _without_constant_gaps(mech, notes)
         mech = _clear(mech) if keyframe is None else mech
+        _note_penetrations(mech, keyframe, notes)
         mech = with_self_collisions(mech, choices, notes, slippery=True) if choices.itself else mech
         known = {model.joint(j).name or f"joint_{j}": home for j, home in homes.items()}
         report = MjcfReport(file, notes.close(), _frames(model, where), known, gear, low, high)
@@ -198,9 +201,11 @@ def _neutral(model: Any, keyframe: int | None, notes: Notes) -> Any:
         if kind in (FREE, BALL):
             a += 3 if kind == FREE else 0
             q[a : a + 4] /= np.linalg.norm(q[a : a + 4])
-        elif keyframe is None and model.jnt_limited[j] and not model.jnt_range[j, 0] <= q[a] <= model.jnt_range[j, 1]:
-            q[a] = model.jnt_range[j].mean()
-            notes.add("neutral coordinates that were outside their range are in its middle", [model.joint(j).name])
+        elif keyframe is None and model.jnt_limited[j]:
+            low, high = range_of(model, j)
+            if not low <= q[a] <= high:
+                q[a] = 0.5 * (low + high)
+                notes.add("neutral coordinates that were outside their range are in its middle", [model.joint(j).name])
     return q
 
 
@@ -229,12 +234,14 @@ def _without_constant_gaps(mech: MjcfMechanism, notes: Notes) -> MjcfMechanism:
 def _clear(mech: MjcfMechanism) -> MjcfMechanism:
     """The mechanism with its floating base, if it has one, lifted out of the ground."""
     bases = [j.name for j in mech.joints if j.kind == "floating"]
-    if len(bases) != 1:
-        return mech
-    q = np.asarray(mech.neutral)
-    if min([0.0, *gaps(mech, q), *(gap for gap, _ in plane_heights(mech, q))]) >= 0.0:
-        return mech
-    return replace(mech, neutral=lifted(mech, bases[0]))
+    return replace(mech, neutral=lifted(mech, bases[0], down=False)) if len(bases) == 1 else mech
+
+
+def _note_penetrations(mech: MjcfMechanism, keyframe: int | None, notes: Notes) -> None:
+    """A note on the contacts that begin inside of the ground: hard contact parts them in the first step."""
+    low = penetrations(mech)
+    if low:
+        notes.add("contacts that are inside of the ground in the neutral state", low, warn=keyframe is None)
 
 
 def _frames(model: Any, where: dict[int, tuple[GeomGroup | None, Pose]]) -> dict[str, LinkFrame]:

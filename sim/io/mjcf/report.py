@@ -50,12 +50,15 @@ class MjcfMechanism(Mechanism):
 
     The coordinates q and velocities v are MuJoCo's qpos and qvel. Represented: bodies (welded ones as one), free, ball,
     slide and hinge joints with damping, armature (an inertia of its coordinate alone: exact; not on balls), springs and
-    ranges (not on balls); spheres, capsules, boxes, cylinders, ellipsoids against planes that do not move, and with
-    `collisions=True` against one another and fixed geoms; actuators on hinges and slides as inputs in N and N m, or as
-    servos with targets in units of the joint, u = report.gear * ctrl, and on sites as wrenches that move with the body;
-    connect and weld as joints that close loops, and linear couplings of two joints as gears, all of them rigid
-    (equalities.py). Not represented, and listed in `report.notes`: other equality constraints, tendons, fluids, meshes,
-    height fields.
+    ranges within their margins (not on balls); spheres, capsules, boxes, cylinders, ellipsoids against planes that do
+    not move, and with `collisions=True` against one another and fixed geoms, with their margins if one of them is round
+    or a plane; actuators on hinges and slides as inputs in N and N m, or as servos with targets in units of the joint,
+    u = report.gear * ctrl, with their armature and damping, and on sites as wrenches that move with the body; connect
+    and weld as joints that close loops, and linear couplings of two joints as gears, all of them rigid (equalities.py).
+
+    Not represented, and listed in `report.notes`: other equality constraints, tendons, flexes, fluids, meshes, height
+    fields, plugins, actuators with dynamics, delays or several controls, torsional and rolling friction, adhesion,
+    moving surfaces, bouncing contacts, springs that are not linear or yield; see sim/io/mjcf/omitted.py.
 
     Attributes:
         report: poses of the bodies, coordinates of the joints, gears and bounds of the inputs, unsupported elements.

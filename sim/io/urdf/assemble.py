@@ -27,7 +27,7 @@ from sim.mechanism.contact import Contact
 from sim.mechanism.input import Input
 from sim.mechanism.joint import KINDS, WORLD, Joint
 from sim.mechanism.pose import Pose
-from sim.mechanism.stance import gaps, lifted, resting
+from sim.mechanism.stance import lifted, penetrations, resting
 from solvers.types import Floats
 
 ROOT_JOINT = {
@@ -36,7 +36,6 @@ ROOT_JOINT = {
 }  # by whether the base is fixed; behind the link's name if taken
 DENSITY = 1000.0  # [kg/m^3] of repaired links without a mass
 _NOTHING = 1e-12  # [m^2] an inertia over a mass that is none
-_SUNK = 1e-3  # [m] how deep a contact may start in the ground without a warning
 _ENDS_SHOWN = 6  # last links named in the message about a robot without contacts
 
 
@@ -308,11 +307,9 @@ def _ground_notes(mech: UrdfMechanism, choices: Choices, ends: list[str] | None,
             "balls at the origins of its last links",
             warn=True,
         )
-    if mech.contacts:
-        sunk = gaps(mech, np.asarray(mech.neutral))
-        low = [f"{name} ({-gap:.3g} m)" for name, gap in zip(mech.contact_names, sunk, strict=True) if gap < -_SUNK]
-        if low:
-            notes.add("contacts that are below the ground in the neutral state; see position, neutral", low, warn=True)
+    low = penetrations(mech)
+    if low:
+        notes.add("contacts that are below the ground in the neutral state; see position, neutral", low, warn=True)
 
 
 def _friction_notes(joints: list[UrdfJoint], loops: Mapping[str, UrdfLoop], choices: Choices, notes: Notes) -> None:
