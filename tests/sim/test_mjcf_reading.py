@@ -229,6 +229,15 @@ def test_an_actuator_of_a_ball_leaves_its_armature_out() -> None:
     assert sum("armature and damping of actuators" in str(w.message) for w in caught) == 1
 
 
+def test_flexes_are_named_and_negative_margins_let_geoms_sink_in() -> None:
+    cloth = '<flexcomp type="grid" count="2 2 1" spacing=".1 .1 .1" dim="2" pos="0 0 2" name="cloth" mass="1"/>'
+    body = '<body pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .1" margin="-.02"/></body>'
+    text = f'<mujoco><worldbody><geom type="plane" size="2 2 1"/>{body}{cloth}</worldbody></mujoco>'
+    with pytest.warns(MjcfWarning, match="flexes are omitted"):
+        mech = load_mjcf(text)
+    assert [(c.radius, c.height) for c in mech.contacts[:8]] == [(0.0, -0.02)] * 8
+
+
 def test_fields_of_a_later_mujoco_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_string(omitted._ONE_OF_EACH)

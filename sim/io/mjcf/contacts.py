@@ -165,15 +165,15 @@ def _contact(
     """One ball of a geom against a plane."""
     chosen, law = choices.friction, choices.law
     normal = plane.rotation[:, 2]
-    half = 0.5 * rubbed.margin  # on either surface: the contact is in the middle between them
+    own = max(0.5 * rubbed.margin, -ball[1])  # half on either surface: the contact is in the middle between them
     return Contact(
         group.name,
         ball[0] - group.com,
-        ball[1] + half,
+        ball[1] + own,
         friction=rubbed.friction if chosen is None else chosen,
         law="impact" if rubbed.slippery else law,
         normal=normal,
-        height=float(normal @ plane.point) + half,
+        height=float(normal @ plane.point) + rubbed.margin - own,
         name=name,
     )
 

@@ -43,7 +43,7 @@ Where = dict[
 
 def name_of(model: Any, kind: str, index: int) -> str:
     """Name of a body, joint, geom or actuator; made from its number where the file gives none."""
-    given = getattr(model, kind)(index).name
+    given = getattr(model, kind)(index).name if hasattr(model, kind) else ""  # flexes have none
     return str(given) if given else f"{kind}_{index}"
 
 
