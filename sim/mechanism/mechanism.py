@@ -27,7 +27,7 @@ from sim.mechanism.loop_joints import carried
 from sim.mechanism.moved_scene import moved_coordinates, moved_joint, moved_obstacle, moved_visual
 from sim.mechanism.naming import name_contacts, name_inputs
 from sim.mechanism.renamed import renamed
-from sim.mechanism.rising_bases import rising_bases
+from sim.mechanism.rising_bases import CARRIES, rising_bases
 from sim.mechanism.self_collisions import self_collisions
 from sim.mechanism.shape_contacts import shape_contacts
 from sim.mechanism.shapes import Solid, Sphere
@@ -533,7 +533,7 @@ def _standing(mech: Mechanism) -> Floats:
         for c in mech.contacts:
             center = at[c.body].at(c.point)
             slope = float(c.normal_at(center)[2])
-            if c.body in hanging and slope > 0.0:
+            if c.body in hanging and (c.terrain is not None or slope >= CARRIES):
                 rises.append((_CLEAR - float(c.gap(center))) / slope)
         if rises:
             q[place] += max(rises) * rates

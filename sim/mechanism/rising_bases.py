@@ -13,7 +13,9 @@ from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.joint_coordinates import coordinate_limits, joint_places
 from solvers.types import Floats, Integers
 
-__all__ = ["rising_bases"]
+__all__ = ["CARRIES", "rising_bases"]
+
+CARRIES = 0.25  # upward part of the normal of ground that a base stands on; steeper ground is a wall
 
 
 def rising_bases(joints: Sequence[Joint], bodies: Sequence[Body], q: Floats) -> Iterator[tuple[str, Integers, Floats]]:

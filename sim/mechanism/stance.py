@@ -7,13 +7,11 @@ import numpy as np
 from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.joint import WORLD
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.rising_bases import CARRIES
 from sim.mechanism.shapes import HalfSpace, rotation_matrix
 from solvers.types import Floats
 
 _CLEAR = 1e-9  # [m] above the ground: a gap of zero, or below by rounding, has no interior to start the solver in
-_CARRIES = (
-    0.5  # upward part of the normal of ground that a base stands on; steeper ground is a wall, none that faces down
-)
 _SUNK = 1e-3  # [m] how deep a contact may start in the ground without a warning
 
 
@@ -66,7 +64,7 @@ def lifted(mech: Mechanism, base: str, *, down: bool = True) -> Floats:
     q = np.array(mech.neutral, dtype=np.float64)
     joint = mech.joints[mech.joint_names.index(base)]
     low = [*zip(gaps(mech, q), mech.contact_normals[:, 2], strict=True), *plane_heights(mech, q)]
-    heights = [gap / rise for gap, rise in low if rise >= _CARRIES]
+    heights = [gap / rise for gap, rise in low if rise >= CARRIES]
     if heights and (down or min(heights) < 0.0):
         up = _CLEAR - min(heights)
         at = mech.q_slice(base).start

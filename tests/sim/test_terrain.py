@@ -67,6 +67,15 @@ def test_bases_on_slides_rise_where_nothing_limits_them():
         np.testing.assert_allclose(moved.neutral, [0.0, -0.6 if limits is None else 0.0], atol=1e-8)
 
 
+def test_a_wall_does_not_raise_a_base():
+    """One contact stays on a wall, whose normal has a vertical part of rounding."""
+    contacts = [dojo.Contact("ball", radius=0.1, name="foot", normal=n, height=0.2) for n in ((0, 0, 1), (1, 0, 2e-16))]
+    scene = ball(law="impact")
+    mech = dataclasses.replace(scene, contacts=[contacts[0], dataclasses.replace(contacts[1], name="hand")])
+    moved = mech.with_terrain(dojo.Terrain.slope(0.0), contacts=["foot"])
+    np.testing.assert_allclose(np.array(moved.neutral)[:3], (0.0, 0.0, 0.1), atol=1e-8)
+
+
 @pytest.mark.parametrize("radius", [0.02, 0.3])
 def test_a_ball_in_a_bowl_is_a_point_in_a_smaller_bowl(radius):
     R = 2.0
