@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sim.mechanism import checks
 from sim.mechanism.joint import Joint
+from sim.mechanism.joint_coordinates import joint_places
 from sim.mechanism.positional import few_positional
 
 
@@ -67,3 +69,23 @@ def check_gears(call: str, gears: Sequence[Gear], joints: Sequence[Joint]) -> No
                 )
         if (g.joint, g.dof) == (g.other, g.other_dof):
             raise ValueError(f"{call}: gear {g.name!r} couples joint {g.joint!r} with itself")
+
+
+def geared(q: ArrayLike, named: Collection[str], joints: Sequence[Joint], gears: Sequence[Gear]) -> tuple[float, ...]:
+    """Coordinates q (nq,) where those of joints without a name follow those of joints with one, along all gears."""
+    out = np.array(q, dtype=np.float64)
+    first = {joint.name: at.start for joint, at, _ in joint_places(joints)}
+    known = {first[joint.name] + k for joint in joints if joint.name in named for k in range(joint.scalar_count)}
+    before = -1
+    while len(known) != before:  # a gear may follow another one
+        before = len(known)
+        for g in gears:
+            driven, driving = first[g.joint] + g.dof, first[g.other] + g.other_dof
+            if driving in known and driven not in known:
+                out[driven] = g.ratio * out[driving] + g.offset
+            elif driven in known and driving not in known and g.ratio:
+                out[driving] = (out[driven] - g.offset) / g.ratio
+            else:
+                continue
+            known |= {driven, driving}
+    return tuple(float(x) for x in out)

@@ -19,7 +19,7 @@ from sim.mechanism.contact import Contact
 from sim.mechanism.contact_candidates import ContactCandidate, contact_candidates
 from sim.mechanism.dofs import components, dof_names
 from sim.mechanism.forward_kinematics import body_poses
-from sim.mechanism.gear import Gear, check_gears
+from sim.mechanism.gear import Gear, check_gears, geared
 from sim.mechanism.input import Input
 from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.joint_coordinates import coordinate_limits, coordinates, joint_places
@@ -50,7 +50,7 @@ class Mechanism:
         gravity: (3,) acceleration of gravity [m/s^2] (default 9.81 downwards).
         name: name of the mechanism.
         neutral: coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero for joints
-            without a name in it, or all of q (default None: zero).
+            without a name in it, but by a gear with one that has; or all of q (default None: zero).
         collisions: collisions of bodies with each other and with obstacles (default none). "self" stands for all pairs
             of shapes but those of links that a joint connects, and those that overlap in the neutral state
             (self_collisions.py).
@@ -101,7 +101,10 @@ class Mechanism:
         check_gears(f"{call})", self.gears, joints)
         if self.nv == 0:
             raise ValueError(f"{call}): no joint is free to move")
-        object.__setattr__(self, "neutral", coordinates(f"{call}, neutral=...)", self.joints, self.neutral))
+        neutral = coordinates(f"{call}, neutral=...)", self.joints, self.neutral)
+        if self.gears and isinstance(self.neutral, Mapping):
+            neutral = geared(neutral, self.neutral, self.joints, self.gears)
+        object.__setattr__(self, "neutral", neutral)
         if itself:
             object.__setattr__(self, "collisions", tuple(self.self_collisions()[0]))
         ends = dict.fromkeys([*self.body_names, WORLD])

@@ -266,6 +266,7 @@ def _assets():
 @pytest.mark.parametrize("name", ["HalfCheetah", "Ant"])
 def test_the_least_gap_of_first_states_is_that_of_forward_kinematics(name):
     mech = task_of(name).sim.mechanism
+    assert all(contact.height == 0.0 for contact in mech.contacts), "margins are left out"
     least, rng = least_gap(mech), np.random.default_rng(0)
     for _ in range(3):
         q = mech.neutral + rng.uniform(-0.3, 0.3, mech.nq)

@@ -94,6 +94,14 @@ def test_derivatives(name: str) -> None:
     check_step(sim, x, u)
 
 
+def test_neutral_coordinates_follow_those_that_are_named() -> None:
+    mech = replace(wheels(), gears=[Gear("c", "a", 2.0), Gear("a", "b", -2.5, 0.1)])
+    for neutral in ({"b": 0.2}, {"c": -0.8}, {"a": -0.4, "b": 0.2}):
+        np.testing.assert_allclose(replace(mech, neutral=neutral).neutral, (-0.4, 0.2, -0.8))
+    assert replace(mech, neutral=(1.0, 2.0, 3.0)).neutral == (1.0, 2.0, 3.0)
+    assert replace(mech, neutral=None).neutral == (0.0, 0.0, 0.0)
+
+
 def test_wrong_gears_are_refused() -> None:
     mech = robot()
     for gear, message in (
