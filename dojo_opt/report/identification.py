@@ -58,7 +58,8 @@ def identification_report(found: Identified, folder: str | Path) -> list[Path]:
     if not predictions:
         return files
     window, predicted, _ = max(predictions, key=lambda each: len(each[1].u))
-    return [*files, save_html([replace(predicted, x=window.x), predicted], target / "motion.html")]
+    motions = [replace(predicted, x=window.x), predicted]
+    return [*files, save_html(motions, target / "motion.html", names=("measured", "predicted"))]
 
 
 def _parameters(found: Identified) -> Table:

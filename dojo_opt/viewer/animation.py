@@ -49,8 +49,9 @@ def save_html(
     """Write an animation that opens in a browser.
 
     The page has a clock, speeds, steps from knot to knot, and boxes that show and hide contact forces, the paths of the
-    base and of the ends of the limbs, and the goal of a plan, as a ghost. Several results move side by side, or in one
-    place, as a measured motion and its prediction: a robot that is there again has another colour.
+    base and of the ends of the limbs, and the goal of a plan that has its problem, as a ghost. Several results move
+    side by side, or in one place, as a measured motion and its prediction: a robot that is there again has another
+    colour.
 
     Args:
         result: Trajectory, Plan or ClosedLoop; a Mechanism, which stands in its neutral state; or a list of these.

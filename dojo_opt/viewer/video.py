@@ -96,7 +96,9 @@ def save_picture(
     size: tuple[int, int] = (640, 360),
     time: float = 0.0,
 ) -> Path:
-    """Write a picture of a motion, or of a mechanism at rest, as a .png; drawn as in `save_video`, with the goal.
+    """Write a picture of a motion, or of a mechanism at rest, as a .png.
+
+    It is drawn as in `save_video`, with the goal of a plan, but of one that was loaded, which has no problem.
 
     Args:
         result: Trajectory, Plan or ClosedLoop; or a Mechanism, which stands in its neutral state.

@@ -300,6 +300,7 @@ def test_a_report_has_parameters_residuals_and_both_motions(tmp_path):
     assert {file.name for file in files} == names
     page = (tmp_path / "fit" / "report.html").read_text()
     assert "damper" in page and "v joint_0" in page
+    assert all(f"</b> {name}" in (tmp_path / "fit" / "motion.html").read_text() for name in ("measured", "predicted"))
     with pytest.raises(TypeError, match="Identified"):
         dojo.identification_report(motions, tmp_path)
 
