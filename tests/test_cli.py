@@ -199,6 +199,7 @@ def test_show_prints_and_draws_a_model(tmp_path: Path, capsys: pytest.CaptureFix
     assert cli.main(command) == 0
     text = capsys.readouterr().out
     assert "raiberthopper: 2 bodies, 7 degrees of freedom" in text and "released for 0.1 s" in text
+    assert "m at the beginning." in text
     assert figure.read_bytes().startswith(b"\x89PNG") and "MeshCat.Viewer" in page.read_text()
 
 

@@ -258,7 +258,7 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
             self.view = None
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture (480, 480, 3) of the robot, with render_mode="rgb_array"."""
+        """A sketch (480, 480, 3) of the robot by Matplotlib, with render_mode="rgb_array"; "human" shows the page."""
         if self.render_mode != "rgb_array":
             return None
         from matplotlib.backends.backend_agg import FigureCanvasAgg

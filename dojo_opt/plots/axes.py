@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _DECADES = 300.0  # ratio of the ends of an axis
 _FEW, _MANY = 5, 14  # entries of a legend that fit above the axes, and beside them
 _LETTERS, _WIDE = 40, 24  # of a legend above the axes, and of a label at most
+_END = 14  # letters at the end of a longer one
 _LINE = 11.0  # [points] between two labels
 _STYLES = ("-", (0, (5, 2)), (0, (1, 1.5)))
 _ARGUMENTS = """
@@ -128,8 +129,8 @@ def label_lines(ax: Axes) -> None:
 
 
 def _short(name: str) -> str:
-    """A name that leaves room for the curves."""
-    return name if len(name) <= _WIDE else f"{name[: _WIDE - 3]}..."
+    """A name that leaves room for the curves; its end, where numbers are, tells it from others."""
+    return name if len(name) <= _WIDE else f"{name[: _WIDE - 3 - _END]}...{name[-_END:]}"
 
 
 def _apart(values: Sequence[float], gap: float, low: float, high: float) -> list[float]:

@@ -158,12 +158,20 @@ def show(args: argparse.Namespace) -> int:
     if args.json:
         print(json_text(_numbers(sim, motion)))
         return 0 if motion.success else 1
-    print(f"released for {motion.time[-1]:g} s without inputs: {motion.message}")
+    print(f"released for {motion.time[-1]:g} s without inputs: {motion.message}{_sunk(sim, motion)}")
     for path in filter(None, (args.out, args.html)):
         print(f"wrote {path}")
     if args.live:
         play(motion)
     return 0 if motion.success else 1
+
+
+def _sunk(sim: dojo.Simulator, motion: dojo.Trajectory) -> str:
+    """How far the base of a robot that floats sinks, which tells whether it stands."""
+    if sim.mechanism.joints[0].kind != "floating":
+        return ""
+    first, last = (sim.maximal(motion.x[k])[0, 2] for k in (0, -1))
+    return f" The centre of {sim.mechanism.bodies[0].name} is {last:.3g} m high then, {first:.3g} m at the beginning."
 
 
 def play(motion: dojo.Trajectory) -> None:

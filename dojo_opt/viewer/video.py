@@ -46,7 +46,8 @@ def save_video(
     """Write a motion as a video, .mp4 or .gif.
 
     The page of `save_html` is drawn frame by frame by a Chromium without a window. Needs `pip install
-    "dojo-opt[video]"`, and a Chromium (`playwright install chromium`, or the system's).
+    "dojo-opt[video]"`, and a Chromium (`playwright install chromium`, or the system's). Without a graphics
+    card that takes much longer than the motion; a smaller size and rate take less.
 
     Args:
         result: Trajectory, Plan or ClosedLoop.
