@@ -177,7 +177,7 @@ class Plan:
                 1e-5 without a time step).
             kappa: central-path parameter [N s m] (default None: that of the plan's simulator, or less if the accuracy
                 needs it; with a time step, in proportion to it).
-            time_step: time step of the replay, of which a knot is a whole number [s] (default None: an accuracy).
+            time_step: time step of the replay; a knot is a whole number of them [s] (default None: an accuracy).
 
         Returns:
             FeedbackRollout with the solved knots, one state per knot; with an accuracy, with velocities at the nodes.

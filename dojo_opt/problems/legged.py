@@ -146,9 +146,9 @@ def jump(
 ) -> Problem:
     """A robot jumps forward, from standing to standing: the library's quadruped, or any robot with legs.
 
-    Jumps planned with steps of 20 ms land up to 72 mm off at 1 ms; upward and backward jumps are the worst. As for
-    `leap`, `ilqr` therefore ends with the refined problem, and jumps land within 4 mm. In the refined problem the
-    height at the top is a constraint.
+    Replayed with steps of 1 ms, jumps planned with steps of 20 ms land up to 72 mm off; upward and backward jumps are
+    the worst. As for `leap`, `ilqr` therefore ends with the refined problem, and jumps land within 4 mm. In the refined
+    problem the height at the top is a constraint.
 
     The quadruped jumps 0.3 m far and 0.2 m high. Others jump as far and high for their height h, that of the quadruped
     being 0.29 m, a third of it on flat feet; times follow the root of h, weights the robot's weight and height. A robot

@@ -299,9 +299,9 @@ def jump(
 ) -> Problem:
     """The quadruped jumps forward: standing, flight, standing.
 
-    Jumps planned with steps of 20 ms land up to 72 mm off at 1 ms; upward and backward jumps are the worst. As for
-    `leap`, `ilqr` therefore ends with the refined problem, and jumps land within 4 mm. In the refined problem the
-    height at the top is a constraint.
+    Replayed with steps of 1 ms, jumps planned with steps of 20 ms land up to 72 mm off; upward and backward jumps are
+    the worst. As for `leap`, `ilqr` therefore ends with the refined problem, and jumps land within 4 mm. In the refined
+    problem the height at the top is a constraint.
 
     Args:
         distance: displacement along x [m].

@@ -462,7 +462,8 @@ def status_message(
         text += f" It is {mech.contact_names[int(contact)]!r}."
     if reason in (Status.MAX_ITERATIONS, Status.NO_PROGRESS):
         text += f" Residual {residual:.1e} after {int(iterations)} iterations (tolerance {tolerance:g})"
-        text += f", off the central path by {violation:.1e}." if violation > 0.0 else "."
+        met = " but" if residual <= tolerance else ""
+        text += f",{met} off the central path by {violation:.1e}." if violation > 0.0 else "."
         if contact >= 0:
             text += f" Contact {mech.contact_names[int(contact)]!r} is worst."
         if loop is not None and not loop[0] < tolerance:
