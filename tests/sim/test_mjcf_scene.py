@@ -187,7 +187,7 @@ MARGINS = """<mujoco><compiler angle="radian"/><option cone="elliptic" impratio=
 def test_margins_and_the_inertia_of_actuators_act_as_in_mujoco() -> None:
     """A ball that slides, then rolls on its margin, and an arm that falls to that of its range against its actuator."""
     model = mujoco.MjModel.from_xml_string(MARGINS)
-    model.opt.timestep = 1e-3
+    model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, 1e-3
     data = mujoco.MjData(model)
     data.qvel[0], data.ctrl[:] = 0.5, -0.2
     mech = quietly(MARGINS, collisions=True)
@@ -196,7 +196,7 @@ def test_margins_and_the_inertia_of_actuators_act_as_in_mujoco() -> None:
     sim = Simulator(mech, time_step=1e-3)
     x = sim.state_from_velocity(sim.neutral()[: sim.nq], data.qvel)
     t = sim.rollout(x, np.tile(mech.report.gear * data.ctrl, (800, 1)), throw=True)
-    for steps, error in ((200, 2e-4), (800, 2e-3)):  # MuJoCo's limit and contact give way
+    for steps, error in ((200, 5e-4), (800, 2e-3)):  # MuJoCo's limit and contact give way
         mujoco.mj_step(model, data, steps - round(data.time / 1e-3))
         np.testing.assert_allclose(t.x[steps, 7], data.qpos[7], atol=error)
         np.testing.assert_allclose(t.x[steps, [0, 2]], data.qpos[[0, 2]], atol=2e-3)
