@@ -200,7 +200,7 @@ def test_margins_and_the_inertia_of_actuators_act_as_in_mujoco() -> None:
         mujoco.mj_step(model, data, steps - round(data.time / 1e-3))
         np.testing.assert_allclose(t.x[steps, 7], data.qpos[7], atol=error)
         np.testing.assert_allclose(t.x[steps, [0, 2]], data.qpos[[0, 2]], atol=2e-3)
-    assert abs(data.qvel[0] / data.qvel[4] - 0.12) < 1e-3 and abs(t.v[-1, 0] / t.v[-1, 4] - 0.12) < 1e-3
+    assert abs(data.qvel[0] / data.qvel[4] - 0.12) < 1e-3 and abs(t.x[-1, sim.nq] / t.x[-1, sim.nq + 4] - 0.12) < 1e-3
 
 
 def test_margins_of_collisions_are_those_of_round_geoms() -> None:
