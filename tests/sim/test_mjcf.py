@@ -183,6 +183,7 @@ SERVOS = """<mujoco><worldbody><body><joint name="j" axis="0 1 0"/><geom size="0
   <position joint="j" gear="2" kp="10" kv="0.5" ctrlrange="-1 2" ctrllimited="true"
    forcerange="-1 3" forcelimited="true"/><velocity joint="j" kv="3"/>
   <general joint="j" gear="3" gainprm="4" biastype="affine" biasprm="0 -4 -1"/>
+  <pid joint="j" gear="2" kp="7" kv="0.2" input="pos"/>
   <general name="other" joint="j" gainprm="4" biastype="affine" biasprm="0 -5 -1"/></actuator></mujoco>"""
 
 
@@ -190,19 +191,19 @@ def test_actuators_that_are_servos_are_read_as_servos() -> None:
     """Their total force equals MuJoCo's, for the same controls at the same state."""
     with pytest.warns(MjcfWarning, match="other"):
         mech = load_mjcf(SERVOS)
-    assert [part.servo for part in mech.inputs] == ["position", "velocity", "position", None]
+    assert [part.servo for part in mech.inputs] == ["position", "velocity", "position", "position", None]
     np.testing.assert_allclose(mech.inputs[0].limits, (-0.5, 1.0))
     assert mech.inputs[0].force_limits == (-2.0, 6.0)
     model = mujoco.MjModel.from_xml_string(SERVOS)
     data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:], data.ctrl[:] = 0.3, -0.7, (0.4, 0.5, -0.6, 0.0)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = 0.3, -0.7, (0.4, 0.5, -0.6, 0.8, 0.0)
     mujoco.mj_forward(model, data)
     u = mech.report.gear * data.ctrl
-    parts = mech.inputs[:3]
+    parts = mech.inputs[:4]
     forces = [p.gain * x - p.stiffness * 0.3 + p.damping * 0.7 for p, x in zip(parts, u, strict=False)]
     forces = [np.clip(force, *p.force_limits) for p, force in zip(parts, forces, strict=True)]
     assert forces[0] == -2.0
-    np.testing.assert_allclose(forces, data.actuator_force[:3] * model.actuator_gear[:3, 0], atol=1e-12)
+    np.testing.assert_allclose(forces, data.actuator_force[:4] * model.actuator_gear[:4, 0], atol=1e-12)
 
 
 def test_poses_agree_with_mujoco() -> None:

@@ -18,6 +18,7 @@ from solvers.types import Floats
 _JOINT, _JOINT_IN_PARENT, _SITE = 0, 1, 4  # mjtTrn
 _FIXED_GAIN, _NO_BIAS, _NO_DYNAMICS = 0, 0, 0  # mjtGain, mjtBias, mjtDyn
 _AFFINE_BIAS = 1
+_PID_GAIN, _PLACE = 5, 1  # mjtGain, and the control of a PID that is its place
 
 
 def find_inputs(
@@ -101,11 +102,14 @@ def _servo(model: Any, a: int) -> Input | None:
 
     Its force is kp ctrl - kp l - kd l' or kd (ctrl - l') of the length l = gear q.
     """
-    affine = model.actuator_gaintype[a] == _FIXED_GAIN and model.actuator_biastype[a] == _AFFINE_BIAS
+    pid = model.actuator_gaintype[a] == _PID_GAIN and model.actuator_ctrlspec[a] == _PLACE  # for a place alone
+    gained = pid or model.actuator_gaintype[a] == _FIXED_GAIN
+    affine = gained and model.actuator_biastype[a] == _AFFINE_BIAS
     gear = _gear(model, a)
     if not affine or model.actuator_dyntype[a] != _NO_DYNAMICS or gear == 0.0:
         return None
-    gain, (constant, place, rate) = float(model.actuator_gainprm[a, 0]), model.actuator_biasprm[a, :3].tolist()
+    constant, place, rate = model.actuator_biasprm[a, :3].tolist()
+    gain = -place if pid else float(model.actuator_gainprm[a, 0])
     if constant != 0.0 or gain <= 0.0 or rate > 0.0:
         return None
     if place == -gain:
