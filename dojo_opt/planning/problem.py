@@ -150,7 +150,7 @@ class Problem:
     ) -> None:
         _check_simulator("Problem(sim)", sim)
         self.sim = sim
-        self.advice = advice or _advice(sim)
+        self.advice = checks.name_or("Problem(advice=...)", advice, _advice(sim))
         call = "Problem(gain_regularization=...)"
         self.gain_regularization = checks.number(call, gain_regularization, at_least=0.0)
         self.horizon = whole_number("Problem(horizon=...)", horizon)
