@@ -21,10 +21,10 @@ import numpy as np
 from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
+from dojo_opt.planning.problem import REPLAY_ACCURACY
 from dojo_opt.report.result import Cell, Report, Row, Table
 
 DISTANCES, HEIGHTS = (-0.3, -0.2, -0.1, 0.0), (0.3, 0.35, 0.4, 0.45)  # [m]
-ACCURACY = 1e-5  # of the replay
 NEAR, UPRIGHT, SLOW = 0.01, 0.99, 0.5  # at its end: [m] off, least cosine, largest speed [m/s, rad/s]
 HEADER = (
     *("far [m]", "high [m]", "planned", "iterations", "processor [s]", "turned [rad]", "rise [m]"),
@@ -40,7 +40,7 @@ def flip(distance: float, height: float) -> list[Cell]:
     seconds = time.process_time() - begin
     angle = np.unwrap(2.0 * np.arctan2(plan.x[:, 5], plan.x[:, 3]))
     rise, torque = float(plan.x[:, 2].max() - plan.x[0, 2]), float(np.abs(plan.u).max())
-    shot: Any = plan.replay(accuracy=ACCURACY)
+    shot: Any = plan.replay(accuracy=REPLAY_ACCURACY)
     end = shot.x[-1]
     off = float(np.abs(end[:3] - plan.x[-1, :3]).max())
     cosine = float(1.0 - 2.0 * (end[4] ** 2 + end[5] ** 2))

@@ -78,22 +78,23 @@ HEADER = (
     *("replayed", "off", "upright then", "torque then", "slid", "lift"),
 )
 REPEATS = 20  # of periodic plans
+PARTS = 5  # of a time step, in replays
 DISTANCES = (-0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5)  # of leaps [m]
 HEIGHTS = (0.15, 0.2, 0.25, 0.3)  # [m]
 
 
 def replay(plan: Any) -> list[Cell]:
     """The plan under its gains at a fifth of the time step, a periodic one many times in a row."""
-    problem = plan.problem
     plan = plan if plan.stride is None else plan.repeated(REPEATS)
-    fine, cut = problem.sim.replace(time_step=problem.sim.time_step / 5), 5 * problem.substeps
-    limits = problem.control_limits
-    shot = fine.rollout_feedback(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=cut, limits=limits)
+    short = plan.time_step / PARTS
+    shot = plan.replay(time_step=short)
     if not shot.success:
         return [f"{shot.status.name} at knot {shot.solved_knots}", *[None] * 5]
-    knots = [fine.rollout(x, np.tile(u, (cut, 1))).contacts for x, u in zip(shot.x[:-1], shot.u, strict=True)]
+    fine = plan.simulator.replace(time_step=short, kappa=plan.simulator.kappa / PARTS)  # that of the replay
+    held = np.repeat(shot.u[:, None], PARTS * plan.substeps, axis=1)
+    knots = [fine.rollout(x, us).contacts for x, us in zip(shot.x[:-1], held, strict=True)]
     loaded = np.concatenate([c.normal_force for c in knots]) > 1.0
-    slid = float((np.concatenate([c.slip for c in knots]) * loaded).sum() * fine.time_step)
+    slid = float((np.concatenate([c.slip for c in knots]) * loaded).sum() * short)
     lift = max(float(c.gap.min(axis=1).max()) for c in knots)
     off = float(np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max())
     return ["to the end", off, upright(shot.x), float(np.abs(shot.u).max()), slid, lift]

@@ -15,9 +15,9 @@ import dojo_opt as dojo
 problem = dojo.problems.jump(distance=0.3, height=0.2, guess="reference" if QUICK else "standing")
 plan = dojo.ilqr(problem, verbose=True)
 
-fine = problem.sim.replace(time_step=problem.knot_time / 20, kappa=1e-8)
-limits = problem.control_limits
-replay = fine.rollout_feedback(problem.start, plan.u, xs=plan.x, Ks=plan.K, substeps=20, limits=limits)
+step, kappa = problem.knot_time / 20, 1e-8
+replay = plan.replay(time_step=step, kappa=kappa)
+fine = problem.sim.replace(time_step=step, kappa=kappa)
 motion = [fine.rollout(x, np.tile(u, (20, 1))).contacts for x, u in zip(replay.x[:-1], replay.u, strict=True)]
 clearance = max(contacts.gap.min(axis=1).max() for contacts in motion)  # of the lowest foot, in the air
 landed = replay.x[-1, 0] - replay.x[0, 0]
@@ -32,4 +32,4 @@ finish(dojo.plots.gait(plan), __file__)
 assert plan.success, plan.message
 assert clearance > 0.1, clearance
 assert abs(landed - 0.3) < 0.01, landed
-assert np.abs(replay.u).max() <= limits[1].max()
+assert np.abs(replay.u).max() <= problem.control_limits[1].max()

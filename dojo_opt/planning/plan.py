@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from dojo_opt.planning.options import Options
+from dojo_opt.planning.problem import REPLAY_ACCURACY
 from sim import drawn
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
@@ -192,8 +193,9 @@ class Plan:
         limits = sim.mechanism.input_limits if problem is None else problem.control_limits
         smoothing = {} if kappa is None else {"kappa": kappa}
         if time_step is None:
-            accuracy = 1e-5 if accuracy is None else checks.number("Plan.replay(accuracy=...)", accuracy, above=0.0)
-            shot = sim.replace(time_step=self.time_step * self.substeps, order=2, accuracy=accuracy, **smoothing)
+            error = REPLAY_ACCURACY if accuracy is None else accuracy
+            error = checks.number("Plan.replay(accuracy=...)", error, above=0.0)
+            shot = sim.replace(time_step=self.time_step * self.substeps, order=2, accuracy=error, **smoothing)
             start = self._start(sim)
         else:
             steps = self._steps_per_knot(time_step, accuracy)

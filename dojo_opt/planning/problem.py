@@ -23,7 +23,7 @@ from solvers.types import Matrix, Vector
 
 __all__ = ["REPLAY_ACCURACY", "Problem"]
 
-REPLAY_ACCURACY = 1e-5  # [m/s, rad/s] of the replay that `refined_accuracy` compares a plan with
+REPLAY_ACCURACY = 1e-5  # [m/s, rad/s] of `Plan.replay`, with which `refined_accuracy` compares a plan
 
 _IN_USE: set[int] = set()  # problems whose terms are written into at the moment, by id
 _IN_USE_LOCK = Lock()

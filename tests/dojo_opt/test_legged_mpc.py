@@ -178,8 +178,7 @@ def test_an_arm_pushes_a_box_along_a_table():
     assert plan.success and plan.nit < 60, plan.message
     at = problem.sim.mechanism.q_slice("box")
     np.testing.assert_allclose(plan.x[-1, at][:2] - plan.x[0, at][:2], (0.0, 0.2), atol=1e-3)
-    fine = problem.sim.replace(time_step=problem.sim.time_step / 5)
-    shot = fine.rollout_feedback(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=5, limits=problem.control_limits)
+    shot = plan.replay(time_step=plan.time_step / 5)
     assert shot.success
     np.testing.assert_allclose(shot.x[-1, at][:2] - shot.x[0, at][:2], (0.0, 0.2), atol=0.01)
     with pytest.raises(ValueError, match="displacement"):

@@ -138,8 +138,7 @@ def test_periodic_gaits_go_on(name, settings):
     problem = getattr(problems, name)(periodic=True, cycles=1, **settings)
     plan = ilqr(problem).repeated(5)
     assert len(plan.u) == len(plan.K) == 5 * problem.horizon
-    fine = problem.sim.replace(time_step=problem.sim.time_step / 5)
-    shot = fine.rollout_feedback(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=5, limits=problem.control_limits)
+    shot = plan.replay(time_step=plan.time_step / 5)
     assert shot.status == 0 and upright(shot.x).min() > 0.97
     assert np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < 0.05
 

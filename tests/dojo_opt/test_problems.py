@@ -13,9 +13,7 @@ pytestmark = pytest.mark.slow
 
 def replayed(problem, plan, kappa):
     """The plan under its own gains on a harder contact."""
-    shot = problem.sim.rollout_feedback(
-        problem.start, plan.u, xs=plan.x, Ks=plan.K, substeps=problem.substeps, kappa=kappa
-    )
+    shot = plan.replay(time_step=plan.time_step, kappa=kappa)
     assert shot.status == 0
     return problem.violation(shot.x, shot.u)
 

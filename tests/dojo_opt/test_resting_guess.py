@@ -81,7 +81,7 @@ def test_plans_from_rest_succeed(make, seed):
     plan = dojo.ilqr(problem)
     assert plan.success, plan.closing_line()
     assert plan.history[0]["kappa_eval"] == dojo.Options().stages[0].kappa_eval
-    motion = problem.sim.rollout_feedback(plan.x[0], plan.u, plan.x, Ks=plan.K, kappa=1e-6, substeps=problem.substeps)
+    motion = plan.replay(time_step=plan.time_step, kappa=1e-6)
     np.testing.assert_allclose(motion.x, plan.x, atol=1e-5)
 
 

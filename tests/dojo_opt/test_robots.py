@@ -89,8 +89,7 @@ def test_a_robot_stands_up_and_the_plan_holds_at_a_fifth_of_the_step(straight):
     plan = dojo.ilqr(problem)
     assert plan.success and plan.nit < 30, plan.message
     assert plan.x[-1, 2] - plan.x[0, 2] > 0.1
-    fine = problem.sim.replace(time_step=problem.sim.time_step / 5)
-    shot = fine.rollout_feedback(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=5, limits=problem.control_limits)
+    shot = plan.replay(time_step=plan.time_step / 5)
     assert shot.success and np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < 0.01
 
 
@@ -101,9 +100,7 @@ def test_a_robot_trots_and_jumps(straight, task):
     assert plan.success, plan.message
     assert (1.0 - 2.0 * (plan.x[:, 4] ** 2 + plan.x[:, 5] ** 2)).min() > 0.9
     assert plan.x[-1, 0] - plan.x[0, 0] > 0.1
-    sim, parts = plan.problem.sim, 5 * plan.problem.substeps
-    fine, limits = sim.replace(time_step=sim.time_step / 5), plan.problem.control_limits
-    shot = fine.rollout_feedback(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=parts, limits=limits)
+    shot = plan.replay(time_step=plan.time_step / 5)
     assert shot.success and np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < 0.01
 
 

@@ -92,11 +92,8 @@ def _clocked(problem: Problem, options: dict[str, Any]) -> tuple[Plan, Matrix, f
 
 
 def _replay(plan: Plan, refine: int) -> tuple[float, float]:
-    problem = plan.problem
-    sim = problem.sim.replace(kappa=HARD, time_step=problem.sim.time_step / refine)
-    steps, limits = refine * problem.substeps, problem.control_limits
-    shot = sim.rollout_feedback(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=steps, limits=limits)
-    return _judged(problem, shot.x, shot.u) if shot.success else (np.nan, np.nan)
+    shot = plan.replay(time_step=plan.time_step / refine, kappa=HARD)
+    return _judged(plan.problem, shot.x, shot.u) if shot.success else (np.nan, np.nan)
 
 
 def _judged(problem: Problem, xs: Matrix, us: Matrix) -> tuple[float, float]:
