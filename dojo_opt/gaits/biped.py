@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.gait import Gait, assemble, check_length
+from dojo_opt.gaits.minimum_jerk import minimum_jerk
 from sim.mechanism import checks
 from sim.model.state_columns import BaseState
 from sim.simulator.simulator import Simulator
@@ -75,7 +76,7 @@ def step(
     check_length("gaits.step(shift=..., swing=..., settle=...)", sim, steps, "step in less time")
     time = sim.time_step * np.arange(-1.0, steps + 1.0)
     out, over, back = (
-        _smooth((time - begin) / span) for begin, span in ((0.0, shift), (shift, swing), (shift + swing, shift))
+        minimum_jerk((time - begin) / span) for begin, span in ((0.0, shift), (shift, swing), (shift + swing, shift))
     )
     start = sim.neutral() if after is None else _end(sim, after)
     path = np.tile(feet.positions(start), (len(time), 1, 1))
@@ -106,12 +107,6 @@ def _swung(feet: Feet, swinging: str | None) -> NDArray[np.bool_]:
     moving = names[0] if swinging is None else swinging
     checks.one_of("gaits.step(swinging=...)", moving, names)
     return np.asarray(owner == moving)
-
-
-def _smooth(t: Floats) -> Floats:
-    """0 before 0, 1 after 1, with two derivatives zero at both: 10 t^3 - 15 t^4 + 6 t^5."""
-    t = np.clip(t, 0.0, 1.0)
-    return np.asarray(t**3 * (10.0 - 15.0 * t + 6.0 * t**2))
 
 
 def _end(sim: Simulator, after: Gait) -> Floats:

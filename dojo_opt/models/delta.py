@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,8 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pose import quaternion
 from sim.mechanism.shapes import Box, Cylinder, rotation_matrix
 from solvers.types import Floats
+
+_SIDES = (-0.5, 0.5)  # of the two rods of an arm, in units of the gap between them
 
 
 @checked_numbers("models")
@@ -71,24 +73,12 @@ def delta(
         raise ValueError(
             f"delta(forearm=...): expected more than {abs(out):.3g} m, from an arm to the platform, got {forearm}"
         )
-    drop = float(np.sqrt(forearm**2 - out**2))
     bodies, joints, balls = [], [], []
-    for k in range(3):
-        yaw = 2.0 * np.pi * k / 3
-        radial, tangent = (np.array([np.cos(a), np.sin(a), 0.0]) for a in (yaw, yaw + np.pi / 2))
-        bodies.append(Body(f"arm_{k}", arm_mass, shape=Box(arm, 0.04, 0.04)))
-        motor = _motor(k, yaw, base_radius * radial + np.array([0.0, 0.0, height]), arm)
-        joints.append(replace(motor, damper=damper, limits=limits))
-        lowered = np.array([[np.cos(angle), 0.0, np.sin(angle)], [0.0, 1.0, 0.0], [-np.sin(angle), 0.0, np.cos(angle)]])
-        arm_axes = np.array([radial, tangent, [0.0, 0.0, 1.0]]).T @ lowered
-        rod_axes = rotation_matrix(from_z((-out * radial - np.array([0.0, 0.0, drop])) / forearm))
-        for side in (-0.5, 0.5):
-            name = f"rod_{k}_{'l' if side < 0 else 'r'}"
-            bodies.append(Body(name, rod_mass, shape=Cylinder(0.008, forearm)))
-            corner = platform_radius * radial + side * gap * tangent
-            pair = _rod_joints(f"arm_{k}", name, (arm / 2, side * gap, 0.0), corner, forearm, arm_axes, rod_axes)
-            joints.append(pair[0])
-            balls.append(pair[1])
+    for limb in (_Arm(k, arm, angle, forearm, out) for k in range(3)):
+        bodies += limb.links(arm_mass, rod_mass)
+        pairs = [limb.rod_joints(side * gap, platform_radius) for side in _SIDES]
+        joints += [replace(limb.motor(base_radius, height), damper=damper, limits=limits), *(pair[0] for pair in pairs)]
+        balls += [pair[1] for pair in pairs]
     bodies.append(Body("platform", platform_mass, shape=Cylinder(platform_radius + gap / 2, 0.02)))
     return Mechanism(
         bodies,
@@ -100,21 +90,71 @@ def delta(
     )
 
 
-def _motor(k: int, yaw: float, place: Floats, arm: float) -> Joint:
-    """The hinge of arm k, `arm` long [m], at a place of the world (3,) [m]; at zero the arm points along yaw [rad]."""
-    frame = np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
-    inner = (-arm / 2, 0.0, 0.0)
-    return Joint("revolute", None, f"arm_{k}", f"motor_{k}", place, inner, axis=(0.0, 1.0, 0.0), orientation=frame)
+@dataclass(frozen=True)
+class _Arm:
+    """One of the three arms with its two rods, in the neutral state."""
 
+    number: int
+    length: float  # of the arm [m]
+    angle: float  # below the horizontal [rad]
+    forearm: float  # length of a rod [m]
+    out: float  # from the end of the arm to the platform, inwards [m]
 
-def _rod_joints(
-    arm: str, rod: str, at: ArrayLike, corner: Floats, length: float, arm_axes: Floats, rod_axes: Floats
-) -> tuple[Joint, Joint]:
-    """The universal joint of a rod at its arm and the ball joint at the platform, which stands level.
+    @property
+    def yaw(self) -> float:
+        """Its direction [rad]."""
+        return 2.0 * np.pi * self.number / 3
 
-    at, corner: (3,) where they are in arm and platform [m]; arm_axes, rod_axes: (3, 3) of the neutral state.
-    """
-    low, end = (0.0, 0.0, -length / 2), (0.0, 0.0, length / 2)
-    universal = Joint("orbital", arm, rod, "", at, low, orientation=quaternion(arm_axes.T @ rod_axes))
-    ball = Joint("spherical", rod, "platform", f"ball{rod[3:]}", end, corner, orientation=quaternion(rod_axes.T))
-    return universal, ball
+    @property
+    def radial(self) -> Floats:
+        """(3,) outwards."""
+        return np.array([np.cos(self.yaw), np.sin(self.yaw), 0.0])
+
+    @property
+    def tangent(self) -> Floats:
+        """(3,) across, level."""
+        across = self.yaw + np.pi / 2
+        return np.array([np.cos(across), np.sin(across), 0.0])
+
+    @property
+    def axes(self) -> Floats:
+        """(3, 3) of the arm."""
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        lowered = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+        return np.asarray(np.array([self.radial, self.tangent, [0.0, 0.0, 1.0]]).T @ lowered)
+
+    @property
+    def rod_axes(self) -> Floats:
+        """(3, 3) of both rods."""
+        drop = float(np.sqrt(self.forearm**2 - self.out**2))
+        return rotation_matrix(from_z((-self.out * self.radial - np.array([0.0, 0.0, drop])) / self.forearm))
+
+    def _rod(self, side: float) -> str:
+        return f"rod_{self.number}_{'l' if side < 0 else 'r'}"
+
+    def links(self, arm_mass: float, rod_mass: float) -> list[Body]:
+        """The arm and its rods, of these masses [kg]."""
+        rods = [Body(self._rod(side), rod_mass, shape=Cylinder(0.008, self.forearm)) for side in _SIDES]
+        return [Body(f"arm_{self.number}", arm_mass, shape=Box(self.length, 0.04, 0.04)), *rods]
+
+    def motor(self, radius: float, height: float) -> Joint:
+        """Its hinge, so far from the axis and so high [m]; at zero the arm points outwards."""
+        place = radius * self.radial + np.array([0.0, 0.0, height])
+        turn = np.array([np.cos(self.yaw / 2), 0.0, 0.0, np.sin(self.yaw / 2)])
+        arm, inner = f"arm_{self.number}", (-self.length / 2, 0.0, 0.0)
+        return Joint(
+            "revolute", None, arm, f"motor_{self.number}", place, inner, axis=(0.0, 1.0, 0.0), orientation=turn
+        )
+
+    def rod_joints(self, aside: float, radius: float) -> tuple[Joint, Joint]:
+        """The universal joint of a rod at the arm and the ball joint at the platform, which stands level.
+
+        aside: from the middle of the pair [m]; radius: from there to the middle of the platform [m].
+        """
+        name, axes = self._rod(aside), self.rod_axes
+        low, end = (0.0, 0.0, -self.forearm / 2), (0.0, 0.0, self.forearm / 2)
+        corner = radius * self.radial + aside * self.tangent
+        at, turn = (self.length / 2, aside, 0.0), quaternion(self.axes.T @ axes)
+        universal = Joint("orbital", f"arm_{self.number}", name, "", at, low, orientation=turn)
+        ball = Joint("spherical", name, "platform", f"ball{name[3:]}", end, corner, orientation=quaternion(axes.T))
+        return universal, ball

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -70,39 +70,72 @@ def minitaur_leg(
     Raises:
         ValueError: for an argument out of range, or shanks too short to meet.
     """
+    reach, knee = _stance(upper, lower, angle)
+    halves = _Half("front", 1.0, upper, lower), _Half("back", -1.0, upper, lower)
+    links = [link for half in halves for link in half.links(upper_mass, lower_mass)]
+    hips = [replace(half.hip(), damper=damper, armature=rotor) for half in halves]
+    knees = [replace(half.knee(), limits=half.turned(straight, folded)) for half in halves]
+    return Mechanism(
+        [Body("body", body_mass, shape=Box(0.2, 0.12, 0.08)), *links],
+        [Joint("planar_axis", None, "body", "base", axis=Y), *hips, *knees, _pin(lower)],
+        contacts=[
+            Contact("front_shank", _end(lower), foot_radius, friction=friction, law=law, name="foot"),
+            Contact("body", radius=0.05, friction=friction, law=law, name="hull"),
+        ],
+        inputs=[Input(hip.name) for hip in hips],
+        gravity=gravity,
+        name="minitaur_leg",
+        neutral={"base": (0.0, reach + foot_radius, 0.0)} | halves[0].bent(angle, knee) | halves[1].bent(angle, knee),
+    )
+
+
+def _stance(upper: float, lower: float, angle: float) -> tuple[float, float]:
+    """From the foot to the hip [m], and the angle of the knees [rad], with the thighs at an angle from the vertical."""
     across = upper * np.sin(angle)  # from a knee to the middle
     if not abs(across) < lower:
         raise ValueError(f"minitaur_leg(lower=...): expected more than {abs(across):.3g} m, to the middle, got {lower}")
     reach = upper * np.cos(angle) + np.sqrt(lower**2 - across**2)
-    knee = angle + float(np.arcsin(across / lower))
-    bodies = [Body("body", body_mass, shape=Box(0.2, 0.12, 0.08))]
-    neutral: dict[str, ArrayLike] = {"base": (0.0, float(reach) + foot_radius, 0.0)}
-    hips, knees = [], []
-    for side, sign in (("front", 1.0), ("back", -1.0)):
-        bodies.append(Body(f"{side}_thigh", upper_mass, shape=Box(0.015, 0.015, upper)))
-        bodies.append(Body(f"{side}_shank", lower_mass, shape=Box(0.012, 0.012, lower)))
-        hip, hinge = _hip_and_knee(side, upper, lower)
-        hips.append(replace(hip, damper=damper, armature=rotor))
-        knees.append(replace(hinge, limits=sorted((sign * straight, sign * folded))))
-        neutral |= {f"{side}_hip": -sign * angle, f"{side}_knee": sign * knee}
-    end = (0.0, 0.0, -lower / 2)
-    pin = Joint("revolute", "front_shank", "back_shank", "foot", end, end, axis=Y, close=True)
-    foot = Contact("front_shank", end, foot_radius, friction=friction, law=law, name="foot")
-    hull = Contact("body", radius=0.05, friction=friction, law=law, name="hull")
-    return Mechanism(
-        bodies,
-        [Joint("planar_axis", None, "body", "base", axis=Y), *hips, *knees, pin],
-        contacts=[foot, hull],
-        inputs=[Input("front_hip"), Input("back_hip")],
-        gravity=gravity,
-        name="minitaur_leg",
-        neutral=neutral,
-    )
+    return float(reach), angle + float(np.arcsin(across / lower))
 
 
-def _hip_and_knee(side: str, upper: float, lower: float) -> tuple[Joint, Joint]:
-    """The joints of one half of the leg, whose thigh and shank of these lengths [m] hang from their upper ends."""
-    thigh, shank = f"{side}_thigh", f"{side}_shank"
-    top, bottom, start = (0.0, 0.0, upper / 2), (0.0, 0.0, -upper / 2), (0.0, 0.0, lower / 2)
-    hip = Joint("revolute", "body", thigh, f"{side}_hip", child_point=top, axis=Y)
-    return hip, Joint("revolute", thigh, shank, f"{side}_knee", bottom, start, axis=Y)
+def _end(length: float) -> tuple[float, float, float]:
+    """The lower end of a link of this length [m]."""
+    return (0.0, 0.0, -length / 2)
+
+
+def _pin(lower: float) -> Joint:
+    """The hinge at the foot, which closes the loop of shanks of this length [m]."""
+    return Joint("revolute", "front_shank", "back_shank", "foot", _end(lower), _end(lower), axis=Y, close=True)
+
+
+@dataclass(frozen=True)
+class _Half:
+    """One half of the leg: a thigh and a shank that hang from their upper ends."""
+
+    side: str
+    sign: float  # of the angle of a bent knee
+    upper: float  # length of the thigh [m]
+    lower: float  # of the shank [m]
+
+    def links(self, upper_mass: float, lower_mass: float) -> list[Body]:
+        """Thigh and shank of these masses [kg]."""
+        return [
+            Body(f"{self.side}_thigh", upper_mass, shape=Box(0.015, 0.015, self.upper)),
+            Body(f"{self.side}_shank", lower_mass, shape=Box(0.012, 0.012, self.lower)),
+        ]
+
+    def hip(self) -> Joint:
+        top = (0.0, 0.0, self.upper / 2)
+        return Joint("revolute", "body", f"{self.side}_thigh", f"{self.side}_hip", child_point=top, axis=Y)
+
+    def knee(self) -> Joint:
+        thigh, shank, top = f"{self.side}_thigh", f"{self.side}_shank", (0.0, 0.0, self.lower / 2)
+        return Joint("revolute", thigh, shank, f"{self.side}_knee", _end(self.upper), top, axis=Y)
+
+    def turned(self, least: float, most: float) -> list[float]:
+        """Limits of the knee for the least and the largest bend [rad]."""
+        return sorted((self.sign * least, self.sign * most))
+
+    def bent(self, hip: float, knee: float) -> dict[str, ArrayLike]:
+        """Coordinates for angles of thigh and knee [rad]."""
+        return {f"{self.side}_hip": -self.sign * hip, f"{self.side}_knee": self.sign * knee}

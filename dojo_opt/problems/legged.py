@@ -13,6 +13,7 @@ from dojo_opt.gaits.biped import balanced
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.gait import Gait, assemble, check_length
 from dojo_opt.gaits.legs import Legs
+from dojo_opt.gaits.minimum_jerk import minimum_jerk
 from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
@@ -298,8 +299,7 @@ def _lowered(sim: Simulator, by: Floats) -> tuple[Floats, Floats]:
 def _rise(sim: Simulator, steps: int, by: float) -> Gait:
     """The base goes up by so much in two thirds of the steps, at rest at both ends; the feet stand."""
     feet = Feet(sim)
-    share = np.clip(1.5 * np.arange(-1, steps + 1) / steps, 0.0, 1.0)
-    base, where = _lowered(sim, by * (1.0 - share**3 * (10.0 - 15.0 * share + 6.0 * share**2)))
+    base, where = _lowered(sim, by * (1.0 - minimum_jerk(1.5 * np.arange(-1, steps + 1) / steps)))
     return assemble(sim, "stand up", base, where, np.ones(where.shape[:2], dtype=bool), names=feet.names)
 
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.constraint import Frame, Goal, SpeedLimits
-from dojo_opt.cost import Effort, Tracking
-from dojo_opt.gaits.equilibrium import potential_gradient
-from dojo_opt.gaits.static_motions import input_map
+from dojo_opt.cost import Tracking
+from dojo_opt.gaits.minimum_jerk import minimum_jerk
 from dojo_opt.models.checked_numbers import checked_numbers
 from dojo_opt.planning.problem import Problem
+from dojo_opt.problems.holding import effort, holding_inputs
 from dojo_opt.problems.whole_knots import whole_knots
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
@@ -25,7 +25,8 @@ from solvers.types import Floats
 
 __all__ = ["reach"]
 
-_EFFORT = 0.01  # weight of squares of a torque, in units of the largest that holds the arm, beside rates in rad/s
+_CALL = "problems.reach"
+_TIP = "the point that reaches the target"
 
 
 @checked_numbers("problems")
@@ -68,41 +69,25 @@ def reach(
             of range.
     """
     sim = _simulator(arm, time_step)
-    kin = Kinematics(sim)
-    checks.one_of("problems.reach(frame)", frame, kin.frames)
-    point = np.asarray(checks.vector("problems.reach(offset=...)", offset, 3))
-    kin.add(_TIP, frame, point)
+    point = np.asarray(checks.vector(f"{_CALL}(offset=...)", offset, 3))
     place, turn = _target(target)
     first = _start(sim, start)
-    found = ik(kin, {_TIP: place if turn is None else (place, turn)}, first[: sim.nq])
-    if not found.success:
-        raise ValueError(f"problems.reach({frame!r}, target): {found.message}")
-    substeps = whole_number("problems.reach(substeps=...)", substeps)
-    horizon = whole_knots("problems.reach(duration=...)", duration, time_step * substeps, 2)
-    check_room(
-        "problems.reach(duration=...)", horizon, 8.0 * sim.nx, "reach in less time, or with longer steps", "knots"
-    )
-    states = _path(sim, first, found.q, horizon, substeps)
-    B = input_map(sim)
-    held = np.linalg.lstsq(B, potential_gradient(sim, states[:-1]).T, rcond=None)[0].T
-    low, high = sim.mechanism.input_limits
-    unit = np.maximum(np.abs(np.clip(held, low, high)).max(initial=0.0), 1e-3)
+    last = _reached(sim, frame, point, place if turn is None else (place, turn), first)
+    substeps = whole_number(f"{_CALL}(substeps=...)", substeps)
     knot = time_step * substeps
-    more = tuple(constraints) if isinstance(constraints, list | tuple) else (constraints,)
-    limited = any(i.joint is not None and np.isfinite(i.speed) for i in sim.mechanism.inputs or ())
+    horizon = whole_knots(f"{_CALL}(duration=...)", duration, knot, 2)
+    check_room(f"{_CALL}(duration=...)", horizon, 8.0 * sim.nx, "reach in less time, or with longer steps", "knots")
+    states = _path(sim, first, last, horizon, substeps)
+    held = holding_inputs(sim, states[:-1, : sim.nq])
     return Problem(
         sim,
         first,
         horizon,
-        cost=[
-            Tracking(states, {"v": knot}),
-            Effort(knot * _EFFORT / unit**2, reference=np.clip(held, low, high)),
-        ],
+        cost=[Tracking(states, {"v": knot}), effort(sim, held, knot)],
         constraints=[
             Frame(frame, place, turn, knots=-1, offset=point),
-            Goal(np.concatenate([found.q, np.zeros(sim.nv)]), components="v"),
-            *((SpeedLimits(),) if limited else ()),
-            *more,
+            *_rest(sim, last),
+            *(constraints if isinstance(constraints, list | tuple) else (constraints,)),
         ],
         substeps=substeps,
         controls0=held,
@@ -111,14 +96,11 @@ def reach(
     )
 
 
-_TIP = "the point that reaches the target"
-
-
 def _simulator(arm: Any, time_step: float) -> Simulator:
     if isinstance(arm, Simulator):
         return arm.replace(time_step=time_step)
     if not isinstance(arm, Mechanism):
-        raise TypeError(f"problems.reach(arm): expected a Mechanism or a Simulator, got {arm!r}")
+        raise TypeError(f"{_CALL}(arm): expected a Mechanism or a Simulator, got {arm!r}")
     return Simulator(arm, time_step=time_step)
 
 
@@ -126,25 +108,43 @@ def _target(target: Any) -> tuple[Floats, Floats | None]:
     """Place and quaternion."""
     pair = isinstance(target, tuple | list) and len(target) == 2
     place, turn = target if pair else (target, None)
-    at = checks.array("problems.reach(target)", place, (3,))
-    return at, None if turn is None else np.asarray(checks.quaternion("problems.reach(target)", turn))
+    at = checks.array(f"{_CALL}(target)", place, (3,))
+    return at, None if turn is None else np.asarray(checks.quaternion(f"{_CALL}(target)", turn))
 
 
 def _start(sim: Simulator, given: ArrayLike | None) -> Floats:
     """The first state."""
     if given is None:
         return sim.neutral()
-    array = np.asarray(checks.floats("problems.reach(start=...)", given))
+    array = np.asarray(checks.floats(f"{_CALL}(start=...)", given))
     if array.shape == (sim.nq,):
         array = np.concatenate([array, np.zeros(sim.nv)])
-    x = np.array(checks.array("problems.reach(start=...)", array, (sim.nx,)))
+    x = np.array(checks.array(f"{_CALL}(start=...)", array, (sim.nx,)))
     for joint in sim.mechanism.joints:
         q = x[sim.mechanism.q_slice(joint.name)]
         for value, (low, high) in zip(q, joint.limits or (), strict=False):
             if not low <= value <= high:
                 at = f"{value:.4g} is beyond its limits [{low:g}, {high:g}]"
-                raise ValueError(f"problems.reach(start=...): joint {joint.name!r} at {at}")
+                raise ValueError(f"{_CALL}(start=...): joint {joint.name!r} at {at}")
     return x
+
+
+def _reached(sim: Simulator, frame: Any, point: Floats, target: Any, first: Floats) -> Floats:
+    """(nq,) coordinates near the first state (nx,) with a point of a frame (3,) at its target."""
+    kin = Kinematics(sim)
+    checks.one_of(f"{_CALL}(frame)", frame, kin.frames)
+    kin.add(_TIP, frame, point)
+    found = ik(kin, {_TIP: target}, first[: sim.nq])
+    if not found.success:
+        raise ValueError(f"{_CALL}({frame!r}, target): {found.message}")
+    return found.q
+
+
+def _rest(sim: Simulator, q: Floats) -> list[Goal | SpeedLimits]:
+    """Rest at coordinates (nq,) at the end, and the speed limits of the inputs on the way, if there are any."""
+    rest = Goal(np.concatenate([q, np.zeros(sim.nv)]), components="v")
+    limited = any(i.joint is not None and np.isfinite(i.speed) for i in sim.mechanism.inputs or ())
+    return [rest, SpeedLimits()] if limited else [rest]
 
 
 def _path(sim: Simulator, first: Floats, q: Floats, horizon: int, substeps: int) -> Floats:
@@ -152,15 +152,11 @@ def _path(sim: Simulator, first: Floats, q: Floats, horizon: int, substeps: int)
     last = np.concatenate([q, np.zeros(sim.nv)])
     way = sim.difference(last, first)[: sim.nv]
     step = 1.0 / (horizon * substeps)
-
-    def along(share: Floats) -> Floats:
-        return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
-
     share = np.arange(horizon + 1) / horizon
     moved = np.zeros((horizon + 1, sim.ndx))
-    moved[:, : sim.nv] = along(share)[:, None] * way
+    moved[:, : sim.nv] = minimum_jerk(share)[:, None] * way
     if sim.mean_over:
-        rates = (along(share) - along(np.maximum(share - step, 0.0))) / sim.time_step
+        rates = (minimum_jerk(share) - minimum_jerk(share - step)) / sim.time_step
     else:
         rates = 30.0 * (share * (1.0 - share)) ** 2 * step / sim.time_step
     states = sim.integrate(np.concatenate([first[: sim.nq], np.zeros(sim.nv)]), moved)

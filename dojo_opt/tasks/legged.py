@@ -27,6 +27,7 @@ from solvers.types import Vector
 
 __all__ = ["legged_mpc"]
 
+_CALL = "tasks.legged_mpc"
 _GAITS = ("trot", "walk", "pace", "bound", "hop")
 # of a robot of the size and weight of the A1, as in `quadruped_mpc`: lengths go with the height, times with its root
 _KNOT, _KNOTS, _HORIZON = 0.04, 12, 20  # [s], of a period, of a plan
@@ -89,35 +90,48 @@ def legged_mpc(  # noqa: PLR0913
         TypeError: for an unknown setting.
         ValueError: for an argument out of range, a robot without legs, or a foot that cannot reach its place.
     """
-    call = "tasks.legged_mpc"
-    checks.one_of(f"{call}(gait)", gait, _GAITS)
+    checks.one_of(f"{_CALL}(gait)", gait, _GAITS)
     legs = Legs(robot, feet, damping=damping, stance=stance)
-    slow, unit = legs.size**0.5, legs.torque
-    usual = _HOP if gait == "hop" else _KNOT * _KNOTS
-    cycle = usual * slow if period is None else checks.number(f"{call}(period=...)", period, above=0.0)
-    knot = 1e-3 * max(1, round(1e3 * cycle / _KNOTS))
-    sim = legs.simulator(knot / whole_number(f"{call}(substeps=...)", substeps), PLANNED)
+    knot = _knot(legs, gait, period)
+    sim = legs.simulator(knot / whole_number(f"{_CALL}(substeps=...)", substeps), PLANNED)
     lift = _LIFT * legs.size if step_height is None else step_height
     shape: dict[str, Any] = {"period": _KNOTS * knot, "step_height": lift} | ({} if duty is None else {"duty": duty})
-    make = partial(_period, gait, **shape)
-    command: Any = (_SPEED * slow, 0.0, 0.0) if velocity is None else velocity
-    reference = (SteeredGait if callable(command) else CommandedGait)(sim, make, command, place)
+    command: Any = (_SPEED * legs.size**0.5, 0.0, 0.0) if velocity is None else velocity
+    follow = SteeredGait if callable(command) else CommandedGait
+    reference = follow(sim, partial(_period, gait, **shape), command, place)
+    problem = _problem(legs, sim, reference, knot, substeps)
+    return MPC(problem, reference={0: reference, 1: reference.torques}, **{**_usual(legs, sim), **settings})
+
+
+def _knot(legs: Legs, gait: str, period: float | None) -> float:
+    """Length of a knot, a whole number of milliseconds [s]."""
+    usual = _HOP if gait == "hop" else _KNOT * _KNOTS
+    cycle = usual * legs.size**0.5 if period is None else checks.number(f"{_CALL}(period=...)", period, above=0.0)
+    return 1e-3 * max(1, round(1e3 * cycle / _KNOTS))
+
+
+def _problem(legs: Legs, sim: Simulator, reference: CommandedGait, knot: float, substeps: int) -> Problem:
+    """Tracking of the reference with its torques, from which the guess is."""
     times = knot * np.arange(_HORIZON + 1)
     states, torques = reference(times), reference.torques(times[:-1])
     gains = np.array([part.gain for part in sim.mechanism.inputs or ()])
-    problem = Problem(
+    return Problem(
         sim,
         states[0],
         _HORIZON,
-        cost=[Tracking(states, _weights(legs, sim)), Effort(_EFFORT * gains**2 / unit**2)],
+        cost=[Tracking(states, _weights(legs, sim)), Effort(_EFFORT * gains**2 / legs.torque**2)],
         substeps=substeps,
         controls0=np.clip(torques, *sim.mechanism.input_limits),
         states0=states,
     )
+
+
+def _usual(legs: Legs, sim: Simulator) -> dict[str, Any]:
+    """Settings of `dojo.MPC` that differ from its defaults."""
     grip = min((c.friction for c in sim.mechanism.contacts), default=0.0)
     planner = replace(OPTIONS, multiple_shooting_below=0.0 if legs.biped else _SHORT)
-    own = {"learn_ground": True, "options": planner, "kappa": _KAPPA * unit * slow, "friction": _CAREFUL * grip}
-    return MPC(problem, reference={0: reference, 1: reference.torques}, **{**own, **settings})
+    kappa = _KAPPA * legs.torque * legs.size**0.5
+    return {"learn_ground": True, "options": planner, "kappa": kappa, "friction": _CAREFUL * grip}
 
 
 def _period(name: str, sim: Simulator, command: Vector, **settings: Any) -> Gait:
