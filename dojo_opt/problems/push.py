@@ -33,7 +33,7 @@ __all__ = ["push"]
 _CALL = "problems.push"
 # weights of squares per second: place of the object over its way, its heading, angles of the arm, and their rates
 _PLACE, _TURN, _ANGLE, _RATE = 1.0, 1.0, 0.1, 0.01
-_ROUGH = 0.5  # friction of an object whose shapes have none
+_CALM = 30.0  # regularisation of the gains: with less, some objects turn away from the hand in shorter steps
 
 
 @checked_numbers("problems")
@@ -53,17 +53,18 @@ def push(
     """An arm pushes an object along a table to a place, where both come to rest.
 
     The object stands with its x axis in the direction of the push. The hand is a ball at a frame of the arm; it begins
-    1 cm behind the object, at the height of its centre of mass. In the guess the hand moves straight ahead with the
-    object in front of it, under the torques that hold the arm, without contact. The links of the arm have no contacts
-    with the object and the table. In the guess their joints and centres of mass stay outside of both where the arm can;
-    a warning tells where it cannot. Nothing keeps their shapes outside: a hand that is wider than the object is high
-    reaches into the table, unless `offset` and `at` have it stand off. Place and heading of the object at the end are
-    constraints, and both are at rest there. Each shape of the object has its own friction, 0.5 where it has none, at
-    the table and at the ball.
+    1 cm behind the object, at the height of its centre of mass, or lower where the object would tip over. In the guess
+    the hand moves straight ahead with the object in front of it, under the torques that hold the arm, without contact.
+    The links of the arm have no contacts with the object and the table. In the guess their joints and centres of mass
+    stay outside of both where the arm can; a warning tells where it cannot. Nothing keeps their shapes outside: a hand
+    that is wider than the object is high reaches into the table, unless `offset` and `at` have it stand off. Place and
+    heading of the object at the end are constraints, and both are at rest there. Each shape of the object has its own
+    friction, 0.5 where it has none, at the table and at the ball. Gains are low (`Problem.gain_regularization`), so
+    that plans hold with shorter steps.
 
     Args:
         arm: the mechanism, or its simulator, whose time step is then `time_step`; its own contacts are omitted.
-        object: a body with a shape that stands on the table: a Box, Sphere, Capsule or Polytope.
+        object: a body with a shape that stands on the table: a Box, Capsule or Polytope, or a Sphere among others.
         goal: (2,) displacement of the object along x and y [m].
         frame: name of the link that has the ball (default None: the body at the end of the longest row of hinges).
         offset: (3,) of the ball from the origin of the frame, in its axes [m].
@@ -80,7 +81,8 @@ def push(
 
     Raises:
         TypeError: `arm` is neither a mechanism nor a simulator, or `object` no body.
-        ValueError: the frame is unknown, the hand cannot reach the object or its goal, or an argument is out of range.
+        ValueError: the frame is unknown, the hand cannot reach the object or its goal, the object rolls along its way,
+            or an argument is out of range.
     """
     checks.number(f"{_CALL}(radius=...)", radius, above=0.0)
     kin = pushing_arm(arm, frame, offset, radius, time_step)
@@ -120,6 +122,7 @@ def _problem(kin: Kinematics, sim: Simulator, thing: PushedObject, below: Floats
         constraints=[Goal(states[-1], components=_ends(kin.sim.nv))],
         controls0=held,
         states0=states,
+        gain_regularization=_CALM,
         advice="Try a longer duration, a nearer goal, or an object that is lighter or has less friction.",
     )
 
@@ -135,7 +138,7 @@ def _way(goal: ArrayLike) -> Floats:
 def _scene(kin: Kinematics, pushed: PushedObject, below: Floats, radius: float) -> Simulator:
     """The arm, the object over a point of the table (3,), and the ball between them."""
     mech, thing = kin.mechanism, pushed.body
-    rough = [_ROUGH if shape.friction is None else shape.friction for shape in thing.shapes]
+    rough = pushed.friction
     thing = replace(thing, shape=[replace(shape, friction=mu) for shape, mu in zip(thing.shapes, rough, strict=True)])
     contacts = shape_contacts(_CALL, thing, height=float(below[2]))
     joint = Joint("floating", None, thing.name)

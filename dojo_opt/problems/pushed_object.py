@@ -9,7 +9,7 @@ import numpy as np
 
 from dojo_opt.gaits.minimum_jerk import minimum_jerk
 from sim.mechanism.body import Body
-from sim.mechanism.shapes import Solid, rotation_matrices
+from sim.mechanism.shapes import Solid, Stance, rotation_matrices
 from sim.simulator.kinematics import Kinematics
 from solvers.types import Floats
 
@@ -19,6 +19,9 @@ _CALL = "problems.push"
 _GAP = 0.01  # [m] between the hand and the object at the beginning
 _REST = 0.2  # of the duration, at the end
 _DOWN = np.array([0.0, 0.0, -1.0])
+_ROUGH = 0.5  # friction of an object whose shapes have none
+_LEVEL = 0.01  # of the height of the centre of mass: points this near to the lowest one are on the table
+_UPRIGHT = 0.8  # of the height from which a push tips the object over
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,19 @@ class PushedObject:
         """An object that moves along `way` (3,) [m] in a number of knots, from the knot before the first one on."""
         if not isinstance(body, Body):
             raise TypeError(f"{_CALL}(object): expected a Body, got {body!r}")
-        return cls(body, way, np.arange(-1.0, horizon + 1.0) / ((1.0 - _REST) * horizon))
+        made = cls(body, way, np.arange(-1.0, horizon + 1.0) / ((1.0 - _REST) * horizon))
+        rear, front, _ = made._footing()
+        if not rear < 0.0 < front:
+            raise ValueError(
+                f"{_CALL}(object): body {body.name!r} rolls along its way, and goes on when the hand stops, or falls "
+                "over: its centre of mass has to be between points on which it stands"
+            )
+        return made
+
+    @property
+    def friction(self) -> list[float]:
+        """Coefficients of its shapes, 0.5 where they have none."""
+        return [_ROUGH if shape.friction is None else shape.friction for shape in self.body.shapes]
 
     @property
     def far(self) -> float:
@@ -76,7 +91,28 @@ class PushedObject:
     def hands(self, radius: float) -> Floats:
         """(n, 3) places of the ball of a hand from the point of the table below the object at the beginning [m]."""
         back = self.half(np.array([-1.0, 0.0, 0.0])) + radius
-        return self.up - back * self.forward + self._hand_moved[:, None] * self.forward
+        up = np.array([0.0, 0.0, max(radius, self._height())])
+        return up - back * self.forward + self._hand_moved[:, None] * self.forward
+
+    def _height(self) -> float:
+        """Height of a push [m]: that of the centre of mass, or lower, where the object would tip over.
+
+        The friction mu m g, pushed at a height z, lifts the rear once mu z is more than the way from the centre of mass
+        to the front edge.
+        """
+        _, front, friction = self._footing()
+        middle = self.half(_DOWN)
+        return middle if friction * middle <= _UPRIGHT * front else _UPRIGHT * front / friction
+
+    def _footing(self) -> tuple[float, float, float]:
+        """Ends of the points on the table along the way, from the centre of mass [m], and their largest friction."""
+        low, rows = _LEVEL * self.half(_DOWN) - self.half(_DOWN), []
+        for shape, friction in zip(self.body.shapes, self.friction, strict=True):
+            stance = _stance(shape)
+            points = shape.place(stance.points)
+            rows += [(x, friction) for x, _, z in points if z - stance.radius <= low]
+        ends, frictions = zip(*rows, strict=True)
+        return min(ends), max(ends), max(frictions)
 
     def places(self, below: Floats) -> Floats:
         """(n, 3) places of the object that begins over a point of the table (3,) [m]."""
@@ -118,9 +154,15 @@ def _points(kin: Kinematics, hands: Floats) -> Floats:
     return np.array(points)
 
 
-def _reach(shape: Solid, direction: Floats) -> float:
-    """How far a shape on its body reaches in a direction (3,) [m]."""
+def _stance(shape: Solid) -> Stance:
+    """The points on which a shape stands."""
     stance = shape.stance()
     if stance is None:
         raise ValueError(f"{_CALL}(object): expected a Box, Sphere, Capsule or Polytope, got {shape!r}")
+    return stance
+
+
+def _reach(shape: Solid, direction: Floats) -> float:
+    """How far a shape on its body reaches in a direction (3,) [m]."""
+    stance = _stance(shape)
     return float((shape.place(stance.points) @ direction).max()) + stance.radius

@@ -1,5 +1,6 @@
 """A robot of any make under a velocity command: its reference, and closed loops with pushes and steering."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.mpc.settings import OPTIONS
+from dojo_opt.problems.pushed_object import PushedObject
 from dojo_opt.tasks.commanded import CommandedGait
 from dojo_opt.tasks.legged import _period
 
@@ -166,6 +168,16 @@ def test_shapes_of_a_pushed_object_keep_their_friction():
     expected = {"foot": 0.1, "lid": 0.9, "knob": 0.5}
     assert {c.name.split("_")[0].split(".")[1]: c.friction for c in mech.contacts} == expected
     assert [c.friction for c in mech.collisions] == list(expected.values())
+    with pytest.raises(ValueError, match="rolls along its way"):
+        dojo.problems.push(arm, dojo.Body("ball", 0.2, shape=dojo.Sphere(0.05)), (0.0, 0.1))
+
+
+def test_an_object_that_would_tip_over_is_pushed_further_down():
+    box = dojo.Body("box", 0.2, shape=dojo.Box(0.04, 0.1, 0.1))
+    thing = PushedObject.of(box, np.array([0.0, 0.3, 0.0]), 5)
+    assert thing.hands(0.01)[:, 2] == pytest.approx(0.8 * 0.02 / 0.5)
+    slippery = replace(box, shape=dojo.Box(0.04, 0.1, 0.1, friction=0.3))
+    assert PushedObject.of(slippery, thing.way, 5).hands(0.01)[:, 2] == pytest.approx(0.05)
 
 
 @pytest.mark.slow
