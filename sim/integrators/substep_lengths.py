@@ -12,7 +12,7 @@ from solvers.types import Vector
 _SAFE, _MOST, _LEAST = 0.95, 5.0, 0.2  # shares of a length: of the best one, and limits
 _FAR = 0.1  # error over allowed of a step that is much too short
 _AGAIN = 0.5  # most of a length that was refused a second time at a node
-_RISES, _SLOWLY = 1.25, 1.05  # shares of the longest length after each step that was kept
+_RISES = 1.25  # share of the longest length after each step that was kept
 _TRIES = 4.0  # lengths 5, 25, ... times the shortest that are tried in turn, where that misses the accuracy
 _STALLED = 0.5  # error of an impact over that in a longer step
 _SLIGHT, _LARGE = 0.1, 1.0  # errors of impacts, in accuracies
@@ -72,7 +72,7 @@ def lengthen(clock: Vector, h: float, ratio: float, shortest: float) -> None:
     clock[Clock.SHORT] = max(length, clock[Clock.SHORT] if h < 0.99 * clock[Clock.SHORT] else shortest)
     if clock[Clock.HIT] > 0.0:
         clock[Clock.SHORT] = h
-    clock[Clock.CEILING] *= clock[Clock.RISE] if clock[Clock.CEILING] < 2.0 * clock[Clock.UNSOLVED] else _RISES
+    clock[Clock.CEILING] *= _RISES
     clock[Clock.SHORT] = min(clock[Clock.SHORT], max(clock[Clock.CEILING], h))
 
 
@@ -105,15 +105,8 @@ def shorten(clock: Vector, h: float, ratio: float, shortest: float) -> None:
 
 @kernel
 def shorten_unsolved(clock: Vector, h: float, shortest: float) -> None:
-    """After a step that has no solution. Where the last one was about as long, lengths go on as they were, and rise
-    more slowly than before.
-    """
-    again, recent = 0.5 * clock[Clock.UNSOLVED] < h < 2.0 * clock[Clock.UNSOLVED], clock[Clock.RECENT]
-    clock[Clock.UNSOLVED], clock[Clock.RISE] = h, max(sqrt(clock[Clock.RISE]), _SLOWLY) if again else _RISES
-    if again and 0.25 * h < recent < 0.95 * h:
-        clock[Clock.SHORT] = clock[Clock.CEILING] = max(recent, shortest)
-    else:
-        clock[Clock.SHORT], clock[Clock.CEILING] = max(0.25 * h, shortest), 0.5 * h
+    """After a step that has no solution."""
+    clock[Clock.SHORT], clock[Clock.CEILING] = max(0.25 * h, shortest), 0.5 * h
 
 
 @kernel

@@ -51,8 +51,6 @@ class Clock(Code):
     ROUGH = 27  # length of the step just tried over the longest of order 4, 0 where that is not known
     ENDED = 28  # 1 where `settled` of a SubstepState are the nodes where the impact of the step just tried has ended
     STOP = 29  # time when the first contact stops sliding, at its deceleration [s]
-    UNSOLVED = 30  # last length without a solution [s]
-    RISE = 31  # of CEILING with every step that is kept
 
 
 class AccuracyGoal(Code):
@@ -81,7 +79,7 @@ class SubstepState(NamedTuple):
     node: Vector  # (nx,) scratch: the node after the undivided step
     ahead: Vector  # (nx,) scratch: mean state of a step from there
     settled: Matrix  # (2, nx) scratch: nodes a short step after that, and after the halves
-    clock: Vector  # (32,) in place
+    clock: Vector  # (30,) in place
     report: Vector  # (9,) in place; PARTS counts the sub-steps
     parts: Cube  # (3, ncontact, 11) scratch: contacts of both halves, and of the whole step
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the step
