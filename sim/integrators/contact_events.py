@@ -20,8 +20,8 @@ from solvers.types import Vector
 NEVER = 1e300  # [s]
 UNKNOWN, BEGINS = -1.0, -2.0  # in place of a slip
 _ACCELERATION = 1e3  # [m/s^2] of impacts at least that forget the slip
-LANDED = 0.05  # error of a contact at its node before it lands, in accuracies
-_HIT = 1e2  # [m/s^2, rad/s^2] of impacts at least
+_LANDED, _CLOSE = 0.05, 2.5e-7  # error of a contact at its node before it lands, in accuracies; at least [m, rad]
+_HIT, _GENTLE = 1e2, 5e-3  # [m/s^2, rad/s^2] and [m/s, rad/s] of impacts at least
 
 
 class Landing(NamedTuple):
@@ -76,11 +76,17 @@ def _time_to_land(model: Model, data: Data, h: float, c: int, on_ground: bool) -
 
 
 @kernel
+def landed_error(accuracy: float) -> float:
+    """Largest error of a contact in a step that it begins before it lands [m, rad]."""
+    return max(_LANDED * accuracy, _CLOSE)
+
+
+@kernel
 def _jumps(h: float, accuracy: float, push: float, gap: float) -> bool:
-    """Whether a velocity jumps: by more than _HIT, or by more than the accuracy in a step that closes a gap. A foot may
-    land gently in the midst of a long one.   push: way of the jump in the time of the step [m, rad].
+    """Whether a velocity jumps: by more than _HIT, or, in a step that closes a gap, by more than the accuracy and
+    _GENTLE, as a foot lands in the midst of a long step.   push: way of the jump in the time of the step [m, rad].
     """
-    return push > h * h * _HIT or min(2.0 * gap, push) > h * accuracy
+    return push > h * h * _HIT or min(2.0 * gap, push) > h * max(accuracy, _GENTLE)
 
 
 @kernel
@@ -95,7 +101,7 @@ def landing(
     """
     h, nq = options.h, data.theta1.shape[0]
     error, ahead, longest, depth, hits = 0.0, NEVER, NEVER, 0.0, False
-    least, apart = LANDED * accuracy, NEVER
+    least, apart = landed_error(accuracy), NEVER
     for k in range(model.limit_dof.shape[0]):
         gap, time = _limit_reached(model, data, k, mean)
         depth = max(depth, -gap)

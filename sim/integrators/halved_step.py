@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from sim.contact.contact_report import report_contacts
 from sim.dynamics.state_manifold import configuration_difference
-from sim.integrators.contact_events import LANDED, NEVER, Landing, landing
+from sim.integrators.contact_events import NEVER, Landing, landed_error, landing
 from sim.integrators.extrapolated_step import CLOSED, NOISE, extrapolate, raise_order
 from sim.integrators.impact_error import FEW, MANY, impact_errors, jumps
 from sim.integrators.node_step import (
@@ -185,7 +185,7 @@ def _ends_before(goal: Vector, line: SubstepState, found: Landing, h: float) -> 
     if found.hits and h > clock[Clock.IMPACT] and clock[Clock.BEYOND] == 0.0:
         shorten_impact(clock, h, clock[Clock.IMPACT])
         return True
-    if found.error > LANDED * goal[AccuracyGoal.ACCURACY] and clock[Clock.ANY] == 0.0:
+    if found.error > landed_error(goal[AccuracyGoal.ACCURACY]) and clock[Clock.ANY] == 0.0:
         clock[Clock.CUT] = before_landing(h, found.ahead)
         return True
     return False
