@@ -94,8 +94,7 @@ COARSE = Randomization(
 # Of shac; an evaluation takes as long as several epochs.
 _RARELY: dict[str, Any] = {"environments": 32, "evaluations": 5, "episodes": 4}
 _CHEETAH = {
-    **_RARELY, "epochs": 600, "episode": 128, "rate": 2e-3, "saturation": 0.01, "randomization": TRANSFER,
-    "cutoff": _CUTOFF,
+    **_RARELY, "episode": 128, "rate": 2e-3, "saturation": 0.01, "randomization": TRANSFER, "cutoff": _CUTOFF,
 }  # fmt: skip
 _LEGGED = {**_RARELY, "epochs": 800, "horizon": 32, "gamma": 0.997, "randomization": BALANCE}
 _ANT = {**_RARELY, "epochs": 2100, "episode": 128, "rate": 3e-3, "randomization": COARSE, "cutoff": _CUTOFF}
