@@ -23,7 +23,7 @@ sim = dojo.Simulator(dojo.models.pendulum(), 0.05)
 terms = [dojo.cost.ResidualCost(residual, 1), dojo.cost.Effort(1e-3)]
 plan = dojo.ilqr(dojo.Problem(sim, sim.neutral(), 5, cost=terms))
 found["plan with a residual"] = [plan.nit, plan.fun, *plan.x.ravel()]
-for name in ("raiberthopper", "fourbar", "quadruped", "atlas"):
+for name in ("raiberthopper", "fourbar", "quadruped"):
     sim = dojo.Simulator(getattr(dojo.models, name)(), 0.02)
     r = sim.rollout(sim.neutral(), np.zeros((3, sim.nu)))
     A, B = sim.linearize(sim.neutral(), np.zeros(sim.nu), kappa=1e-3)

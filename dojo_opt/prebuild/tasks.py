@@ -274,10 +274,12 @@ def _environments(batches: bool) -> None:
             compile_functions(
                 task.observation, task.reward, task.terminated, task.survival_probability, batches=batches
             )
-            if batches and name == "QuadrotorWaypoint":  # the sweep of gradients
-                few: dict[str, Any] = {"epochs": 1, "environments": 2, "horizon": 2, "hidden": (4,)}
-                few |= {"evaluations": 1, "episodes": 1}
-                dojo.learn.shac(task, **few)
+
+
+def _policy_gradients() -> None:
+    """Rollouts of a policy, their gradient, and the fit of a critic: the same code for every task."""
+    few: dict[str, Any] = {"epochs": 1, "evaluations": 1, "episodes": 1}
+    dojo.learn.shac(dojo.learn.quadrotor(), environments=2, horizon=2, hidden=(4,), **few)
 
 
 def _mpc() -> None:
@@ -307,6 +309,7 @@ _BEYOND = {  # needed neither by the programs of README and guide nor by the mod
     "batches of environments": lambda: _environments(True),
 }
 _SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to compile for
+    "policy gradients": _policy_gradients,
     "hop": _hop,
     "joints": _joints,
     "grounds": _grounds,
@@ -324,7 +327,7 @@ _SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to co
 # -- tasks -------------------------------------------------------------------------------------------------------------
 
 
-ENVIRONMENTS = ("environments", "batches of environments")
+ENVIRONMENTS = ("environments", "batches of environments", "policy gradients")
 
 
 def _kernels() -> dict[str, OptionalKernel]:

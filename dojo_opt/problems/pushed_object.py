@@ -10,6 +10,7 @@ import numpy as np
 from dojo_opt.gaits.minimum_jerk import minimum_jerk
 from sim.mechanism.body import Body
 from sim.mechanism.shapes import Solid, Stance, rotation_matrices
+from sim.mechanism.short_repr import short_repr
 from sim.simulator.kinematics import Kinematics
 from solvers.types import Floats
 
@@ -37,6 +38,8 @@ class PushedObject:
     body: Body
     way: Floats
     shares: Floats
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, body: Any, way: Floats, horizon: int) -> PushedObject:

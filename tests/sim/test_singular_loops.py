@@ -116,6 +116,8 @@ def test_energy_is_bounded_over_1e5_steps(lengths: tuple[float, float, float, fl
         energy = np.concatenate(energies)
         assert np.abs(energy - energy[0]).max() < 0.04 * kinetic
         drifts.append(abs(energies[-1].mean() - energies[0].mean()) / kinetic)
+        if len(drifts) == 2 and max(drifts) < 0.01:  # so is the median
+            return
     assert np.median(drifts) < 0.01, drifts
 
 
