@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -115,6 +115,7 @@ class MPC:
         if self.settings.adapt is not None:
             most = np.inf if self.settings.friction is None else self.settings.friction
             self.estimator = ParameterEstimator(self.nominal, self.sim, self.settings.adapt, most)
+            _check_points(self.problem, self.estimator.space.labels)
         shear = 0.0 if self.settings.adapt is None else self.settings.adapt.shear
         self._shear = FootShear(self.sim, shear) if shear else None
         self.reset()
@@ -414,3 +415,14 @@ def _near(there: Iterate, guess: Iterate) -> bool:
 def _another(problem: Problem, iterations: int, *, reference: Any, **arguments: Any) -> MPC:
     """A controller whose reference is its own."""
     return MPC(problem, iterations, reference=own_reference(reference), **arguments)
+
+
+def _check_points(problem: Problem, labels: Sequence[str]) -> None:
+    """Refuse centres of mass that would move away from points of terms, which are measured from them."""
+    moving = {label.partition(":")[2].partition("[")[0]: label for label in labels if label.startswith("com:")}
+    for term in (*problem.costs, *problem.constraints):
+        body = None if term.point_body is None else problem.sim.mechanism.body_names[term.point_body]
+        if body in moving:
+            raise ValueError(
+                f"MPC(adapt=...): {moving[body]!r} moves the centre of mass from which a {term.name} measures its place"
+            )

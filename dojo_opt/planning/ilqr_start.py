@@ -12,7 +12,8 @@ from dojo_opt.planning.options import Stage
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.task_space.task_term import PeriodicTaskTerm
 from dojo_opt.planning.term import PeriodicTerm
-from sim.mechanism.stance import gaps
+from sim.mechanism.shapes import rotation_matrices
+from sim.model.state_columns import BodyState
 from sim.simulator.horizon import Horizon
 from sim.simulator.simulator import Simulator
 from solvers.riccati import Quadratic, Regularization, backward, value_hessian, work_size
@@ -37,11 +38,17 @@ def only_stops(sim: Simulator, xs: Floats) -> bool:
     a joint that rests there away, and the plan has to follow it back from stage to stage.
     """
     mech = sim.mechanism
-    stops = any(np.isfinite(np.asarray(joint.limits, dtype=np.float64)).any() for joint in mech.joints if joint.limits)
+    limits = [np.asarray(joint.limits, dtype=np.float64) for joint in mech.joints if joint.limits]
+    stops = any(np.isfinite(pair).any() for pair in limits)
     if not stops or mech.collisions or any(np.any(joint.friction) for joint in mech.joints):
         return False
-    some = xs[:: -(-len(xs) // _LOOKS)]
-    return all(float(gaps(mech, x[: sim.nq]).min(initial=np.inf)) > _NEAR for x in some)
+    bodies = sim.maximal(xs[:: -(-len(xs) // _LOOKS)])
+    for contact in mech.contacts:
+        z = bodies[:, mech.body_names.index(contact.body)]
+        at = z[:, :3] + rotation_matrices(z[:, BodyState.QUATERNION]) @ np.asarray(contact.point)
+        if np.any(contact.gap(at) <= _NEAR):
+            return False
+    return True
 
 
 def fitting_stage(horizon: Horizon, now: Iterate, stages: tuple[Stage, ...], least: int = 0) -> tuple[int, Any]:

@@ -46,6 +46,8 @@ class Term:
     A cost keeps its weights; of a constraint, slope is the multiplier and weight half the penalty.
     """
 
+    point_body: int | None = None  # body on which it has a point other than the centre of mass
+
     def __init__(self, name: str, knots: Integers, weight: Matrix, one_sided: bool = False) -> None:
         self.name = name
         self.knots = knots

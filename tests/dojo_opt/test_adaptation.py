@@ -231,6 +231,23 @@ def test_parameters_that_cannot_change_are_refused_at_once(settings, spread, wor
         dojo.MPC(problem, adapt=dojo.Adaptation(tuple(spread), spread=spread))
 
 
+def test_centers_of_mass_away_from_which_a_term_has_a_point_do_not_adapt():
+    """The model moves, and the point of the term would stay where it was from its centre of mass."""
+    link = dojo.Body("link", 1.0, shape=dojo.Capsule(0.05, 0.4))
+    hinge = dojo.Joint("revolute", "world", "link", "hinge", child_point=(0.0, 0.0, 0.2), axis=(0.0, 1.0, 0.0))
+    sim = dojo.Simulator(dojo.Mechanism([link], [hinge]), time_step=0.05)
+    spread = {"com:link[2]": 0.02}
+    adapt = dojo.Adaptation(tuple(spread), spread=spread)
+    for offset, refused in ((0.0, False), (0.1, True)):
+        terms = [dojo.cost.Effort(1.0), dojo.cost.Point("link", (0.0, 0.0, 0.0), (0.0, 0.0, offset))]
+        problem = dojo.Problem(sim, np.zeros(2), 3, cost=terms)
+        if refused:
+            with pytest.raises(ValueError, match=r"MPC\(adapt=...\): 'com:link\[2\]' moves .* a Point measures"):
+                dojo.MPC(problem, adapt=adapt)
+        else:
+            dojo.MPC(problem, adapt=adapt)
+
+
 def test_only_an_adaptation_adapts():
     with pytest.raises(TypeError, match="Adaptation"):
         dojo.tasks.free_gait_mpc(adapt=("mass:trunk",))

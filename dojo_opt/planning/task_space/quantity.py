@@ -21,6 +21,8 @@ class Quantity:
         kappa: central-path parameter at which forces are taken; None for that of the simulator.
     """
 
+    point_body: int | None = None  # body on which it has a point other than the centre of mass
+
     def __init__(
         self, sim: Simulator, knots: Integers, names: Sequence[str], groups: Mapping[str, Sequence[int]]
     ) -> None:
@@ -51,7 +53,7 @@ class FramePoses(Quantity):
     def __init__(self, sim: Simulator, knots: Integers, frame: tuple[int, Vector], aims: Matrix) -> None:
         groups = {"place": (0, 1, 2), "orientation": (3, 4, 5)}
         super().__init__(sim, knots, ("x", "y", "z", "rx", "ry", "rz"), groups)
-        self._frame = (*frame, aims)
+        self._frame, self.point_body = (*frame, aims), _body_of(frame)
 
     def fill(self, xs: Matrix, us: Matrix, *, derivatives: bool) -> None:
         self.space.frame_poses(xs, us, self._frame, self.buffers, derivatives=derivatives)
@@ -63,7 +65,7 @@ class FrameVelocities(Quantity):
     def __init__(self, sim: Simulator, knots: Integers, frame: tuple[int, Vector]) -> None:
         groups = {"linear": (0, 1, 2), "angular": (3, 4, 5)}
         super().__init__(sim, knots, ("x", "y", "z", "rx", "ry", "rz"), groups)
-        self._frame = frame
+        self._frame, self.point_body = frame, _body_of(frame)
 
     def fill(self, xs: Matrix, us: Matrix, *, derivatives: bool) -> None:
         self.space.frame_velocities(xs, us, self._frame, self.buffers, derivatives=derivatives)
@@ -165,3 +167,9 @@ class FrictionReserves(Quantity):
             J = self._forces.buffers.jacobians.reshape(m, n, 3, -1)
             slope = np.stack([np.broadcast_to(-self._bound, (m, n)), f[..., 1] / size, f[..., 2] / size], axis=-1)
             self.buffers.put(np.einsum("mnk,mnkz->mnz", slope, J))
+
+
+def _body_of(frame: tuple[int, Vector]) -> int | None:
+    """The body of a frame, None where its origin is the centre of mass."""
+    body, place = frame
+    return body if place[:3].any() else None

@@ -28,7 +28,7 @@ class TaskTerm(Term):
         self, name: str, quantity: Quantity, entries: Entries, weight: Matrix, *, one_sided: bool = False
     ) -> None:
         super().__init__(name, quantity.knots, weight, one_sided)
-        self._quantity, self._entries = quantity, entries
+        self._quantity, self._entries, self.point_body = quantity, entries, quantity.point_body
 
     def entry_name(self, sim: Simulator, entry: int) -> str:
         return self._quantity.names[self._entries.entry[entry]]
@@ -59,6 +59,7 @@ class PeriodicTaskTerm(Term):
     def __init__(self, name: str, quantity: Quantity, entries: Integers, shift: Matrix, weight: Matrix) -> None:
         super().__init__(name, quantity.knots[-1:], weight)
         self._quantity, self._entries, self._shift = quantity, entries, shift
+        self.point_body = quantity.point_body
 
     def entry_name(self, sim: Simulator, entry: int) -> str:
         return self._quantity.names[self._entries[entry]]
