@@ -11,6 +11,7 @@ from sim.mechanism.body import Body
 from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.joint_coordinates import coordinate_limits, joint_places
+from sim.mechanism.pose import Pose
 from solvers.types import Floats, Integers
 
 __all__ = ["CARRIES", "rising_bases"]
@@ -29,13 +30,15 @@ def rising_bases(joints: Sequence[Joint], bodies: Sequence[Body], q: Floats) -> 
     Yields:
         Name of the body, places (n,) in q of the coordinates that move it, and their rates per metre (n,).
     """
-    at = body_poses(joints, q)
+    at: dict[str, Pose] = {}  # only for bases on others, as poses take a millisecond, and controllers ask in every tick
     frames = {WORLD}  # the world, and bodies without mass between it and a base
     light = {body.name for body in bodies if body.mass == 0.0}
     limits = coordinate_limits(joints)
     for joint, place, _ in joint_places(joints):
         if joint.parent not in frames:
             continue
+        if joint.parent != WORLD:
+            at = at or body_poses(joints, q)
         climb = upward_rates(joint, at[joint.parent].rotation if joint.parent in at else np.eye(3))
         moving = place.start + np.flatnonzero(climb)
         if not len(moving) or np.isfinite([bound[moving] for bound in limits]).any():
