@@ -90,9 +90,8 @@ def replay(plan: Any) -> list[Cell]:
     shot = plan.replay(time_step=short)
     if not shot.success:
         return [f"{shot.status.name} at knot {shot.solved_knots}", *[None] * 5]
-    fine = plan.simulator.replace(time_step=short, kappa=plan.simulator.kappa / PARTS)  # that of the replay
     held = np.repeat(shot.u[:, None], PARTS * plan.substeps, axis=1)
-    knots = [fine.rollout(x, us).contacts for x, us in zip(shot.x[:-1], held, strict=True)]
+    knots = [shot.simulator.rollout(x, us).contacts for x, us in zip(shot.x[:-1], held, strict=True)]
     loaded = np.concatenate([c.normal_force for c in knots]) > 1.0
     slid = float((np.concatenate([c.slip for c in knots]) * loaded).sum() * short)
     lift = max(float(c.gap.min(axis=1).max()) for c in knots)

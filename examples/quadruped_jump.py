@@ -15,9 +15,8 @@ import dojo_opt as dojo
 problem = dojo.problems.jump(distance=0.3, height=0.2, guess="reference" if QUICK else "standing")
 plan = dojo.ilqr(problem, verbose=True)
 
-step, kappa = problem.knot_time / 20, 1e-8
-replay = plan.replay(time_step=step, kappa=kappa)
-fine = problem.sim.replace(time_step=step, kappa=kappa)
+replay = plan.replay(time_step=problem.knot_time / 20, kappa=1e-8)
+fine = replay.simulator
 motion = [fine.rollout(x, np.tile(u, (20, 1))).contacts for x, u in zip(replay.x[:-1], replay.u, strict=True)]
 clearance = max(contacts.gap.min(axis=1).max() for contacts in motion)  # of the lowest foot, in the air
 landed = replay.x[-1, 0] - replay.x[0, 0]

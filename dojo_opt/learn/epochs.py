@@ -88,12 +88,9 @@ def _run_epochs(search: Any, resume: Learned | None) -> Learned:
     if not np.isfinite(search.best):
         search.assess()
     status = Status.SOLVED if success else status
-    message = progress.message(status)
-    if success and search.chosen_at == 0:
-        message = _UNTRAINED
     if not np.isfinite(search.best):  # a reward that is no number is none to learn from
         success, status = False, Status.NOT_FINITE
-        message = progress.message(status)
+    message = _UNTRAINED if success and search.chosen_at == 0 else progress.message(status)
     return Learned(
         search.chosen, success, status, message, name, search.seed, search.best, search.steps,
         search.unsolved, search.infinite, progress.seconds, progress.records, state,

@@ -1,10 +1,9 @@
 """Tasks of Gymnasium, version 5: its models, observations, rewards, ends and limits, in this simulator.
 
 The models are the MJCF files in Gymnasium's own package, without the margins of their geoms, into which soft contact
-sinks. Ground and limits of joints are hard here: a random first
-state below the ground is lifted onto it, and joints beyond their limits are as far within them. Ant and humanoid
-observe forces of contacts, and pay for them, only where they are asked to: these forces are those of contacts with the
-ground, in the last time step of an action.
+sinks. Ground and limits of joints are hard here: a random first state below the ground is lifted onto it, and joints
+beyond their limits are as far within them. Ant and humanoid observe forces of contacts, and pay for them, only where
+they are asked to: these forces are those of contacts with the ground, in the last time step of an action.
 """
 
 from __future__ import annotations

@@ -294,18 +294,13 @@ class Solver:
         duals: the multipliers and penalties that each begins with, if not those of the options.
         """
         guess = self.now
-        kappas = [f"{stage.kappa_eval:.0e}" for stage in self.options.stages]
         ends: list[_Attempt] = []
         for first in self._first_stages():
             if ends:
-                self._history.note(f"{ends[-1].status.name}; restart from the guess at k_eval {kappas[first]}")
+                kappa = self.options.stages[first].kappa_eval
+                self._history.note(f"{ends[-1].status.name}; restart from the guess at k_eval {kappa:.0e}")
                 self.reset(*duals)
                 self._begin(guess)
-            elif first:
-                skipped = ", ".join(kappas[:first])
-                stops = only_stops(self.problem.sim, guess.x)
-                why = "is far from any contact" if stops else f"fits {kappas[first]} best"
-                self._history.note(f"k_eval {skipped} skipped: the guess of states {why}")
             status = self._descend(first)
             ends.append(self._ended(status))
             if status not in FAILED or ends[-1].mismatch <= self.options.violation_tolerance:
@@ -333,10 +328,14 @@ class Solver:
             return [0]
         if at_rest(self.problem.sim, self.objective, now):
             return list(range(len(stages)))
-        least = len(stages) - 1 if only_stops(self.problem.sim, now.x) else 0
-        first, linear = fitting_stage(self._horizon, now, stages, least)
+        stops = only_stops(self.problem.sim, now.x)
+        first, linear = fitting_stage(self._horizon, now, stages, len(stages) - 1 if stops else 0)
         if linear is not None:
             self._open_gaps(stages[first], linear)
+        if first:
+            *skipped, fitting = (f"{stage.kappa_eval:.0e}" for stage in stages[: first + 1])
+            why = "is far from any contact" if stops else f"fits {fitting} best"
+            self._history.note(f"k_eval {', '.join(skipped)} skipped: the guess of states {why}")
         return [first, *range(first)]
 
     # ---- an attempt: stages from smooth to hard ---------------------------------------------------------------------

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from sim.mechanism.axes import translation_axes
 from sim.mechanism.forward_kinematics import body_poses
-from sim.mechanism.joint import WORLD, Joint
+from sim.mechanism.joint import Joint
 from sim.mechanism.mechanism import Mechanism
-from sim.mechanism.shapes import HalfSpace, rotation_matrix
+from sim.mechanism.shapes import rotation_matrix
+from sim.mechanism.stance import collisions_with_ground
 from sim.mechanism.terrain import Terrain
 from solvers.compiler import kernel
 from solvers.types import Cube, Floats, Matrix, Vector
@@ -121,11 +122,10 @@ def _floor(mechanism: Mechanism) -> _Floor | None:
     for c in mechanism.contacts:
         if c.terrain is not None or np.asarray(c.normal)[2] > _FLOOR:
             return _Floor(np.asarray(c.normal), c.height, c.terrain)
-    for plane in (c.shape_b for c in mechanism.collisions if c.b == WORLD):
-        if isinstance(plane, HalfSpace):
-            normal = rotation_matrix(plane.orientation)[:, 2]
-            if normal[2] > _FLOOR:
-                return _Floor(normal, float(normal @ _numbers(plane.center)))
+    for _, plane in collisions_with_ground(mechanism):
+        normal = rotation_matrix(plane.orientation)[:, 2]
+        if normal[2] > _FLOOR:
+            return _Floor(normal, float(normal @ _numbers(plane.center)))
     return None
 
 

@@ -11,7 +11,7 @@ from sim.mechanism.body import Body
 from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.joint import WORLD, Joint
 from sim.mechanism.joint_coordinates import coordinate_limits, joint_places
-from sim.mechanism.pose import Pose
+from sim.mechanism.pose import HERE, Pose
 from solvers.types import Floats, Integers
 
 __all__ = ["CARRIES", "rising_bases"]
@@ -39,7 +39,7 @@ def rising_bases(joints: Sequence[Joint], bodies: Sequence[Body], q: Floats) -> 
             continue
         if joint.parent != WORLD:
             at = at or body_poses(joints, q)
-        climb = upward_rates(joint, at[joint.parent].rotation if joint.parent in at else np.eye(3))
+        climb = upward_rates(joint, at.get(joint.parent, HERE).rotation)
         moving = place.start + np.flatnonzero(climb)
         if not len(moving) or np.isfinite([bound[moving] for bound in limits]).any():
             frames |= light & {joint.child}

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from sim.mechanism.collision import Collision
 from sim.mechanism.forward_kinematics import body_poses
 from sim.mechanism.joint import WORLD
 from sim.mechanism.mechanism import Mechanism
@@ -30,9 +33,14 @@ def gaps(mech: Mechanism, q: Floats) -> Floats:
     return np.array([float(c.gap(at[c.body].at(c.point))) for c in mech.contacts], dtype=np.float64)
 
 
+def collisions_with_ground(mech: Mechanism) -> Iterator[tuple[Collision, HalfSpace]]:
+    """Collisions of bodies with half-spaces of the world, and these."""
+    return ((c, c.shape_b) for c in mech.collisions if c.b == WORLD and isinstance(c.shape_b, HalfSpace))
+
+
 def plane_heights(mech: Mechanism, q: Floats) -> list[tuple[float, float]]:
     """(distance [m], upward part of the normal) of every shape of a body from a half-space of the world."""
-    on_planes = [(c, c.shape_b) for c in mech.collisions if c.b == WORLD and isinstance(c.shape_b, HalfSpace)]
+    on_planes = list(collisions_with_ground(mech))
     if not on_planes:
         return []
     at = body_poses(mech.joints, q)
@@ -75,7 +83,6 @@ def lifted(mech: Mechanism, base: str, *, down: bool = True) -> Floats:
 def penetrations(mech: Mechanism) -> list[str]:
     """Contacts, and collisions with half-spaces of the world, that start inside of the ground, with their depths."""
     q = np.asarray(mech.neutral, dtype=np.float64)
-    on_planes = [c.name for c in mech.collisions if c.b == WORLD and isinstance(c.shape_b, HalfSpace)]
     distances = [*gaps(mech, q), *(gap for gap, _ in plane_heights(mech, q))]
-    names = [*(c.name for c in mech.contacts), *on_planes]
+    names = [*(c.name for c in mech.contacts), *(c.name for c, _ in collisions_with_ground(mech))]
     return [f"{name} ({-gap:.3g} m)" for name, gap in zip(names, distances, strict=True) if gap < -_SUNK]

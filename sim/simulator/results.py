@@ -346,7 +346,8 @@ class FeedbackRollout(Result):
         solved_knots: number of solved knots.
         residual: largest error of an equation in the last step that was tried [N s, m].
         detail: sentence about an unsolved step, with its numbers.
-        simulator: the Simulator that made it, with the kappa of the call.
+        made_by: the Simulator that made it.
+        kappa: central-path parameter of the call [N s m]; None for that of `made_by`.
         substeps: number of its time steps per knot.
         wrenches: (T, nbody, 6) external wrenches [N, N m]; None without any.
     """
@@ -357,17 +358,23 @@ class FeedbackRollout(Result):
     solved_knots: int
     residual: float
     detail: str = ""
-    simulator: Any = field(default=None, repr=False)
+    made_by: Any = field(default=None, repr=False)
+    kappa: float | None = None
     substeps: int = 1
     wrenches: Floats | None = None
     knot = renamed("solved_knots")
 
     __repr__ = short_repr
 
+    @cached_property
+    def simulator(self) -> Any:
+        """The Simulator that made it, with the kappa of the call; made when asked for, which takes milliseconds."""
+        return self.made_by if self.kappa is None else self.made_by.replace(kappa=self.kappa)
+
     @property
     def time(self) -> Floats:
         """(T + 1,) times of the knots [s]."""
-        return self.simulator.time_step * self.substeps * np.arange(float(len(self.x)))
+        return self.made_by.time_step * self.substeps * np.arange(float(len(self.x)))
 
     @classmethod
     def of(cls, found: tuple[int, Path], **made_with: Any) -> FeedbackRollout:
@@ -375,7 +382,7 @@ class FeedbackRollout(Result):
 
         Args:
             found: (number of solved knots, all of them).
-            **made_with: simulator, substeps, wrenches.
+            **made_with: made_by, kappa, substeps, wrenches.
 
         Returns:
             The result.

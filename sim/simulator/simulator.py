@@ -346,8 +346,7 @@ class Simulator(StateSpace):
         policy = self._arguments.policy(name, state, inputs, external, (xs, ks, Ks, gaps))
         count, level = whole_number(f"{name}(substeps=...)", substeps), self._arguments.kappa(call, kappa)
         roll = partial(self._engine.roll_feedback, state, policy, factor, bounds, count, level)
-        sim = self if level is None else self.replace(kappa=level)
-        made = partial(FeedbackRollout.of, simulator=sim, substeps=count, wrenches=external)
+        made = partial(FeedbackRollout.of, made_by=self, kappa=level, substeps=count, wrenches=external)
         return checked(converted(roll, made), throw)
 
     closed_loop = renamed("rollout_feedback")

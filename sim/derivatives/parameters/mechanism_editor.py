@@ -32,9 +32,7 @@ class Draft:
         self.gears = {g.name: g for g in mech.gears}
         self.inputs = {i.name: i for i in mech.inputs or ()}
         self.gravity = np.array(mech.gravity, dtype=np.float64)
-        self.report: Any = getattr(
-            mech, "report", None
-        )  # of the file that it was loaded from, with frames of its parts
+        self.report: Any = getattr(mech, "report", None)  # of the file, with frames of its parts
 
     def change(self, kind: str, part: str, entries: Entries) -> None:
         """Give one number, or some components of a vector, their values."""
