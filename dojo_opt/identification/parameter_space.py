@@ -19,7 +19,15 @@ Chart = Callable[[Floats], tuple[Floats, Floats]]  # coordinates -> values of pa
 
 _VECTORS = ("orientation", "axis", "contact_normal")  # whose derivatives are those from where they have come to
 _NOT_NEGATIVE = ("spring", "damper", "armature", "contact_radius")
-_POSITIVE = ("mass", "time_step", "size_a", "size_b", "friction")  # a contact without friction is another law
+_POSITIVE = (
+    "mass",
+    "time_step",
+    "size_a",
+    "size_b",
+    "friction",
+    "torsional_friction",
+    "rolling_friction",
+)  # a contact without friction is another law
 _SMALL = 1e-3  # least scale of a value
 _LEAST = 1e-6  # of the value: where positive parameters end
 

@@ -18,7 +18,7 @@ from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory_limit import check_room
 from sim.mechanism.short_repr import short_table
-from sim.simulator.engines.engine import CONTACT
+from sim.model.record_columns import ContactRow
 from sim.simulator.results import Contacts, Interrupted, contacts_of
 from sim.simulator.simulator import Simulator
 from solvers.status import MESSAGES, Status
@@ -238,7 +238,9 @@ def _closed_loop(run: _LoopRecord, controller: Controller, plant: Plant, referen
         contacts=contacts_of(
             plant.simulator.mechanism,
             plant.simulator.time_step,
-            np.array(run.contacts[:count]).reshape(count, plant.simulator.ncontact, CONTACT),
+            np.array(run.contacts[:count])
+            if count
+            else np.zeros((0, plant.simulator.ncontact, int(ContactRow.MOMENT))),
         ),
         survived=run.survived,
         message=" ".join([run.message, *_first(run.reservations)]),

@@ -36,6 +36,7 @@ from sim.contact.ground_contact import (
     contact_rate,
 )
 from sim.contact.inactive_impulses import add_inactive_wrenches, update_inactive
+from sim.contact.moments.contact_moments import moment_constants, moment_error
 from sim.contact.pairs.pair_jacobian import pair_rate
 from sim.contact.pairs.pair_stiffness import pair_constants
 from sim.contact.terrain_contact import add_frame_matrix
@@ -170,6 +171,7 @@ def contact_constants(model: Model, data: Data, target: NewtonTarget) -> None:
         w = data.contact_w[c]
         add_contact_wrench(model, data, c, w[0], w[1], w[2], data.wrench)
     pair_constants(model, data, target)
+    moment_constants(model, data)
     subtree_sums(model, data.wrench, data.subtree)
     for d in range(data.dnu.shape[0]):
         data.dnu[d] -= dot_six(data.S2[d], data.subtree[model.dof_body[d]])
@@ -252,8 +254,8 @@ def contacts_boundary(model: Model, data: Data) -> float:
 
 @optional(Slot.SLIP_ERROR, default=0.0)
 def slip_error(model: Model, data: Data, kappa: float) -> float:
-    """Largest violation of the friction law of the central path of kappa, in units of kappa."""
+    """Largest violation of the friction laws of the central path of kappa, in units of kappa."""
     e = 0.0
     for m in range(data.active_count[0]):
         e = max(e, slip_violation(model, data, data.active[m], kappa))
-    return e
+    return max(e, moment_error(model, data, kappa))

@@ -38,8 +38,12 @@ def cone_slip(b0: float, x: float, y: float, kappa: float) -> tuple[float, float
 def start_cone(model: Model, data: Data, c: int, kappa: float) -> None:
     """beta on the central path of kappa at the present slip and normal impulse."""
     z = data.cone[c]
-    k = data.contact_kin[c]
-    b0 = model.contact_friction[c] * z[Cone.IMPULSE]
+    put_on_path(z, data.contact_kin[c], model.contact_friction[c] * z[Cone.IMPULSE], kappa)
+
+
+@kernel
+def put_on_path(z: Vector, k: Vector, b0: float, kappa: float) -> None:
+    """beta in z on the central path of kappa at the slip in k and the bound b0."""
     psi, _ = cone_slip(b0, k[Kin.SLIP1], k[Kin.SLIP2], kappa)
     z[Cone.FRICTION1] = -b0 * k[Kin.SLIP1] / psi
     z[Cone.FRICTION2] = -b0 * k[Kin.SLIP2] / psi
@@ -49,8 +53,12 @@ def start_cone(model: Model, data: Data, c: int, kappa: float) -> None:
 def cone_violation(model: Model, data: Data, c: int, kappa: float) -> float:
     """|mu gamma v_t + psi beta|, in units of kappa."""
     z = data.cone[c]
-    k = data.contact_kin[c]
-    b0 = model.contact_friction[c] * z[Cone.IMPULSE]
+    return distance_from_path(z, data.contact_kin[c], model.contact_friction[c] * z[Cone.IMPULSE], kappa)
+
+
+@kernel
+def distance_from_path(z: Vector, k: Vector, b0: float, kappa: float) -> float:
+    """Largest component of |b0 v_t + psi beta|."""
     psi, _ = cone_slip(b0, k[Kin.SLIP1], k[Kin.SLIP2], kappa)
     return max(abs(b0 * k[Kin.SLIP1] + psi * z[Cone.FRICTION1]), abs(b0 * k[Kin.SLIP2] + psi * z[Cone.FRICTION2]))
 
@@ -71,19 +79,25 @@ def condense_cone(model: Model, data: Data, c: int, kappa: float, indefinite: fl
     Far from the solution the violation that the line search looks at, that of the first form, may grow along a step of
     the other.
     """
-    z = data.cone[c]
-    k = data.contact_kin[c]
     W = data.contact_W[c]
     q = data.contact_scale[c]
     mu = model.contact_friction[c]
-    b0 = mu * z[Cone.IMPULSE]
+    z = data.cone[c]
+    condense_bounded(z, data.contact_kin[c], mu * z[Cone.IMPULSE], kappa, indefinite, linear, W, q)
+    W[3] = mu * W[0] * q[ConeScale.GROWTH]
+    W[6] = mu * W[0] * q[ConeScale.GROWTH + 1]
+
+
+@kernel
+def condense_bounded(
+    z: Vector, k: Vector, b0: float, kappa: float, indefinite: float, linear: bool, W: Vector, q: Vector
+) -> None:
+    """d(beta)/d(slip) and d(beta)/d(b) in W and q: of the beta in z at the slip in k, with the bound b0."""
     room = b0 * b0 - z[Cone.FRICTION1] * z[Cone.FRICTION1] - z[Cone.FRICTION2] * z[Cone.FRICTION2]
     if linear and room > _INSIDE * b0 * b0:
         condense_sticking(z, k, b0, kappa, indefinite, W, q)
     else:
         condense_sliding(z, k, b0, kappa, indefinite, W, q)
-    W[3] = mu * W[0] * q[ConeScale.GROWTH]
-    W[6] = mu * W[0] * q[ConeScale.GROWTH + 1]
 
 
 @kernel

@@ -23,7 +23,7 @@ from sim.contact.softening import soften
 from sim.model.data import Data
 from sim.model.model import Law, Model
 from sim.model.options import LawForm, NewtonTarget
-from sim.model.record_columns import Bounce, Cone, ContactRow, Kin, Pyramid
+from sim.model.record_columns import Bounce, Cone, ContactRow, Kin, Moment, MomentRow, Pyramid
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.cones import onto_path, orthant_step, return_pair
@@ -124,7 +124,9 @@ def slip_violation(model: Model, data: Data, c: int, kappa: float) -> float:
 
 @optional(Slot.SLIP_NOISE, default=0.0)
 def slip_noise(model: Model, data: Data, h: float) -> float:
-    """Rounding of the friction laws: mu gamma times that of the slips, which are differences of positions over h."""
+    """Rounding of the friction laws: mu gamma times that of the slips, which are differences of positions over h; and
+    of angular velocities.
+    """
     e = 0.0
     for m in range(data.active_count[0]):
         c = data.active[m]
@@ -134,6 +136,9 @@ def slip_noise(model: Model, data: Data, h: float) -> float:
         length += abs(k[Kin.ARM]) + abs(k[Kin.ARM + 1]) + abs(k[Kin.ARM + 2])
         speed = length / h + abs(k[Kin.SLIP1]) + abs(k[Kin.SLIP2])
         e = max(e, 4e-16 * model.contact_friction[c] * data.cone[c, Cone.IMPULSE] * speed)
+        if model.moment_friction.shape[0] > 0:
+            most = max(model.moment_friction[c, MomentRow.SPIN], model.moment_friction[c, MomentRow.ROLL])
+            e = max(e, 4e-16 * most * data.cone[c, Cone.IMPULSE] * 2.0 / h)
     return e
 
 
@@ -160,7 +165,7 @@ def keep_in_cone(model: Model, data: Data, c: int) -> None:
 
 @kernel
 def scale_contact(model: Model, data: Data, c: int, ratio: float) -> None:
-    """Impulses of contact c, normal and along the ground, times a ratio."""
+    """Impulses of contact c, normal and along the ground, and its moments times a ratio."""
     z = data.cone[c]
     z[Cone.IMPULSE] *= ratio
     if law_of(model, c) == Law.LINEAR:
@@ -169,6 +174,8 @@ def scale_contact(model: Model, data: Data, c: int, ratio: float) -> None:
     else:
         z[Cone.FRICTION1] *= ratio
         z[Cone.FRICTION2] *= ratio
+    for k in range(Moment.SPIN, z.shape[0]):
+        z[k] *= ratio
 
 
 @kernel

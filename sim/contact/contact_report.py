@@ -7,6 +7,7 @@ from sim.contact.corners import report_corners
 from sim.contact.far_contacts import FAR
 from sim.contact.ground_contact import contact_kinematics
 from sim.contact.inactive import sunk_contact
+from sim.contact.moments.contact_moments import report_moments
 from sim.contact.pairs.pair_report import report_pairs
 from sim.model.data import Data
 from sim.model.model import Model
@@ -45,6 +46,7 @@ def report_contacts(model: Model, data: Data, h: float, out: Matrix) -> None:
     """
     report_ground(model, data, h, out)
     report_pairs(model, data, out)
+    report_moments(model, data, out)
 
 
 @optional(Slot.REPORT_CONTACTS)

@@ -84,6 +84,12 @@ def loaded_response(model: Model, data: Data, h: float, c: int, M: float) -> flo
 
 
 @kernel
+def hardness_part(data: Data, c: int) -> float:
+    """Factor of sqrt(M G) in d of contact c."""
+    return _PART if data.bounce[c, Bounce.RESTITUTION] == 0.0 else _PART_OF_IMPACTS
+
+
+@kernel
 def soften(model: Model, data: Data, h: float, c: int) -> None:
     """W of contact c becomes W'; its derivative by friction (contact_scale) changes with it; contact_hard: M W'.
 
@@ -91,7 +97,7 @@ def soften(model: Model, data: Data, h: float, c: int) -> None:
     """
     W = data.contact_W[c]
     M = contact_response(model, c)
-    part = _PART if data.bounce[c, Bounce.RESTITUTION] == 0.0 else _PART_OF_IMPACTS
+    part = hardness_part(data, c)
     hard = max(-h * W[0], -W[4], -W[8])
     if part * M * hard > 1.0 - 1e-12:
         d = part * sqrt(M * loaded_response(model, data, h, c, M))
@@ -100,13 +106,13 @@ def soften(model: Model, data: Data, h: float, c: int) -> None:
             if model.contact_law[c] == Law.LINEAR
             else data.contact_scale[c, ConeScale.GROWTH : ConeScale.RESIDUAL]
         )
-        _compose(W, q, h * d if -h * d * W[0] > 1.0 else 0.0, d if -d * min(W[4], W[8]) > 1.0 else 0.0)
+        compose(W, q, h * d if -h * d * W[0] > 1.0 else 0.0, d if -d * min(W[4], W[8]) > 1.0 else 0.0)
         hard = max(-h * W[0], -W[4], -W[8])
     data.contact_hard[0] = max(data.contact_hard[0], M * hard)
 
 
 @kernel
-def _compose(W: Vector, q: Vector, normal: float, along: float) -> None:
+def compose(W: Vector, q: Vector, normal: float, along: float) -> None:
     """W = (I - W D)^-1 W and q likewise, D = diag(normal, along, along); the normal impulse does not depend on slip."""
     n = 1.0 / (1.0 - W[0] * normal)
     a, b, c, d = 1.0 - W[4] * along, -W[5] * along, -W[7] * along, 1.0 - W[8] * along

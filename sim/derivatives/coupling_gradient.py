@@ -9,6 +9,7 @@ dR_dq pair by pair of joints.
 from __future__ import annotations
 
 from sim.contact.contact_law import contact_impulse
+from sim.contact.moments.contact_moments import add_moment_couplings
 from sim.contact.pairs.pair_contact import is_absent, pair_force
 from sim.contact.pairs.pair_stiffness import add_earlier_slip
 from sim.contact.pairs.wrench_columns import center_shift
@@ -43,6 +44,7 @@ def add_coupling_composites(model: Model, data: Data, h: float) -> None:
         add_earlier_slip(model, data, h, j, data.coupling_K2[2 * k : 2 * k + 2])
         n, t1, t2 = contact_impulse(model, data, model.contact_height.shape[0] + j)
         _take_back(model, data, k, pair_force(data, j, n, t1, t2))
+    add_moment_couplings(model, data, h)
     for m in range(nloop):
         k = first + m
         _take_back(model, data, k, loop_stiffness(model, data, m, data.coupling_K2[2 * k : 2 * k + 2]))

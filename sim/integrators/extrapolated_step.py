@@ -90,6 +90,8 @@ def raise_order(model: Model, data: Data, line: SubstepState, embedded: Embedded
     for c in range(line.slips.shape[0]):
         for k in range(ContactRow.POINT):
             other[c, k] += (one[c, k] + other[c, k] - whole[c, k]) / 3.0
+        for k in range(ContactRow.MOMENT, other.shape[1]):
+            other[c, k] += (one[c, k] + other[c, k] - whole[c, k]) / 3.0
     noise = NOISE if model.contact_body.shape[0] + model.limit_dof.shape[0] > 0 else CLOSED
     return max(0.5 * apart - noise, 0.0)
 

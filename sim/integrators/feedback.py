@@ -28,7 +28,7 @@ class FeedbackLaw(NamedTuple):
     gaps: Matrix  # (T + 1, ndx)  f(xs_t, us_t) (-) xs_t+1
     A: Cube  # (T, ndx, ndx) derivatives of the steps: where the next velocity is looked for
     B: Cube  # (T, ndx, nu)
-    cones: Cube  # (T, ncontact, 12) cone variables of the steps
+    cones: Cube  # (T, ncontact, 16) cone variables of the steps
     bounds: Cube  # (T, nlimit, 2)
 
 
@@ -43,7 +43,7 @@ class FeedbackRun(NamedTuple):
     low: Vector  # (nu,) limits of u
     high: Vector
     substeps: int  # steps of a knot
-    cones: Cube  # (T, ncontact, 12) cone variables of the steps, out; or empty
+    cones: Cube  # (T, ncontact, 16) cone variables of the steps, out; or empty
     bounds: Cube  # (T, nlimit, 2)
 
 
@@ -52,7 +52,7 @@ class Path(NamedTuple):
 
     xs: Matrix  # (T + 1, nx)
     us: Matrix  # (T, nu)
-    cones: Cube  # (T, ncontact, 12) or empty
+    cones: Cube  # (T, ncontact, 16) or empty
     bounds: Cube
     report: Vector  # (10,) of the last step, and the iterations of all, which are those of the report in the end; zeros
 

@@ -85,7 +85,7 @@ class RowTables(NamedTuple):
     models: Table  # (n, ...) tables of their Models
     scratch: Table  # (n, ...) tables of their Data; rows of one chunk may share one
     settings: Matrix  # (n, 10) of StepSetting, with one deadline
-    cones: Cube  # (n, ncontact, 12) cone variables that the last steps ended with, in and out; or empty
+    cones: Cube  # (n, ncontact, 16) cone variables that the last steps ended with, in and out; or empty
     bounds: Cube  # (n, nlimit, 2) of limits
     dry: Cube  # (n, ndry, 4) of dry friction
 

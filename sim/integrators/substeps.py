@@ -174,8 +174,10 @@ def add_contacts(line: SubstepState) -> None:
             for k in range(3):
                 out[k] += row[k]
                 out[ContactRow.POINT + k] += weight * (row[ContactRow.POINT + k] - out[ContactRow.POINT + k])
-            for k in range(ContactRow.GAP, out.shape[0]):
+            for k in range(ContactRow.GAP, ContactRow.MOMENT):
                 out[k] = row[k]
+            for k in range(ContactRow.MOMENT, out.shape[0]):
+                out[k] += row[k]
         one, other = line.parts[0, c, ContactRow.SLIP], line.parts[1, c, ContactRow.SLIP]
         line.slips[c] = max(0.0, 1.5 * other - 0.5 * one)
 
@@ -186,5 +188,5 @@ def rest_contacts(line: SubstepState) -> None:
     for c in range(line.contacts.shape[0]):
         line.slips[c] = UNKNOWN
         free = three(line.contacts[c], ContactRow.IMPULSE) == (0.0, 0.0, 0.0)
-        for k in range(ContactRow.POINT if free else ContactRow.GAP, line.contacts.shape[1]):
+        for k in range(ContactRow.POINT if free else ContactRow.GAP, ContactRow.MOMENT):
             line.contacts[c, k] = line.parts[0, c, k]

@@ -12,7 +12,7 @@ from sim.mechanism.body import Body
 from sim.mechanism.contact import LAWS
 from sim.mechanism.joint import WORLD
 from sim.mechanism.positional import few_positional
-from sim.mechanism.shapes import Solid, String
+from sim.mechanism.shapes import SURFACE_FIELDS, Solid, String
 
 
 @few_positional
@@ -41,6 +41,10 @@ class Collision:
         name: name of the collision (default "a-b").
         restitution: share of the normal velocity that an impact gives back, 0 to 1 (default None: the larger one of the
             two shapes, 0 where they have none).
+        torsional_friction: largest moment about the normal, over the normal force [m] (default None: the larger one of
+            the two shapes, 0 where they have none).
+        rolling_friction: largest moment across the normal, against rolling, over the normal force [m] (default None:
+            likewise).
         reach: gap beyond which the shapes do not act on one another [m]; below half of it, the contact law is
             unchanged. Shapes farther apart than twice the reach cost next to nothing, and their contacts have an
             infinite gap in results (default None: an impulse kappa/gap at every distance).
@@ -58,6 +62,8 @@ class Collision:
     law: str = "nonlinear"
     name: str = ""  # default: a-b
     restitution: float | None = None
+    torsional_friction: float | None = None  # [m]
+    rolling_friction: float | None = None  # [m]
     reach: float | None = None
 
     def __post_init__(self) -> None:
@@ -79,12 +85,14 @@ class Collision:
             shape = getattr(self, field)
             if shape is not None and not isinstance(shape, Solid):
                 raise ValueError(f"{call}, {field}=...): expected a shape, got {shape!r}")
-        if self.friction is not None:
-            friction = checks.number(f"{call}, friction=...)", self.friction, at_least=0.0)
-            object.__setattr__(self, "friction", friction)
+        for field in ("friction", "torsional_friction", "rolling_friction"):
+            value = getattr(self, field)
+            if value is not None:
+                object.__setattr__(self, field, checks.number(f"{call}, {field}=...)", value, at_least=0.0))
         checks.one_of(f"{call}, law=...)", self.law, LAWS)
         if self.restitution is not None:
             object.__setattr__(self, "restitution", checks.fraction(f"{call}, restitution=...)", self.restitution))
+        checks.no_rebound(call, self)
         if self.reach is not None:
             object.__setattr__(self, "reach", checks.number(f"{call}, reach=...)", self.reach, above=0.0))
             if isinstance(self.shape_a, String) or isinstance(self.shape_b, String):
@@ -114,9 +122,11 @@ def _single(collision: Collision, bodies: Mapping[str, Body]) -> list[Collision]
         if labels:
             given["name"] = f"{collision.name}.{'-'.join(labels)}"
         given |= {field: s for field, s, many in zip(("shape_a", "shape_b"), (a, b), several, strict=True) if many}
-        for field, usual in (("friction", 0.5), ("restitution", 0.0)):
+        for field in SURFACE_FIELDS:
             if getattr(collision, field) is None:
                 own = (getattr(shape, field) for shape in (a, b) if shape is not None)
-                given[field] = max((value for value in own if value is not None), default=usual)
+                given[field] = max(
+                    (value for value in own if value is not None), default=0.5 if field == "friction" else 0.0
+                )
         out.append(replace(collision, **given) if given else collision)
     return out

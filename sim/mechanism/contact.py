@@ -33,6 +33,9 @@ class Contact:
             (default None: the half-space).
         restitution: share of the normal velocity that an impact gives back, 0 to 1, see sim/contact/restitution.py
             (default 0).
+        torsional_friction: largest moment about the normal, over the normal force [m] (default 0: none;
+            docs/theory/interior_point.md).
+        rolling_friction: largest moment across the normal, against rolling, over the normal force [m] (default 0).
 
     Raises:
         ValueError: for a value of the wrong shape or out of range; the message names the contact.
@@ -49,18 +52,21 @@ class Contact:
     name: str = ""  # default: that of the body, numbered when it has several
     terrain: Terrain | None = None
     restitution: float = 0.0
+    torsional_friction: float = 0.0  # [m]
+    rolling_friction: float = 0.0  # [m]
 
     def __post_init__(self) -> None:
         checks.name("Contact(body=...)", self.body)
         call = f"Contact({checks.name_or('Contact(name=...)', self.name, self.body)!r}"
         object.__setattr__(self, "point", checks.vector(f"{call}, point=...)", self.point, 3))
-        for field in ("radius", "friction"):
+        for field in ("radius", "friction", "torsional_friction", "rolling_friction"):
             value = checks.number(f"{call}, {field}=...)", getattr(self, field), at_least=0.0)
             object.__setattr__(self, field, value)
         checks.one_of(f"{call}, law=...)", self.law, LAWS)
         object.__setattr__(self, "normal", checks.direction(f"{call}, normal=...)", self.normal))
         object.__setattr__(self, "height", checks.number(f"{call}, height=...)", self.height))
         object.__setattr__(self, "restitution", checks.fraction(f"{call}, restitution=...)", self.restitution))
+        checks.no_rebound(call, self)
         if self.terrain is not None:
             self._put_on(f"{call}, terrain=...)", self.terrain)
 

@@ -36,6 +36,7 @@ class ContactCandidate:
     friction: float
     law: str
     restitution: float
+    moment_friction: tuple[float, float]  # torsional and rolling [m]
     collision: str
     reach: float  # infinite where there is none
 
@@ -129,6 +130,7 @@ def _points(collision: Collision, kind: shape_kinds.Pair, ends: list[End]) -> li
             0.0 if rope else collision.friction or 0.0,
             "impact" if rope else collision.law,
             collision.restitution or 0.0,
+            (0.0, 0.0) if rope else _moment_friction(collision),
             collision.name,
             inf if collision.reach is None else collision.reach,
         )
@@ -156,7 +158,13 @@ def _corners(collision: Collision, solid: tuple[int, Polytope | SignedDistance],
     for k, point in enumerate(stance.points @ places[0, 3:].reshape(3, 3).T + places[0, :3]):
         where = places.copy()
         where[0, :3] = point
-        law = (collision.friction or 0.0, collision.law, collision.restitution or 0.0, collision.name)
+        law = (
+            collision.friction or 0.0,
+            collision.law,
+            collision.restitution or 0.0,
+            _moment_friction(collision),
+            collision.name,
+        )
         reach = inf if collision.reach is None else collision.reach
         out.append(
             ContactCandidate(
@@ -164,6 +172,11 @@ def _corners(collision: Collision, solid: tuple[int, Polytope | SignedDistance],
             )
         )
     return out
+
+
+def _moment_friction(collision: Collision) -> tuple[float, float]:
+    """Torsional and rolling friction [m]."""
+    return collision.torsional_friction or 0.0, collision.rolling_friction or 0.0
 
 
 def _place(shape: Solid) -> Floats:

@@ -280,7 +280,7 @@ class Mechanism:
             contacts: names of the contacts above it; all by default.
             bodies: names of bodies whose shapes touch it too, by balls and corners that are added as contacts
                 (shape_contacts.py).
-            **options: friction, law, restitution of the added contacts.
+            **options: friction, law, restitution, torsional_friction, rolling_friction of the added contacts.
 
         Returns:
             The new mechanism.
@@ -321,7 +321,7 @@ class Mechanism:
             shape: the obstacle, placed in world axes by its centre and orientation.
             bodies: names of bodies, all of whose shapes touch it; by default the balls of the contacts touch it.
             name: prefix of the names of the collisions.
-            **options: friction, law, restitution of Collision.
+            **options: friction, law, restitution, torsional_friction, rolling_friction of Collision.
 
         Returns:
             The new mechanism.

@@ -45,8 +45,15 @@ def mechanism_sizes(mech: Mechanism) -> Sizes:
         ngear=len(mech.gears),
         nterrain=len(fields),
         nheight=sum(f.coefficients.size for f in fields),
+        nmoment=len(mech.contacts) + npair if has_moments(mech) else 0,
         ndry=sum(int(np.count_nonzero(j.friction)) for j in mech.joints) + len(limited_servos(mech.inputs or ())),
     )
+
+
+def has_moments(mech: Mechanism) -> bool:
+    """Whether a contact has torsional or rolling friction."""
+    found = any(contact.torsional_friction or contact.rolling_friction for contact in mech.contacts)
+    return found or any(any(candidate.moment_friction) for candidate in mech.contact_candidates)
 
 
 def pack(mech: Mechanism) -> Model:
@@ -209,6 +216,8 @@ def _pack_contacts(mech: Mechanism, model: Model) -> None:
         model.contact_radius[c] = contact.radius
         model.contact_friction[c] = contact.friction
         model.contact_restitution[c] = contact.restitution
+        if len(model.moment_friction):
+            model.moment_friction[c] = contact.torsional_friction, contact.rolling_friction
         model.contact_frame[c] = contact_frame(contact.normal).ravel()
         model.contact_height[c] = contact.height
     if mech.contacts:

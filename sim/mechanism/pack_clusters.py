@@ -36,9 +36,12 @@ def pack_clusters(model: Model) -> None:
         friction = model.contact_friction[first:end].max()
         model.cluster_end[first] = end
         turn = float(_swings(inertia, points.mean(axis=0, keepdims=True))[0]) * easy
-        several = np.count_nonzero(model.contact_body[:count] == body)
+        several = float(np.count_nonzero(model.contact_body[:count] == body))
         others = radii.any() or model.contact_terrain[first] or np.any(model.contact_law[first:end] == _LINEAR)
         corners = end - first > MANY and not others
+        if len(model.moment_friction) and model.moment_friction[first:end].any():
+            mobility = turn = several = np.inf  # always active: inactive contacts have no moments
+            corners = False
         model.cluster[first] = *center, around, arm, mobility, friction, turn, several, corners
 
 

@@ -25,6 +25,8 @@ def pack_collisions(mech: Mechanism, model: Model) -> None:
         model.contact_law[c] = Law[candidate.law.upper()] if candidate.friction > 0.0 else Law.IMPACT
         model.contact_friction[c] = candidate.friction
         model.contact_restitution[c] = candidate.restitution
+        if len(model.moment_friction):
+            model.moment_friction[c] = candidate.moment_friction
         model.pair_coupling[j] = bodies.index(candidate.bodies)
         model.pair_kind[j], model.pair_feature[j] = candidate.kind, candidate.feature
         model.pair_sizes[j] = candidate.sizes
@@ -56,7 +58,9 @@ def _pack_far(found: Sequence[ContactCandidate], model: Model) -> None:
             mobility += 1.0 / model.body_mass[i] + arm**2 / least if free else np.inf
             turning += arm / least if free else np.inf
             model.body_reach[i] = max(model.body_reach[i], arm)
-        most = max(degree[i] for i in candidate.bodies if i >= 0)
+        most: float = max(degree[i] for i in candidate.bodies if i >= 0)
+        if any(candidate.moment_friction):
+            most = np.inf  # always active within its reach: inactive_pairs.py has no moments
         model.pair_bound[j] = sum(candidate.radii), *arms, mobility, turning, most, end - j, candidate.reach
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from sim.mechanism.body import Body
 from sim.mechanism.contact import Contact
+from sim.mechanism.shapes import SURFACE_FIELDS
 
 
 def shape_contacts(call: str, body: Body, **options: Any) -> list[Contact]:
@@ -27,7 +28,7 @@ def shape_contacts(call: str, body: Body, **options: Any) -> list[Contact]:
         if stance is None:
             raise ValueError(f"{call}: body {body.name!r} has the shape {type(shape).__name__}; {_EXPECTED}")
         label = body.name if len(body.shapes) == 1 else f"{body.name}.{shape.name or number}"
-        own = {field: getattr(shape, field) for field in ("friction", "restitution")}
+        own = {field: getattr(shape, field) for field in SURFACE_FIELDS}
         settings = {field: value for field, value in own.items() if value is not None} | options
         for k, point in enumerate(shape.place(stance.points)):
             name = f"{label}_{stance.part}{k}" if len(stance.points) > 1 else f"{label}_{stance.part}"

@@ -69,6 +69,7 @@ def _around() -> tuple[Floats, Floats]:
 
 
 RING, BALL = _around()
+SURFACE_FIELDS = ("friction", "restitution", "torsional_friction", "rolling_friction")  # of contacts, and of shapes
 PLATE = 0.002  # thickness of a drawn plane [m]
 
 
@@ -82,6 +83,8 @@ class Solid:
         friction: coefficient of contacts and collisions of this shape that have none of their own; of two shapes the
             larger one (default None: that of the contact or collision).
         restitution: likewise, their restitution.
+        torsional_friction: likewise, their torsional friction [m].
+        rolling_friction: likewise, their rolling friction [m].
         name: name in those of its contacts, where its body has several shapes (default its number).
 
     Raises:
@@ -95,15 +98,18 @@ class Solid:
     orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0)
     friction: float | None = None
     restitution: float | None = None
+    torsional_friction: float | None = None  # [m]
+    rolling_friction: float | None = None  # [m]
     name: str = ""
 
     def __post_init__(self) -> None:
         call = type(self).__name__
         object.__setattr__(self, "center", checks.vector(f"{call}(center=...)", self.center, 3))
         object.__setattr__(self, "orientation", checks.quaternion(f"{call}(orientation=...)", self.orientation))
-        if self.friction is not None:
-            friction = checks.number(f"{call}(friction=...)", self.friction, at_least=0.0)
-            object.__setattr__(self, "friction", friction)
+        for field in ("friction", "torsional_friction", "rolling_friction"):
+            value = getattr(self, field)
+            if value is not None:
+                object.__setattr__(self, field, checks.number(f"{call}({field}=...)", value, at_least=0.0))
         if self.restitution is not None:
             restitution = checks.fraction(f"{call}(restitution=...)", self.restitution)
             object.__setattr__(self, "restitution", restitution)

@@ -14,7 +14,7 @@ from sim.mechanism import checks
 from sim.mechanism.distances import distances_to_level, distances_to_mesh
 from sim.mechanism.level_set import LevelSet, level_set
 from sim.mechanism.positional import few_positional
-from sim.mechanism.shapes import Primitive, Solid, Stance, rotation_matrix
+from sim.mechanism.shapes import SURFACE_FIELDS, Primitive, Solid, Stance, rotation_matrix
 from sim.mechanism.short_repr import short_repr
 from sim.model import shape_kinds
 from sim.model.shape_kinds import Size
@@ -221,7 +221,7 @@ class SignedDistance(Solid):
         Returns:
             The shape; its values are the same.
         """
-        place = {f: getattr(self, f) for f in ("center", "orientation", "friction", "restitution", "name")}
+        place = {f: getattr(self, f) for f in ("center", "orientation", *SURFACE_FIELDS, "name")}
         return SignedDistance(
             self.values, np.asarray(self.origin) - self.centroid, self.spacing, offset=self.offset, **place
         )

@@ -14,7 +14,7 @@ class Carry(NamedTuple):
     travel_known: Integers  # (1,) whether pair_clear and body_travel are those of this motion
     external: Matrix  # (nbody, 6) external force at the centre of mass and torque in this step, world axes [N, N m]
     inactive_kappa: Vector  # (1,) kappa of the impulses of inactive contacts, 0 where none are known
-    cone_step: Matrix  # (ncontact, 12) last directions of the cone variables
+    cone_step: Matrix  # (ncontact, 16) last directions of the cone variables
     bound_step: Matrix  # (nlimit, 2) and of limits
     dry_step: Matrix  # (ndry, 4) and of dry friction
     couple_force: Vector  # (nrow,) impulses of loops
@@ -118,8 +118,8 @@ class Data(NamedTuple):
     far_wrench: Matrix  # (nbody, 6) less the wrenches of far contacts (contact/far_contacts.py), about O
     inactive_tolerance: Vector  # (1,) change of a cluster's impulses below which they stand [N s]
     # contacts
-    cone: Matrix  # (ncontact, 12) cone variables: Cone or Pyramid
-    cone_trial: Matrix  # (ncontact, 12)
+    cone: Matrix  # (ncontact, 16) cone variables: Cone or Pyramid, and Moment
+    cone_trial: Matrix  # (ncontact, 16)
     contact_kin: Matrix  # (ncontact, 27) gap, tangential velocity, arms and their Jacobian: Kin
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the ground, world axes
     contact_turn: Matrix  # (nground, 18) on terrain, rotation of the frame by the twist
@@ -129,6 +129,13 @@ class Data(NamedTuple):
     contact_hard: Vector  # (1,) hardest contact of the last derivatives, see contact/softening.py
     contact_w: Matrix  # (ncontact, 3) constant part of the same
     contact_scale: Matrix  # (ncontact, 16) ConeScale or PyramidScale
+    # friction against spinning and rolling, two rows for each contact: MomentRow
+    moment_kin: Matrix  # (2 nmoment, 3) rates behind Kin.GAP: about the normal, or about both tangents [rad/s]
+    moment_W: Matrix  # (2 nmoment, 9) d(moment)/d(gap, rates), as contact_W
+    moment_scale: Matrix  # (2 nmoment, 4) ConeScale
+    moment_w: Matrix  # (2 nmoment, 3) constant part, as contact_w
+    moment_Ca: Matrix  # (nmoment, 18) d(rates about n, t1, t2)/d(twist of the first body), about O
+    moment_Cb: Matrix  # (nmoment, 18) of the second one
     # pairs
     shape_pos: Matrix  # (2 npair, 3) centres of their shapes at configuration 3
     shape_rot: Matrix  # (2 npair, 9)

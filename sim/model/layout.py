@@ -48,7 +48,8 @@ MODEL_FLOATS = _shapes(
     body_mass nbody, body_weight nbody, body_inertia nbody 9, joint_parent_point nbody 3, joint_child_point nbody 3,
     joint_offset nbody 4, joint_trans_axes nbody 9, joint_axis nbody 3, joint_lead nbody, joint_swing_axes nbody 6,
     dof_spring nv, dof_damper nv, dof_seen nv, dof_armature nv, dof_rest nv,
-    contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_restitution ncontact,
+    contact_point nground 3, contact_radius nground, contact_friction ncontact, moment_friction nmoment 2,
+    contact_restitution ncontact,
     contact_frame nground 9, terrain_place nterrain 8, terrain_heights nheight, terrain_rates nheight,
     contact_height nground, cluster nground 10, pair_sizes npair 8, pair_least npair, pair_place 2npair 12,
     pair_bound npair 8, body_reach nbody, hull nhull 4,
@@ -62,7 +63,7 @@ MODEL_FLOATS = _shapes(
 CARRY_INTS = _shapes("steps 1, travel_known 1")
 CARRY_FLOATS = _shapes(
     """
-    external nbody 6, inactive_kappa 1, cone_step ncontact 12, bound_step nlimit 2, dry_step ndry 4, couple_force nrow,
+    external nbody 6, inactive_kappa 1, cone_step ncontact 16, bound_step nlimit 2, dry_step ndry 4, couple_force nrow,
     next_velocity nv
     """
 )
@@ -90,9 +91,11 @@ DATA_FLOATS = _shapes(
     balance nbody 6, node_inertia nbody 9, node_momentum nbody 6, node_p nv, node_share nv,
     wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36,
     articulated 6nbody 8, U nv 6, L nv 8, D nbody 37,
-    joint_block nbody 36, rotor nv, z nv, twist nbody 6, cone ncontact 12, cone_trial ncontact 12,
+    joint_block nbody 36, rotor nv, z nv, twist nbody 6, cone ncontact 16, cone_trial ncontact 16,
     contact_kin ncontact 27, contact_frame nground 9,
     contact_turn nground 18, bounce ncontact 22, rebound_part 1,
+    moment_kin 2nmoment 3, moment_W 2nmoment 9, moment_scale 2nmoment 4, moment_w 2nmoment 3, moment_Ca nmoment 18,
+    moment_Cb nmoment 18,
     contact_W ncontact 9, contact_hard 1, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
      bound_trial nlimit 2, dry ndry 4, dry_trial ndry 4, dry_move ndry 2, dry_w ndry 3, dry_drive ndry 3,
     bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
@@ -151,6 +154,7 @@ class Sizes(NamedTuple):
     nheight: int = 0  # their coefficients
     ndry: int = 0  # dry friction of degrees of freedom, and servos with limits of their force
     nstage: int = 0  # stages of steps of higher order, 0 of those of order 2
+    nmoment: int = 0  # contacts, where one has torsional or rolling friction
 
 
 def _lengths(sizes: Sizes) -> dict[str, int]:
@@ -169,6 +173,7 @@ def _lengths(sizes: Sizes) -> dict[str, int]:
         "nground": sizes.ncontact - sizes.npair,
         "nground+8": sizes.ncontact - sizes.npair + LANES,
         "2npair": 2 * sizes.npair,
+        "2nmoment": 2 * sizes.nmoment,
         "ncoupling+1": sizes.ncoupling + 1,
         "2ncoupling": 2 * sizes.ncoupling,
         "ncouple": couple,
@@ -311,6 +316,7 @@ def sizes_of(model: Model) -> Sizes:
         nheight=len(model.terrain_heights),
         ndry=len(model.dry_dof),
         nstage=len(model.stage_b),
+        nmoment=len(model.moment_friction),
     )
 
 

@@ -97,6 +97,7 @@ class Model(NamedTuple):
     contact_point: Matrix  # (nground, 3) sphere centre in the body, from its centre of mass [m]
     contact_radius: Vector  # (nground,) [m], 0 for a point
     contact_friction: Vector  # (ncontact,) coefficient
+    moment_friction: Matrix  # (nmoment, 2) torsional and rolling friction [m]: MomentRow; no rows where all are zero
     contact_restitution: Vector  # (ncontact,) share of the normal velocity that an impact gives back
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the half-space, world axes
     contact_height: Vector  # (nground,) the half-space is normal . x >= height [m]; of terrain, to be added to it

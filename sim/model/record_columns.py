@@ -89,6 +89,20 @@ class Pyramid(Code):
     SLIP = 8  # (4,) s, slip in these directions, plus psi
 
 
+class Moment(Code):
+    """Columns of `cone` for friction against spinning and rolling (contact/moments/), behind those of either law."""
+
+    SPIN = 12  # about the normal; the next column is zero
+    ROLL = 14  # (2,) about t1 and t2
+
+
+class MomentRow(Code):
+    """moment_friction: likewise the two rows of each contact in moment_kin, moment_W, moment_scale and moment_w."""
+
+    SPIN = 0
+    ROLL = 1
+
+
 class ConeScale(Code):
     """contact_scale of a contact with the exact cone."""
 
@@ -371,3 +385,4 @@ class ContactRow(Code):
     GAP = 6  # [m]
     SLIP = 7  # speed [m/s]
     NORMAL = 8  # (3,)
+    MOMENT = 11  # (3,) of torsional and rolling friction [N m s]; only where a contact of the scene has it

@@ -56,7 +56,7 @@ class ContactGroups:
             ValueError: a wrong shape.
         """
         states = checks.array("ContactGroups.wrenches(X)", X, (len(contacts.impulse), self.sim.nx))
-        return self._sums(states, contacts.impulse, contacts.point, contacts.time_step)
+        return self._sums(states, (contacts.impulse, contacts.point, contacts.moment_impulse), contacts.time_step)
 
     def of_rows(self, states: Floats, rows: Floats) -> Floats:
         """As `wrenches`, without checks: from rows of `ContactRow` of a step of the simulator.
@@ -69,9 +69,15 @@ class ContactGroups:
             (n, count, 6) forces [N], then torques [N m].
         """
         impulses, points = (rows[..., k : k + 3] for k in (ContactRow.IMPULSE, ContactRow.POINT))
-        return self._sums(np.ascontiguousarray(states), impulses, points, self.sim.time_step)
+        moments = rows[..., ContactRow.MOMENT :] if rows.shape[-1] > ContactRow.MOMENT else None
+        return self._sums(np.ascontiguousarray(states), (impulses, points, moments), self.sim.time_step)
 
-    def _sums(self, states: Floats, impulses: Floats, points: Floats, time_step: float) -> Floats:
-        """Sums over the contacts of the groups."""
+    def _sums(self, states: Floats, found: tuple[Floats, Floats, Floats | None], time_step: float) -> Floats:
+        """Sums over the contacts of the groups, of their impulses at their points and of their moments."""
+        impulses, points, moments = found
         forces = np.ascontiguousarray(impulses / time_step)
-        return self._space.group_wrenches(states, forces, np.ascontiguousarray(points), self._numbers, self.count)
+        out = self._space.group_wrenches(states, forces, np.ascontiguousarray(points), self._numbers, self.count)
+        if moments is not None:
+            for group in range(self.count):
+                out[:, group, 3:] += moments[:, self._numbers == group].sum(axis=1) / time_step
+        return out

@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 
+from sim.mechanism.collision import Collision
 from sim.mechanism.contact import Contact
 from sim.mechanism.contact_candidates import ContactCandidate
 from sim.mechanism.joint import WORLD, Joint
@@ -81,6 +82,12 @@ def _loop_lines(mech: Mechanism, rank: str) -> list[str]:
     return ["loops", *lines, f"  {rank}"]
 
 
+def _further_settings(part: Contact | Collision) -> str:
+    """Settings of a contact or collision that few have."""
+    fields = ("restitution", "torsional_friction", "rolling_friction")
+    return "".join(f", {field.replace('_', ' ')} {getattr(part, field):g}" for field in fields if getattr(part, field))
+
+
 def _contact_lines(mech: Mechanism) -> list[str]:
     """One line per body that has contacts with the ground; those that are alike are counted."""
     lines = []
@@ -97,7 +104,7 @@ def _contact(c: Contact) -> str:
     """Shape and law of a contact."""
     law = c.law if c.friction > 0 else "impact"
     shape = f"ball of {c.radius:.4g} m" if c.radius else "point"
-    more = f", restitution {c.restitution:g}" if c.restitution else ""
+    more = _further_settings(c)
     more += ", on terrain" if c.terrain is not None else ""
     return f"{shape}, law {law}, friction {c.friction:g}{more}"
 
@@ -109,7 +116,7 @@ def _collision_lines(mech: Mechanism) -> list[str]:
         points = sum(candidate.collision == c.name for candidate in mech.contact_candidates)
         met = _count(points, "point", "points") if points else "fixed to one another, omitted"
         kinds = [_solid(mech, *end) for end in ((c.a, c.shape_a), (c.b or WORLD, c.shape_b))]
-        more = f", restitution {c.restitution:g}" if c.restitution else ""
+        more = _further_settings(c)
         law = c.law if c.friction else "impact"
         lines.append(
             f"  {c.name:<18}{kinds[0]} on {c.a}, {kinds[1]} {'of the' if c.b == WORLD else 'on'} {c.b}: "

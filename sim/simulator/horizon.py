@@ -26,7 +26,7 @@ __all__ = ["Horizon", "Known", "Rollout", "Steps"]
 class Steps(NamedTuple):
     """Cone variables of a rollout, which warm-start rollouts nearby."""
 
-    cones: Floats  # (T, ncontact, 12)
+    cones: Floats  # (T, ncontact, 16)
     bounds: Floats  # (T, nlimit, 2)
 
 

@@ -36,6 +36,21 @@ from sim.contact.corners import evaluate_corners, report_corners
 from sim.contact.far_contacts import add_far_wrenches, choose_far, has_far_activated
 from sim.contact.inactive import choose_active, has_activated, has_corners, sunk_contact
 from sim.contact.inactive_terrain import evaluate_on_terrain
+from sim.contact.moments.contact_moments import (
+    add_moment_couplings,
+    add_moment_rates,
+    apply_moments,
+    condense_moments,
+    keep_moments,
+    moment_constants,
+    moment_error,
+    moment_rates,
+    move_moments,
+    recover_moments,
+    report_moments,
+    resume_moments,
+    start_moments,
+)
 from sim.contact.pairs.active_features import choose_pairs, choose_shapes, open_pairs, overlapping
 from sim.contact.pairs.clearance import measure_pairs, omitted_pairs, pairs_reached
 from sim.contact.pairs.cylinder_pairs import (
@@ -76,6 +91,11 @@ from sim.contact.terrain_contact import add_frame_matrix, place_on_terrain, terr
 from sim.derivatives.coupling_gradient import add_coupling_composites, add_coupling_derivatives
 from sim.derivatives.loop_stiffness import loop_stiffness
 from sim.derivatives.parameters.height_columns import add_height_gradient
+from sim.derivatives.parameters.moment_columns import (
+    add_moment_change,
+    add_moment_friction,
+    add_moment_time_step,
+)
 from sim.derivatives.parameters.surface import add_surface_radius
 from sim.derivatives.parameters.taut_string_columns import add_moved_end
 from sim.derivatives.restitution_gradient import add_bounce_composites, add_bounce_derivatives
@@ -249,6 +269,19 @@ _PYRAMIDS = (
     pyramid_constant,
     recover_pyramid,
 )
+_MOMENTS = (
+    moment_rates,
+    start_moments,
+    resume_moments,
+    keep_moments,
+    move_moments,
+    moment_error,
+    apply_moments,
+    condense_moments,
+    moment_constants,
+    recover_moments,
+    report_moments,
+)
 _TERRAIN = (
     place_on_terrain,
     turn_on_terrain,
@@ -366,6 +399,8 @@ def link_terms(model: Model) -> None:
         link(model.optional, *_CYLINDERS)
     if _has_strings(model):
         link(model.optional, *_STRINGS)
+    if len(model.moment_friction):
+        link(model.optional, *_MOMENTS)
     if np.any(model.contact_terrain):
         link(model.optional, *_TERRAIN)
     if np.any(model.contact_restitution):
@@ -387,6 +422,8 @@ def link_gradient(model: Model) -> None:
         link(model.optional, add_stiffness)
     if len(model.contact_height):
         link(model.optional, add_slip_jacobians, all_stiff)
+    if len(model.moment_friction):
+        link(model.optional, add_moment_rates, add_moment_couplings)
     if np.any(model.cluster[:, Cluster.CORNERS]):
         link(model.optional, add_corner_slips, take_corners)
     if len(model.limit_dof):
@@ -416,6 +453,8 @@ def link_parameters(model: Model) -> None:
     """Link the further kernels of derivatives by parameters."""
     if np.any(model.contact_terrain):
         link(model.optional, add_surface_radius)
+    if len(model.moment_friction):
+        link(model.optional, add_moment_change, add_moment_friction, add_moment_time_step)
     if len(model.dry_dof):
         link(model.optional, add_dry_time_step)
     if _has_strings(model):

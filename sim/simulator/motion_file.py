@@ -122,6 +122,7 @@ def contact_rows(sim: Any, head: Mapping[str, Any], arrays: Arrays) -> Arrays:
     shapes |= dict.fromkeys(("iterations", "parts", "momentum_fractions", "errors"), (steps,))
     shapes |= {"contact_gap": row, "contact_slip": row}
     shapes |= dict.fromkeys(("contact_impulse", "contact_point", "contact_normals"), (*row, 3))
+    shapes |= {"contact_moment_impulse": (*row, 3)} if "contact_moment_impulse" in arrays else {}
     shapes |= {"wrenches": (steps, sim.nbody, 6)} if "wrenches" in arrays else {}
     check_shapes(arrays, shapes)
     return {name.removeprefix("contact_"): arrays.pop(name) for name in list(arrays) if name.startswith("contact_")}

@@ -27,7 +27,8 @@ def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDA
     for j in np.flatnonzero(model.pair_feature == 0):
         bound = model.pair_bound[j]
         points, limit = int(bound[PairBound.POINTS]), bound[PairBound.REACH]
-        if not np.isfinite(bound[PairBound.MOBILITY]):  # a string, whose gap has no ball around it: always active
+        # a string, whose gap has no ball around it, and friction against turning: always active
+        if not np.isfinite(bound[[PairBound.MOBILITY, PairBound.COLLISIONS]]).all():
             out[ground + j : ground + j + points] = limit
             continue
         mu, scale = model.contact_friction[ground + j], points * bound[PairBound.COLLISIONS] * kappa / COUPLED

@@ -32,7 +32,9 @@ from solvers.types import Floats, Integers
 
 STATUSES = tuple(Status(number) for number in range(len(Status)))  # by number: twice as fast as Status(number)
 # columns of a contact; NumPy takes three times as long with the members of an enum
-IMPULSE, POINT, NORMAL = (slice(int(k), k + 3) for k in (ContactRow.IMPULSE, ContactRow.POINT, ContactRow.NORMAL))
+IMPULSE, POINT, NORMAL, MOMENT = (
+    slice(int(k), k + 3) for k in (ContactRow.IMPULSE, ContactRow.POINT, ContactRow.NORMAL, ContactRow.MOMENT)
+)
 _GAP, _SLIP = int(ContactRow.GAP), int(ContactRow.SLIP)
 _OVERLAP = 1e-3  # [m] from which a message names it
 
@@ -128,6 +130,8 @@ class Contacts:
         gap: (..., ncontact) distance from the ground at the end of the step [m]; infinite beyond the reach of a contact
             (see Collision), or one that does not exist in this configuration.
         slip: (..., ncontact) sliding speed [m/s].
+        moment_impulse: (..., ncontact, 3) moment of torsional and rolling friction on the body, over the step [N m s];
+            None where no contact has them.
     """
 
     names: tuple[str, ...]
@@ -137,6 +141,7 @@ class Contacts:
     point: Floats
     gap: Floats
     slip: Floats
+    moment_impulse: Floats | None = None
 
     def __getattr__(self, name: str) -> Floats:
         """`gap`, evaluated on demand (`contacts_of`): where a step has a report, a collision without a
@@ -160,6 +165,13 @@ class Contacts:
     def force(self) -> Floats:
         """(..., ncontact, 3) mean force on the body over the step [N]."""
         return self.impulse / self.time_step
+
+    @property
+    def moment(self) -> Floats:
+        """(..., ncontact, 3) mean moment of torsional and rolling friction on the body, beside that of its force at
+        `point` [N m]; zero where there is none.
+        """
+        return np.zeros_like(self.impulse) if self.moment_impulse is None else self.moment_impulse / self.time_step
 
     @property
     def normal_force(self) -> Floats:
@@ -275,6 +287,8 @@ class Trajectory(Result):
         names = ("x", "u", "time", "iterations", "parts", "momentum_fractions", "errors")
         arrays |= {name: getattr(self, name) for name in names}
         rows = {name: getattr(self.contacts, name) for name in ("impulse", "point", "gap", "slip", "normals")}
+        if self.contacts.moment_impulse is not None:
+            rows["moment_impulse"] = self.contacts.moment_impulse
         arrays |= {f"contact_{name}": array for name, array in rows.items()}
         arrays |= {} if self.wrenches is None else {"wrenches": self.wrenches}
         write_npz("Trajectory.save(path)", path, head | plain, arrays)
@@ -441,7 +455,8 @@ def converted(call: Callable[[], Any], made: Callable[[Any], Any]) -> Any:
 def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
     """Contacts from the rows (..., ncontact, 11) of a kernel."""
     parts = rows[..., NORMAL], time_step, rows[..., IMPULSE], rows[..., POINT], rows[..., _GAP], rows[..., _SLIP]
-    contacts = Contacts(mech.contact_names, *parts)
+    moments = rows[..., MOMENT] if rows.shape[-1] > ContactRow.MOMENT else None
+    contacts = Contacts(mech.contact_names, *parts, moments)
     if any(c.reach is not None for c in mech.collisions):  # to look through thousands takes longer than a step
         vars(contacts)["rows"] = len(mech.contacts), vars(contacts).pop("gap")
     return contacts

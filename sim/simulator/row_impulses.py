@@ -26,7 +26,7 @@ class RowImpulses:
     are only a guess: a step ends in the same solution, up to its tolerance, after fewer iterations.
 
     Attributes:
-        cones: (n, ncontact, 12) variables of the contacts.
+        cones: (n, ncontact, 16) variables of the contacts.
         bounds: (n, nlimit, 2) of the limits.
         dry: (n, ndry, 4) of the dry friction.
         known: (n,) whether a row has them; one that was not solved, or whose step was divided, has none.

@@ -22,6 +22,17 @@ from sim.contact.active_contacts import (
     start_contacts,
 )
 from sim.contact.inactive import choose_active, has_activated
+from sim.contact.moments.contact_moments import (
+    add_moment_rates,
+    apply_moments,
+    condense_moments,
+    keep_moments,
+    moment_rates,
+    move_moments,
+    recover_moments,
+    resume_moments,
+    start_moments,
+)
 from sim.contact.pairs.inactive_pairs import begin_pairs, enlist_pairs, inactive_pair_impulses, pairs_activated
 from sim.contact.pairs.pair_contact import pair_kinematics
 from sim.contact.pairs.pair_stiffness import apply_pairs, condense_pairs
@@ -85,6 +96,7 @@ def inequality_kinematics(model: Model, data: Data, h: float) -> None:
     """Gaps and slips of active contacts, impulses of inactive ones, gaps of limits, at configuration 3."""
     contacts_kinematics(model, data, h)
     pair_kinematics(model, data, h)
+    moment_rates(model, data, h)
     inactive_pair_impulses(model, data, h, data.carry.inactive_kappa[0])
     subtract_floors(model, data)
     limit_gaps(model, data, h)
@@ -109,6 +121,7 @@ def start_inequalities(model: Model, data: Data, h: float, kappa: float, growth:
             k0 = max(k0, growth * _LIMIT_INERTIA * d * d / h)
             floor = max(floor, 0.5 * d)
     start_contacts(model, data, k0, floor)
+    start_moments(model, data, k0)
     for j in range(model.limit_dof.shape[0]):
         s = max(data.bound_gap[j], floor)
         data.bound[j, Bound.SLACK] = s
@@ -121,6 +134,7 @@ def start_inequalities(model: Model, data: Data, h: float, kappa: float, growth:
 def resume_inequalities(model: Model, data: Data, h: float, kappa: float, predicted: bool) -> None:
     """All cone variables on the central path of kappa, near the present gaps and the impulses kept, or predicted."""
     resume_contacts(model, data, h, kappa, predicted)
+    resume_moments(model, data, kappa, predicted)
     resume_limits(model, data, h / _LIMIT_INERTIA, kappa, predicted)
     resume_dry(model, data, kappa, predicted)
 
@@ -146,6 +160,7 @@ def total_impulse(model: Model, data: Data) -> float:
 def apply_inequalities(model: Model, data: Data) -> float:
     """wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
     r = max(apply_contacts(model, data), apply_pairs(model, data), dry_error(model, data))
+    apply_moments(model, data)
     for k in range(model.limit_dof.shape[0]):
         r = max(r, abs(data.bound_gap[k] - data.bound[k, Bound.SLACK]))
     return r
@@ -164,6 +179,7 @@ def condense_inequalities(model: Model, data: Data, h: float, kappa: float, inde
     """A += contacts, joint_block += limits: their slacks and impulses eliminated.  See `condense_contacts`."""
     condense_contacts(model, data, h, kappa, indefinite, form, data.A)
     condense_pairs(model, data, h, kappa, indefinite, form)
+    condense_moments(model, data, h, kappa, indefinite, form, data.A)
     add_limit_blocks(model, data, h)
     add_dry_blocks(model, data, h)
 
@@ -174,7 +190,9 @@ def add_stiffness(model: Model, data: Data, h: float, kappa: float) -> None:
     data.contact_hard[0] = 0.0
     condense_contacts(model, data, h, kappa, 1.0, LawForm.SOFT, data.A3)
     condense_pairs(model, data, h, kappa, 1.0, LawForm.SOFT)
+    condense_moments(model, data, h, kappa, 1.0, LawForm.SOFT, data.A3)
     add_slip_jacobians(model, data, h)
+    add_moment_rates(model, data, h)
     add_limit_blocks(model, data, h)
     add_dry_blocks(model, data, h)
 
@@ -191,6 +209,7 @@ def inequality_rhs(model: Model, data: Data, target: NewtonTarget) -> None:
 def recover_inequalities(model: Model, data: Data, h: float, gap_fraction: float) -> None:
     """Steps of all cone variables from the twists and rates of the last solve."""
     recover_contacts(model, data, gap_fraction)
+    recover_moments(model, data)
     recover_limits(model, data, h, gap_fraction)
     recover_dry(model, data, h)
 
@@ -199,6 +218,7 @@ def recover_inequalities(model: Model, data: Data, h: float, gap_fraction: float
 def keep_inequalities(model: Model, data: Data) -> None:
     """Remember the cone variables from which the line search starts."""
     keep_contacts(model, data)
+    keep_moments(model, data)
     for k in range(model.limit_dof.shape[0]):
         data.bound_trial[k, Bound.SLACK] = data.bound[k, Bound.SLACK]
         data.bound_trial[k, Bound.IMPULSE] = data.bound[k, Bound.IMPULSE]
@@ -210,6 +230,7 @@ def keep_inequalities(model: Model, data: Data) -> None:
 def move_inequalities(model: Model, data: Data, alpha: float) -> None:
     """cone = kept + alpha step."""
     move_contacts(model, data, alpha)
+    move_moments(model, data, alpha)
     step = data.carry.bound_step
     for k in range(model.limit_dof.shape[0]):
         data.bound[k, Bound.SLACK] = data.bound_trial[k, Bound.SLACK] + alpha * step[k, Bound.SLACK]

@@ -17,7 +17,16 @@ Floats = NDArray[np.float64]
 BAR = 1e-6
 SIZES = (1e-3, 1e-4, 1e-2, 1e-5)
 GOOD = 1e-8
-ONE_SIDED = ("spring", "damper", "armature", "friction", "contact_radius", "restitution")  # not below zero
+ONE_SIDED = (
+    "spring",
+    "damper",
+    "armature",
+    "friction",
+    "contact_radius",
+    "restitution",
+    "torsional_friction",
+    "rolling_friction",
+)  # not below zero
 
 
 def error(case: Case, *kinds: str) -> float:

@@ -75,14 +75,20 @@ def _center(sim: Simulator, x: Floats, foot: Contact) -> Floats:
     return np.asarray(z[:3] + rotated(z[6:10], np.asarray(foot.point)))
 
 
-def _resting(kind: str, height: float, friction: float, speed: float, kappa: float = 1e-4) -> Case:
-    """A body on a joint on a floating base, its contact so high above a tilted ground after a step without contact."""
+def _resting(
+    kind: str, height: float, friction: float, speed: float, kappa: float = 1e-4, turning: float = 0.0
+) -> Case:
+    """A body on a joint on a floating base, its contact so high above a tilted ground after a step without contact.
+
+    turning: torsional, and half the rolling friction [m].
+    """
     rng = np.random.default_rng(3)
     normal = (0.2, -0.1, 0.9)
     mech = _pair(kind, "floating", LEVEL, spring=3.0, damper=0.2)
     if mech.joints[1].nrot < 3:
         mech = replace(mech, joints=[mech.joints[0], replace(mech.joints[1], armature=0.1)])
     foot = Contact("body1", point=(0.1, -0.05, -0.2), radius=0.05, normal=normal, height=-1e3, friction=friction)
+    foot = replace(foot, torsional_friction=turning, rolling_friction=0.5 * turning)
     mech = replace(mech, contacts=[foot])
     far = Simulator(mech, time_step=H, kappa=1e-12, tolerance=3e-14)
     x, u = _random_state(far, rng, speed, 0.4), 0.1 * rng.normal(size=far.nu)
@@ -148,6 +154,7 @@ CASES: dict[str, Callable[[], Case]] = {
     "sliding": lambda: _resting("cylindrical_free", -0.01, 0.1, 2.0),
     "sticking": lambda: _resting("revolute", -0.01, 0.7, 0.02, 1e-3),
     "sliding, pyramid": _pyramid,
+    "pivoting": lambda: _resting("revolute", -0.01, 0.7, 0.5, turning=0.05),
     "bouncing": falling,
     "on terrain": lambda: falling(HILLS),
     "on terrain, sticking": lambda: falling(HILLS, 0.0, 2.0),

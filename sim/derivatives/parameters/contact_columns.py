@@ -12,6 +12,7 @@ from sim.contact.pairs.pair_contact import is_absent, pair_arm, pair_force
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.contact.terrain_contact import center
 from sim.derivatives.parameters.body_columns import add_wrench, moment
+from sim.derivatives.parameters.moment_columns import add_moment_change, add_moment_friction, add_moment_time_step
 from sim.model.data import Data
 from sim.model.model import Law, Model
 from sim.model.record_columns import Bounce, Cone, ConeScale, Kin, Pyramid, PyramidScale
@@ -109,12 +110,20 @@ def add_friction(model: Model, data: Data, c: int, w: float, col: int) -> None:
 
 
 @kernel
+def add_friction_against_turning(model: Model, data: Data, c: int, e: int, w: float, col: int) -> None:
+    """Torsional (e = 0) or rolling friction of contact c."""
+    if is_active(data, c):
+        add_moment_friction(model, data, c, e, w, col)
+
+
+@kernel
 def add_slips_time_step(model: Model, data: Data, h: float, w: float, col: int) -> None:
     """The slips of all contacts, which are displacements over h: -slip/h."""
     for m in range(data.active_count[0]):
         c = data.active[m]
         k = data.contact_kin[c]
         add_impulse(model, data, c, impulse_change(data, c, 0.0, -k[Kin.SLIP1] / h, -k[Kin.SLIP2] / h), w, col)
+    add_moment_time_step(model, data, h, w, col)
 
 
 @kernel
@@ -169,7 +178,7 @@ def add_point(model: Model, data: Data, h: float, c: int, k: int, w: float, col:
     s2 = _along(F, 6, v) + _along(kin, first + 6, e)
     p = impulse_change(data, c, gap, s1, s2)
     df = ground_force(data, c, p)
-    dr = e
+    dr, a = e, (0.0, 0.0, 0.0)
     if model.contact_terrain[c] > 0:
         T = data.contact_turn[c]
         a = (_along(T, 0, e), _along(T, 6, e), _along(T, 12, e))
@@ -180,6 +189,7 @@ def add_point(model: Model, data: Data, h: float, c: int, k: int, w: float, col:
         g = cross(a[0], a[1], a[2], f[0], f[1], f[2])
         df = (df[0] + g[0], df[1] + g[1], df[2] + g[2])
     add_ground(model, data, c, df, dr, w, col)
+    add_moment_change(model, data, h, c, gap, a, w, col)
 
 
 @kernel
@@ -193,10 +203,11 @@ def add_radius(model: Model, data: Data, h: float, c: int, w: float, col: int) -
     gap = 0.0 if model.contact_terrain[c] > 0 else -1.0 - floor_change(data, c, -1.0, -1.0)
     p = impulse_change(data, c, gap, _along(F, 3, v), _along(F, 6, v))
     add_ground(model, data, c, ground_force(data, c, p), dr, w, col)
+    add_moment_change(model, data, h, c, gap, (0.0, 0.0, 0.0), w, col)
 
 
 @kernel
-def add_height(model: Model, data: Data, c: int, w: float, col: int) -> None:
+def add_height(model: Model, data: Data, h: float, c: int, w: float, col: int) -> None:
     """gap -1, -n_z on terrain"""
     if not is_active(data, c):
         return
@@ -205,6 +216,7 @@ def add_height(model: Model, data: Data, c: int, w: float, col: int) -> None:
     if model.contact_terrain[c] > 0:
         gap = -data.contact_frame[c, 2] - floor_change(data, c, -b[Bounce.ROW1 + 2], -b[Bounce.ROW2 + 2])
     add_impulse(model, data, c, impulse_change(data, c, gap, 0.0, 0.0), w, col)
+    add_moment_change(model, data, h, c, gap, (0.0, 0.0, 0.0), w, col)
 
 
 @kernel
@@ -243,3 +255,4 @@ def add_turn(model: Model, data: Data, h: float, c: int, e: Vec3, gap: float, w:
     f = ground_force(data, c, contact_impulse(model, data, c))
     g = cross(e[0], e[1], e[2], f[0], f[1], f[2])
     add_ground(model, data, c, (df[0] + g[0], df[1] + g[1], df[2] + g[2]), dr, w, col)
+    add_moment_change(model, data, h, c, gap, e, w, col)

@@ -17,6 +17,7 @@ from sim.mechanism.contact_candidates import ContactCandidate
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import HalfSpace, Solid, String
+from sim.model.record_columns import MomentRow
 from sim.model.shape_kinds import Size
 from solvers.types import Floats
 
@@ -33,6 +34,7 @@ def contact_parameters(contact: Contact, c: int) -> list[Parameter]:
     found = [
         Parameter("friction", contact.name, "", contact.friction, ((Effect.FRICTION, c, 0, 1.0),)),
         Parameter("restitution", contact.name, "", contact.restitution, ((Effect.RESTITUTION, c, 0, 1.0),)),
+        *turning_friction(contact, [c]),
         *vector("contact_point", contact.name, contact.point, lambda k: [(Effect.POINT, c, k, 1.0)]),
         Parameter("contact_height", contact.name, "", contact.height, ((Effect.HEIGHT, c, 0, 1.0),)),
         Parameter("contact_radius", contact.name, "", contact.radius, ((Effect.RADIUS, c, 0, 1.0),)),
@@ -45,6 +47,16 @@ def contact_parameters(contact: Contact, c: int) -> list[Parameter]:
         contact.normal,
         lambda k: [(Effect.NORMAL, c, j, float(turns[j, k])) for j in range(3)],
     )
+
+
+def turning_friction(part: Contact | Collision, contacts: list[int]) -> list[Parameter]:
+    """torsional_friction and rolling_friction, each where it is not zero: without it there is no such law."""
+    lengths = (part.torsional_friction or 0.0, part.rolling_friction or 0.0)
+    return [
+        Parameter(kind, part.name, "", length, tuple((Effect.TURNING_FRICTION, c, int(row), 1.0) for c in contacts))
+        for row, kind, length in zip(MomentRow, ("torsional_friction", "rolling_friction"), lengths, strict=True)
+        if length > 0.0
+    ]
 
 
 def collision_parameters(mech: Mechanism) -> Iterator[Parameter]:
@@ -61,6 +73,7 @@ def collision_parameters(mech: Mechanism) -> Iterator[Parameter]:
         ):
             if kind == "restitution" or not isinstance(collision.shape_a, String):  # a string does not rub
                 yield Parameter(kind, collision.name, "", value, tuple((effect, ground + j, 0, 1.0) for j in mine))
+        yield from turning_friction(collision, [ground + j for j in mine])
         firsts = [
             j for j in mine if mech.contact_candidates[j].feature == 0
         ]  # the corners of a polytope are one by one

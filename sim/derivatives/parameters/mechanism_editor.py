@@ -14,7 +14,7 @@ from sim.mechanism.loop_joints import parts_of
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.pose import quat_product
-from sim.mechanism.shapes import String
+from sim.mechanism.shapes import SURFACE_FIELDS, String
 from solvers.types import Floats
 
 Entries = Mapping[str, float]  # by component, "" of a single number
@@ -51,7 +51,7 @@ class Draft:
             owner, field = kind.split("_")
             owners: dict[str, Any] = self.gears if owner == "gear" else self.inputs
             owners[part] = replace(owners[part], **{field: _entries(getattr(owners[part], field), entries)})
-        elif kind in ("friction", "restitution") or kind.startswith("contact_"):
+        elif kind in SURFACE_FIELDS or kind.startswith("contact_"):
             field = kind.removeprefix("contact_")
             parts: dict[str, Any] = self.contacts if part in self.contacts else self.collisions
             parts[part] = replace(parts[part], **{field: _entries(getattr(parts[part], field), entries)})

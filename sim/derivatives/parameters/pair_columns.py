@@ -9,6 +9,7 @@ from sim.contact.pairs.pair_contact import POLE, is_absent, pair_force, shape_b
 from sim.contact.pairs.taut_string import is_taut
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.contact_columns import add_pair, floor_change, impulse_change, is_active, turning
+from sim.derivatives.parameters.moment_columns import add_moment_change
 from sim.derivatives.parameters.taut_string_columns import add_moved_end
 from sim.model.data import Data
 from sim.model.model import Model
@@ -99,6 +100,7 @@ def add_moved_shape(
     f = pair_force(data, j, q[0], q[1], q[2])
     x = cross(turn[0], turn[1], turn[2], f[0], f[1], f[2])
     add_pair(model, data, j, (df[0] + x[0], df[1] + x[1], df[2] + x[2]), dp, w, col)
+    add_moment_change(model, data, h, c, gap - floor, turn, w, col)
 
 
 @kernel

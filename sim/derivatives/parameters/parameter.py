@@ -18,6 +18,7 @@ UNITS = {
     "armature": "kg, kg m^2",
     "lower": "m, rad", "upper": "m, rad", "cone": "rad", "gear_ratio": "rad/rad, m/rad", "gear_offset": "m, rad",
     "input_force": "1", "input_torque": "m", "friction": "1", "restitution": "1",
+    "torsional_friction": "m", "rolling_friction": "m",
     "contact_point": "m", "contact_radius": "m", "contact_height": "m", "contact_normal": "1", "terrain": "m",
     "shape_a": "m", "shape_b": "m", "size_a": "m", "size_b": "m", "gravity": "m/s^2", "time_step": "s",
 }  # fmt: skip

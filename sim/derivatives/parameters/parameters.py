@@ -55,6 +55,8 @@ class Parameters:
         gear_ratio [rad/rad, m/rad], gear_offset [m, rad]
         input_force, input_torque [m]      of a unit of an input on a body
         friction, restitution              of contacts and collisions
+        torsional_friction, rolling_friction [m]
+                                           of those that have them
         contact_point, contact_radius, contact_height [m], contact_normal
         terrain [m]                        heights of its grid
         shape_a, shape_b [m]               centres of the shapes of collisions in their bodies

@@ -21,6 +21,7 @@ from sim.derivatives.parameters.body_columns import (
 )
 from sim.derivatives.parameters.contact_columns import (
     add_friction,
+    add_friction_against_turning,
     add_height,
     add_normal,
     add_point,
@@ -89,9 +90,11 @@ def add_contact_term(model: Model, data: Data, h: float, effect: int, i: int, k:
         add_radius(model, data, h, i, w, col)
         add_surface_radius(model, data, h, i, w, col)
     elif effect == Effect.HEIGHT:
-        add_height(model, data, i, w, col)
+        add_height(model, data, h, i, w, col)
     elif effect == Effect.NORMAL:
         add_normal(model, data, h, i, k, w, col)
+    elif effect == Effect.TURNING_FRICTION:
+        add_friction_against_turning(model, data, i, k, w, col)
 
 
 @kernel

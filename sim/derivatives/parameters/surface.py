@@ -10,6 +10,7 @@ from math import sqrt
 from sim.contact.height_field import field_values, height_field
 from sim.contact.terrain_contact import center, frame_turn
 from sim.derivatives.parameters.contact_columns import add_impulse, add_turn, floor_change, impulse_change, is_active
+from sim.derivatives.parameters.moment_columns import add_moment_change
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.record_columns import Bounce, Kin
@@ -32,6 +33,7 @@ def add_ground_place(model: Model, data: Data, h: float, c: int, k: int, col: in
     n = data.contact_frame[c]
     if k == 0:
         add_impulse(model, data, c, impulse_change(data, c, -n[2], 0.0, 0.0), 1.0, col)
+        add_moment_change(model, data, h, c, -n[2], (0.0, 0.0, 0.0), 1.0, col)
         return
     phi = (
         data.contact_kin[c, Kin.GAP] + data.bounce[c, Bounce.FLOOR]

@@ -41,7 +41,8 @@ def find_collisions(model: Any, where: Where, choices: LoaderChoices, notes: Not
         if rubbed.margin:
             first, second = _grown(first, second, rubbed.margin, name, notes)
         kind = "impact" if rubbed.slippery else law
-        out.append(Collision(one, other, first, second, friction=mu, law=kind, name=name))
+        turning = rubbed.turning(choices)
+        out.append(Collision(one, other, first, second, friction=mu, law=kind, name=name, **turning))
     return out
 
 
@@ -61,7 +62,8 @@ def find_on_planes(model: Any, where: Where, choices: LoaderChoices) -> list[Col
             ground = HalfSpace(center=center, orientation=plane.quaternion)
             mu, kind = rubbed.friction if chosen is None else chosen, "impact" if rubbed.slippery else law
             name = label_on(model, g, p, list(rough))
-            out.append(Collision(group.name, None, solid, ground, friction=mu, law=kind, name=name))
+            turning = rubbed.turning(choices)
+            out.append(Collision(group.name, None, solid, ground, friction=mu, law=kind, name=name, **turning))
     return out
 
 

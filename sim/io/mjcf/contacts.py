@@ -9,8 +9,8 @@
 
 A plane counts where it is fixed to the world; a geom touches it if MuJoCo's contype and conaffinity allow it and no
 <exclude> names both bodies, or if a <pair> names both geoms. Friction is the larger of both, or that of the geom with
-priority, or of the <pair>; condim 1 is without. The margins of both geoms keep their surfaces as far apart, and the
-contact is in the middle between them.
+priority, or of the <pair>; condim 1 is without, and condim 4 and 6 have torsional and rolling friction likewise. The
+margins of both geoms keep their surfaces as far apart, and the contact is in the middle between them.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from sim.io.mjcf.welded_bodies import (
     mesh_corners,
     name_of,
     pose_of,
+    turning_lengths,
 )
 from sim.io.urdf.report import Notes
 from sim.mechanism.contact import Contact
@@ -52,6 +53,12 @@ class Rubbing(NamedTuple):
     friction: float
     slippery: bool  # whether there is no friction
     margin: float  # distance of their surfaces [m]
+    lengths: tuple[float, float]  # torsional and rolling friction [m]
+
+    def turning(self, choices: LoaderChoices) -> dict[str, Any]:
+        """The fields of a contact or collision for them, if they were asked for."""
+        fields = ("torsional_friction", "rolling_friction")
+        return dict(zip(fields, self.lengths, strict=True)) if choices.turning_friction else {}
 
 
 def find_contacts(model: Any, where: Where, choices: LoaderChoices, collisions: bool, notes: Notes) -> list[Contact]:
@@ -146,7 +153,8 @@ def rubbing(model: Any, pairs: Mapping[tuple[int, int], int], a: int, b: int) ->
     pair = pairs.get((min(a, b), max(a, b)))
     if pair is not None:
         friction, margin = float(model.pair_friction[pair, 0]), float(model.pair_margin[pair])
-        return Rubbing(friction, int(model.pair_dim[pair]) == 1, margin)
+        condim, rough = int(model.pair_dim[pair]), model.pair_friction[pair]
+        return Rubbing(friction, condim == 1, margin, turning_lengths(condim, float(rough[2]), float(rough[3])))
     return _mixed(model, a, b) if _meet(model, a, b) and not _excluded(model, a, b) else None
 
 
@@ -155,8 +163,9 @@ def _mixed(model: Any, a: int, b: int) -> Rubbing:
     own, other = int(model.geom_priority[a]), int(model.geom_priority[b])
     first = [x for x, wins in ((a, own >= other), (b, other >= own)) if wins]
     friction = max(float(model.geom_friction[x, 0]) for x in first)
-    slippery = max(int(model.geom_condim[x]) for x in first) == 1
-    return Rubbing(friction, slippery, float(model.geom_margin[a] + model.geom_margin[b]))
+    condim = max(int(model.geom_condim[x]) for x in first)
+    lengths = turning_lengths(condim, *(max(float(model.geom_friction[x, k]) for x in first) for k in (1, 2)))
+    return Rubbing(friction, condim == 1, float(model.geom_margin[a] + model.geom_margin[b]), lengths)
 
 
 def _contact(
@@ -175,6 +184,7 @@ def _contact(
         normal=normal,
         height=float(normal @ plane.point) + rubbed.margin - own,
         name=name,
+        **rubbed.turning(choices),
     )
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.io.loader_choices import loader_choices
+from sim.io.loader_choices import LoaderChoices, loader_choices
 from sim.io.mjcf.actuators import find_inputs, reflect_actuators, with_friction
 from sim.io.mjcf.collisions import find_collisions, find_on_planes
 from sim.io.mjcf.contacts import find_contacts
@@ -43,6 +43,7 @@ def load_mjcf(
     collisions: bool | str = False,
     gravity: ArrayLike | None = None,
     joint_friction: bool = False,
+    turning_friction: bool = False,
 ) -> MjcfMechanism:
     """Load the model of an MJCF file, with MuJoCo's own parser (`pip install "dojo-opt[mjcf]"`).
 
@@ -63,6 +64,8 @@ def load_mjcf(
         gravity: (3,) acceleration of gravity [m/s^2]; None: that of the file, none where a <flag> disables it.
         joint_friction: whether hinges and slides have the dry friction (frictionloss) of the file, see
             `Joint.friction`. Steps of a higher order or of a given accuracy are for joints without it.
+        turning_friction: whether contacts and collisions have the torsional and rolling friction of condim 4 and 6,
+            see `dojo.Contact`.
 
     Returns:
         MjcfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion
@@ -87,13 +90,14 @@ def load_mjcf(
             joint_friction=joint_friction,
             gravity=model.opt.gravity if gravity is None else gravity,
             collisions=None if isinstance(collisions, bool) else collisions,
+            turning_friction=turning_friction,
         )
         groups, where = find_groups(model)
-        bodies, joints, homes = _tree(model, groups, merge, notes)
+        bodies, joints, homes = _tree(model, groups, merge, choices, notes)
         if not joints:
             raise ValueError(f"load_mjcf: {file}: no joint is free to move")
         inputs, gear, low, high = find_inputs(model, homes, where, notes)
-        note_omitted(model, collisions, choices.ground, notes)
+        note_omitted(model, collisions, choices, notes)
         mech = MjcfMechanism(
             bodies,
             [*with_friction(model, joints, homes, choices.joint_friction, notes), *find_loops(model, where, notes)],
@@ -126,7 +130,7 @@ def _warn(report: MjcfReport) -> None:
 
 
 def _tree(
-    model: Any, groups: list[GeomGroup], merge: bool, notes: Notes
+    model: Any, groups: list[GeomGroup], merge: bool, choices: LoaderChoices, notes: Notes
 ) -> tuple[list[Body], list[Joint], dict[int, tuple[str, int]]]:
     """Bodies, the joints they hang on, and where every joint of the file went."""
     bodies: list[Body] = []
@@ -137,7 +141,7 @@ def _tree(
         inertia = group.inertia
         if inertia.mass:
             floats = _compensation(model, group, notes)
-            shapes = body_shapes(model, group)
+            shapes = body_shapes(model, group, choices.turning_friction)
             solid = Body(group.name, inertia.mass, inertia.inertia, shapes, gravity_compensation=floats)
         else:
             solid = Body(group.name, 0.0)

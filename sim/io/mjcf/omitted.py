@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sim.io.loader_choices import LoaderChoices
 from sim.io.mjcf.equalities import WELD
 from sim.io.mjcf.flags import actuation_disabled, contacts_disabled
 from sim.io.mjcf.welded_bodies import PLANE, name_of
@@ -99,7 +100,8 @@ def _turns(model: Any) -> Any:
 _RIGID = "contacts and limits are rigid here, whatever their solref and solimp"
 _SOFT = "contacts and limits that give way visibly in MuJoCo are rigid here"
 _SPRINGY = "contacts and limits that MuJoCo's solref lets bounce do not bounce here"
-_ROLLING = "torsional and rolling friction is omitted (condim 4 and 6)"
+_ROLLING = "torsional and rolling friction is omitted (condim 4 and 6; turning_friction=True has it)"
+_ONE_ROLLING = "rolling friction of pairs is that of the first direction in all directions"
 _STICKY = "adhesion of contacts is omitted"
 _PLUGIN = "plugins are omitted"
 
@@ -136,6 +138,11 @@ _ROWS = (
         "pair",
         "friction of pairs is that of the first direction in all directions",
         lambda m: _pairs(m, (m.pair_dim > 1) & (m.pair_friction[:, 0] != m.pair_friction[:, 1])),
+    ),
+    _Dropped(
+        "pair",
+        _ONE_ROLLING,
+        lambda m: _pairs(m, (m.pair_dim >= 6) & (m.pair_friction[:, 3] != m.pair_friction[:, 4])),
     ),
     _Dropped("pair", _STICKY, lambda m: _pairs(m, m.pair_adhesion != 0.0)),
     _Dropped("pair", _SPRINGY, lambda m: _pairs(m, _bounces(m.pair_solref))),
@@ -185,10 +192,12 @@ _ONE_OF_EACH = """<mujoco><worldbody><body name="a"><joint name="j"/><geom name=
 <actuator><motor joint="j"/></actuator></mujoco>"""
 
 
-def note_omitted(model: Any, collisions: bool | str, ground: bool, notes: Notes) -> None:
+def note_omitted(model: Any, collisions: bool | str, choices: LoaderChoices, notes: Notes) -> None:
     """Notes on the elements and attributes of the file that the mechanism lacks."""
     for row in _ROWS:
-        if row.kind in ("geom", "pair") and not (ground or collisions):
+        if row.kind in ("geom", "pair") and not (choices.ground or collisions):
+            continue
+        if row.text == (_ROLLING if choices.turning_friction else _ONE_ROLLING):
             continue
         found = np.flatnonzero(row.found(model))
         if len(found):

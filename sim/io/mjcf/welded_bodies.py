@@ -81,8 +81,16 @@ def find_groups(model: Any) -> tuple[list[GeomGroup], Where]:
     return groups, where
 
 
-def body_shapes(model: Any, group: GeomGroup) -> tuple[Solid, ...]:
-    """All primitives among the geoms of the group that collide; without one the largest of the others, if any."""
+def turning_lengths(condim: int, torsional: float, rolling: float) -> tuple[float, float]:
+    """Torsional and rolling friction of a contact of this dimension [m]."""
+    return torsional if condim >= 4 else 0.0, rolling if condim >= 6 else 0.0
+
+
+def body_shapes(model: Any, group: GeomGroup, turning: bool) -> tuple[Solid, ...]:
+    """All primitives among the geoms of the group that collide; without one the largest of the others, if any.
+
+    turning: with their torsional and rolling friction.
+    """
     found: tuple[list[Solid], list[Solid]] = ([], [])
     for b, frame in group.members.items():
         start = int(model.body_geomadr[b])
@@ -92,6 +100,9 @@ def body_shapes(model: Any, group: GeomGroup) -> tuple[Solid, ...]:
             if solid is not None:
                 mu = 0.0 if int(model.geom_condim[g]) == 1 else float(model.geom_friction[g, 0])
                 solid = replace(solid, name=name_of(model, "geom", g), friction=mu)
+                if turning:
+                    lengths = turning_lengths(int(model.geom_condim[g]), *map(float, model.geom_friction[g, 1:]))
+                    solid = replace(solid, torsional_friction=lengths[0], rolling_friction=lengths[1])
                 found[0 if collides else 1].append(solid)
     if found[0]:
         return named(found[0])

@@ -19,22 +19,27 @@ from sim.integrators.feedback import FeedbackLaw, FeedbackRun, Path
 from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
 from sim.model.interruptible_loops import pieces
-from sim.model.layout import data_view
+from sim.model.layout import Sizes, data_view
 from sim.model.model import Model
-from sim.model.record_columns import Inactive, StepReport
+from sim.model.record_columns import ContactRow, Inactive, StepReport
 from sim.simulator.engines.linked_model import LinkedModel
 from sim.simulator.engines.mean_states import MeanStates
-from sim.simulator.results import IMPULSE, NORMAL, POINT, Interrupted
+from sim.simulator.results import IMPULSE, MOMENT, NORMAL, POINT, Interrupted
 from sim.simulator.settings import Settings, of_call
 from solvers.compiler import Table
 from solvers.status import Status
 from solvers.types import Cube, Floats, Integers, Vector
 
 # numbers of a step, in loops that follow a law one more; and of one of its contacts or limits
-REPORT, CONTACT, CONE, BOUND = int(StepReport.EARLIER), 11, 12, 2
+REPORT, CONE, BOUND = int(StepReport.EARLIER), 16, 2
 _LARGEST = [int(StepReport.LOST), int(StepReport.ERROR)]  # of several steps, the largest
 _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
+
+
+def contact_columns(sizes: Sizes) -> int:
+    """Columns of the row of a contact: with its moment where a contact has torsional or rolling friction."""
+    return int(ContactRow.MOMENT) + (3 if sizes.nmoment else 0)
 
 
 class DividedStep(NamedTuple):
@@ -71,6 +76,7 @@ def contacts_of_parts(parts: Floats) -> Floats:
     out = parts[-1].copy()
     out[:, IMPULSE] = parts[..., IMPULSE].sum(axis=0)
     weight = np.linalg.norm(parts[..., IMPULSE], axis=2)
+    out[:, MOMENT] = parts[..., MOMENT].sum(axis=0)
     total = weight.sum(axis=0)
     pressed = total > 0.0
     points, normals = (np.einsum("tc,tcj->cj", weight, parts[..., part]) for part in (POINT, NORMAL))
@@ -169,7 +175,7 @@ class Engine(LinkedModel):
             np.empty((0, *shape))
             for shape in (
                 (self.sizes.nbody, 6),
-                (self.sizes.ncontact, CONTACT),
+                (self.sizes.ncontact, contact_columns(self.sizes)),
                 (self.ndx, self.ndx),
                 (self.ndx, self.nu),
                 (self.sizes.ncontact, CONE),
@@ -214,7 +220,7 @@ class Engine(LinkedModel):
             A, B = np.empty((steps, self.ndx, self.ndx)), np.empty((steps, self.ndx, self.nu))
             model = self.gradient_table()
         else:
-            contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
+            contacts = np.zeros((steps, self.sizes.ncontact, contact_columns(self.sizes)))
             model = self.step_table()
         motion = MotionBuffers(xs, us, self.external(wrenches), reports, contacts, A, B)
         try:

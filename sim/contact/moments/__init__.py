@@ -1,0 +1,1 @@
+"""Friction against spinning and rolling: moments of a contact, bounded by its normal impulse."""

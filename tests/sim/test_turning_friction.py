@@ -1,0 +1,188 @@
+"""Torsional and rolling friction: against solutions on paper, central differences, and conserved momenta."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+
+R, M, G = 0.1, 1.0, 9.81
+J = 0.4 * M * R * R
+TORSIONAL, ROLLING = 0.01, 0.003
+HILL = dojo.Terrain(0.05 * np.sin(np.add.outer(np.arange(9.0), 0.7 * np.arange(9.0))), spacing=(0.25, 0.25))
+
+
+def ball(
+    torsional: float = TORSIONAL, rolling: float = ROLLING, *, kappa: float = 1e-8, **contact: Any
+) -> dojo.Simulator:
+    """A solid ball above the ground."""
+    point = dojo.Contact("ball", radius=R, torsional_friction=torsional, rolling_friction=rolling, **contact)
+    mech = dojo.Mechanism([dojo.Body("ball", M, np.eye(3) * J)], [dojo.Joint("floating", None, "ball")], [point])
+    return dojo.Simulator(mech, time_step=0.01, kappa=kappa, tolerance=1e-12)
+
+
+def state(velocity: Any = (0.0, 0.0, 0.0), spin: Any = (0.0, 0.0, 0.0), at: Any = (0.0, 0.0, R + 1e-9)) -> np.ndarray:
+    return np.array([*at, 1.0, 0.0, 0.0, 0.0, *velocity, *spin])
+
+
+def two_bodies(shape: Any, *, kappa: float = 1e-4) -> tuple[dojo.Simulator, np.ndarray]:
+    """A ball that is thrown onto another body, without gravity; and the state where they touch."""
+    bodies = [
+        dojo.Body("a", 1.0, np.eye(3) * J, shape=dojo.Sphere(R)),
+        dojo.Body("b", 2.0, (0.01, 0.012, 0.015), shape),
+    ]
+    rub = dojo.Collision("a", "b", torsional_friction=TORSIONAL, rolling_friction=ROLLING)
+    joints = [dojo.Joint("floating", None, name) for name in "ab"]
+    mech = dojo.Mechanism(bodies, joints, collisions=[rub], gravity=(0.0, 0.0, 0.0))
+    q = [0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    v = [0.1, 0.2, -1.0, 0.5, 1.0, 2.0, 0.0, 0.0, 0.5, -0.3, 0.2, -1.0]
+    return dojo.Simulator(mech, time_step=0.01, kappa=kappa, tolerance=1e-12), np.array(q + v)
+
+
+def leg() -> tuple[dojo.Simulator, np.ndarray]:
+    """A leg that pivots on the ball of its foot."""
+    bodies = [dojo.Body("u", 1.0, (0.02, 0.02, 0.01)), dojo.Body("l", 0.5, (0.01, 0.012, 0.004))]
+    knee = dojo.Joint("revolute", "u", "l", parent_point=(0, 0, -0.2), child_point=(0, 0, 0.2), axis=(0, 1, 0))
+    foot = dojo.Contact("l", (0, 0, -0.2), 0.03, torsional_friction=0.02, rolling_friction=0.01)
+    mech = dojo.Mechanism(bodies, [dojo.Joint("floating", None, "u"), knee], [foot])
+    x = np.array([0, 0, 0.4298 + 0.2 * (1 + np.cos(0.1)) - 0.2, 1, 0, 0, 0, 0.1, 0.5, 0.1, -0.3, 0.3, 0.5, 4.0, 1.0])
+    return dojo.Simulator(mech, time_step=0.01, kappa=1e-5, tolerance=1e-12), x
+
+
+def on_hill() -> tuple[dojo.Simulator, np.ndarray]:
+    sim = ball(kappa=1e-5, terrain=HILL)
+    x = state((1.0, 0.2, -0.5), (-2.0, 10.0, 3.0), (0.4, 0.5, 0.3))
+    x[2] -= float(sim.step(x).contacts.gap[0])
+    return sim, x
+
+
+def moving() -> tuple[dojo.Simulator, np.ndarray]:
+    return ball(kappa=1e-4), state((1.0, 0.2, 0.0), (-2.0, 10.0, 3.0))
+
+
+@pytest.mark.kernel
+def test_a_spinning_ball_stops_when_the_moment_has_taken_its_momentum() -> None:
+    """At a constant rate, and after J w/(mu_t m g) = 0.41 s."""
+    sim, w = ball(rolling=0.0), 10.0
+    t = sim.rollout(state(spin=(0.0, 0.0, w)), np.zeros((50, 0)), throw=True)
+    spin = t.x[:, -1]
+    steps = J * w / (TORSIONAL * M * G) / sim.time_step
+    np.testing.assert_allclose(np.diff(spin[2 : int(steps)]), -TORSIONAL * M * G / J * sim.time_step, rtol=2e-5)
+    assert spin[int(steps)] > 0.0
+    np.testing.assert_allclose(spin[int(steps) + 2 :], 0.0, atol=1e-4)
+    np.testing.assert_allclose(t.contacts.moment[3, 0], (0.0, 0.0, -TORSIONAL * M * G), rtol=2e-5, atol=1e-9)
+
+
+def test_a_rolling_ball_slows_down_by_its_rolling_friction() -> None:
+    """By mu_r g/(R (1 + 2/5)), without slip."""
+    t = ball().rollout(state((1.0, 0.0, 0.0), (0.0, 10.0, 0.0)), np.zeros((20, 0)), throw=True)
+    np.testing.assert_allclose(np.diff(t.x[2:, 7]), -ROLLING * G / (1.4 * R) * 0.01, rtol=5e-4)
+    assert t.contacts.slip[2:].max() < 1e-5
+
+
+@pytest.mark.parametrize("slope", [0.9, 1.1])
+def test_a_ball_rests_on_a_slope_below_its_rolling_friction(slope: float) -> None:
+    """Up to tan(angle) = mu_r/R; beyond it rolls."""
+    tilt = np.arctan(slope * ROLLING / R)
+    normal = np.array([np.sin(tilt), 0.0, np.cos(tilt)])
+    t = ball(normal=normal).rollout(state(at=R * normal), np.zeros((50, 0)), throw=True)
+    speed = (G * np.sin(tilt) - ROLLING * G * np.cos(tilt) / R) / 1.4 * 0.5
+    if slope < 1.0:
+        assert np.abs(t.x[-1, 7:]).max() < 1e-3
+    else:
+        np.testing.assert_allclose(t.x[-1, 7] / np.cos(tilt), speed, rtol=1e-2)
+
+
+@pytest.mark.parametrize("length", [1e-3, 10.0])
+@pytest.mark.parametrize("scale", [1e-4, 1e4])
+def test_extreme_lengths_and_weights_are_solved(length: float, scale: float) -> None:
+    point = dojo.Contact("ball", radius=R, torsional_friction=length, rolling_friction=length)
+    body = dojo.Body("ball", scale * M, np.eye(3) * scale * J)
+    mech = dojo.Mechanism([body], [dojo.Joint("floating", None, "ball")], [point])
+    sim = dojo.Simulator(mech, time_step=1e-3)
+    t = sim.rollout(state((1.0, 0.0, 0.0), (300.0, 10.0, 1000.0)), np.zeros((5, 0)))
+    assert t.success
+    assert abs(t.x[-1, -1]) < 1000.0
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize(
+    "scene", [moving, leg, on_hill, lambda: two_bodies(dojo.Sphere(R)), lambda: two_bodies(dojo.Box(0.3, 0.3, 0.2))]
+)
+def test_derivatives_by_the_state_are_those_of_differences(scene: Any) -> None:
+    sim, x = scene()
+    u, eps = np.zeros(sim.nu), 1e-6
+    A = sim.linearize(x, u).A
+    assert np.abs(sim.step(x, u).contacts.moment).max() > 1e-4
+    for k, d in enumerate(eps * np.eye(A.shape[1])):
+        ends = [sim.step(sim.integrate(x, s * d), u, throw=True).x for s in (1.0, -1.0)]
+        np.testing.assert_allclose(A[:, k], sim.difference(*ends) / (2.0 * eps), atol=3e-6 * max(1.0, np.abs(A).max()))
+
+
+GROUND = ("torsional_friction", "rolling_friction", "friction", "contact_radius", "contact_height", "contact_point")
+
+
+@pytest.mark.parametrize(
+    ("scene", "names"),
+    [
+        (moving, (*GROUND, "contact_normal", "com", "inertia", "time_step")),
+        (on_hill, GROUND),
+        (
+            lambda: two_bodies(dojo.Sphere(R)),
+            ("torsional_friction", "rolling_friction", "size_a", "shape_b", "com:b", "time_step"),
+        ),
+    ],
+)
+def test_derivatives_by_parameters_are_those_of_differences(scene: Any, names: tuple[str, ...]) -> None:
+    sim, x = scene()
+    u, found = np.zeros(sim.nu), sim.parameters(names)
+    by_name = sim.linearize(x, u, wrt=names)
+    columns = np.concatenate([by_name[name].reshape(2 * sim.nv, -1) for name in names], axis=1)
+    for name, value, column in zip(found.names, found.values, columns.T, strict=True):
+        eps = 1e-6 * max(0.1, abs(value))
+        ends = [sim.with_parameters({name: value + s * eps}).step(x, u, throw=True).x for s in (1.0, -1.0)]
+        slope = sim.difference(*ends) / (2.0 * eps)
+        np.testing.assert_allclose(column, slope, atol=1e-5 * max(1.0, np.abs(slope).max()), err_msg=name)
+
+
+def test_moments_between_bodies_conserve_momentum() -> None:
+    sim, x = two_bodies(dojo.Sphere(R), kappa=1e-8)
+    t = sim.rollout(x, np.zeros((5, 0)), throw=True)
+    for before, after in zip(sim.momentum(x), sim.momentum(t.x[-1]), strict=True):
+        np.testing.assert_allclose(after, before, atol=1e-12)
+
+
+def test_moments_are_saved_and_described(tmp_path: Path) -> None:
+    sim, x = moving()
+    t = sim.rollout(x, np.zeros((2, 0)))
+    t.save(tmp_path / "t.npz")
+    np.testing.assert_array_equal(dojo.Trajectory.load(tmp_path / "t.npz").contacts.moment, t.contacts.moment)
+    assert "torsional friction 0.01, rolling friction 0.003" in sim.describe()
+    plain = ball(0.0, 0.0).step(x)
+    assert plain.contacts.moment_impulse is None
+    assert not plain.contacts.moment.any()
+
+
+SCENE = """<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1" condim="3" friction="1 .02 .001"/>
+  <body name="a" pos="0 0 1"><freejoint/><geom name="a" size=".1" condim="4" friction=".5 .01 .002"/></body>
+  <body name="b" pos="0 0 2"><freejoint/><geom name="b" size=".1" condim="6" friction=".5 .01 .002" priority="1"/></body>
+  </worldbody><contact><pair geom1="a" geom2="b" condim="6" friction="1 1 .03 .004 .004"/></contact></mujoco>"""
+
+
+def test_condim_4_and_6_of_mjcf_files_are_read() -> None:
+    """The larger lengths of two geoms, those of the one with priority, or those of the pair."""
+    pytest.importorskip("mujoco")
+    mech = dojo.load_mjcf(SCENE, collisions=True, turning_friction=True)
+    lengths = {c.name: (c.torsional_friction, c.rolling_friction) for c in (*mech.contacts, *mech.collisions)}
+    assert lengths == {"a": (0.02, 0.0), "b": (0.01, 0.002), "a-b": (0.03, 0.004)}
+    with pytest.warns(dojo.MjcfWarning, match="torsional and rolling friction is omitted"):
+        assert not dojo.load_mjcf(SCENE).contacts[0].torsional_friction
+
+
+def test_a_restitution_beside_it_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"torsional_friction=.*: together with restitution=0.5 it is not supported"):
+        dojo.Contact("foot", restitution=0.5, torsional_friction=0.01)
