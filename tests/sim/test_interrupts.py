@@ -11,7 +11,8 @@ import pytest
 
 import dojo_opt as dojo
 from sim.model import interruptible_loops
-from support.interrupts import heard_in
+from sim.simulator.engines.python_loop_engine import PythonLoopEngine
+from support.interrupts import heard_in, unfinished
 
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), 0.02)
 QUADRUPED = dojo.Simulator(dojo.models.quadruped(), 0.02)
@@ -158,6 +159,32 @@ def test_derivatives_hear_ctrl_c(name: str) -> None:
 def test_calls_about_many_states_hear_ctrl_c(name: str) -> None:
     call, enough = STATES[name]
     stopped(call, enough // 2, 0.12)  # of more memory, a single copy takes long on a machine that is slow to give it
+
+
+PYTHON_LOOPS = {  # calls of a few knots or rows
+    "closed loop": (
+        lambda: FALLING.rollout_feedback(RESTING, inputs(FALLING, 4), substeps=2),
+        PythonLoopEngine.roll_feedback,
+    ),
+    "damped closed loop": (
+        lambda: FALLING.rollout_feedback(RESTING, inputs(FALLING, 4), alpha=0.5),
+        PythonLoopEngine.roll_feedback,
+    ),
+    "batch": (
+        lambda: FALLING.rollout_batch(np.tile(RESTING, (4, 1)), np.zeros((4, 2, FALLING.nu))),
+        PythonLoopEngine.roll_batch,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PYTHON_LOOPS)
+def test_loops_in_python_keep_what_they_have_wherever_ctrl_c_comes(name: str) -> None:
+    call, loop = PYTHON_LOOPS[name]
+    results = unfinished(call, [loop])
+    begun = next(k for k, found in enumerate(results) if found is not None)
+    assert None not in results[begun:-2]  # the last lines come after the loop
+    done = [np.sum(found.solved_steps if name == "batch" else found.solved_knots) for found in results[begun:-2]]
+    assert begun < 9 and done == sorted(done) and done[-1] > done[0] == 0
 
 
 def rocking(sim: Any, steps: int) -> Any:

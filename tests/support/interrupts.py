@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import pytest
 
@@ -101,13 +101,13 @@ class _Raised:
 
     def __init__(self, call: Callable[[], Any], number: int, within: Collection[Any] = ()) -> None:
         self.count, self._number, self._within = 0, number, {function.__code__ for function in within}
-        self.where, self.heard = "", False
+        self.where, self.stop = "", cast("KeyboardInterrupt | None", None)
         before, handler = sys.gettrace(), signal.signal(signal.SIGINT, signal.default_int_handler)
         sys.settrace(self._trace)
         try:
             call()
-        except KeyboardInterrupt:
-            self.heard = True
+        except KeyboardInterrupt as error:
+            self.stop = error
         finally:
             sys.settrace(before)
             signal.signal(signal.SIGINT, handler)
@@ -127,10 +127,20 @@ class _Raised:
         return self._trace if self._within else None
 
 
-def dropped(call: Callable[[], Any], most: int = 300, within: Collection[Any] = ()) -> list[str]:
-    """Places in which a KeyboardInterrupt during the call is lost, of all, or of `most` spread over it; see _Raised."""
+def _raised_everywhere(call: Callable[[], Any], most: int, within: Collection[Any]) -> list[_Raised]:
+    """Calls with a SIGINT in each of the places, or in `most` of them."""
     call()
     counted = _Raised(call, 0, within)
     assert counted.count > 0
     numbers = range(1, counted.count + 1, 1 + counted.count // most)
-    return [found.where for found in (_Raised(call, k, within) for k in numbers) if found.where and not found.heard]
+    return [found for found in (_Raised(call, k, within) for k in numbers) if found.where]
+
+
+def dropped(call: Callable[[], Any], most: int = 300, within: Collection[Any] = ()) -> list[str]:
+    """Places in which a KeyboardInterrupt during the call is lost, of all, or of `most` spread over it; see _Raised."""
+    return [found.where for found in _raised_everywhere(call, most, within) if found.stop is None]
+
+
+def unfinished(call: Callable[[], Any], within: Collection[Any]) -> list[Any]:
+    """The `result` that each KeyboardInterrupt within a call carries, in order of time; None: it has none."""
+    return [getattr(found.stop, "result", None) for found in _raised_everywhere(call, 10_000, within)]

@@ -23,17 +23,18 @@ class PythonLoopEngine(HighOrderEngine):
         xs = np.zeros((n, steps + 1, self.nx))
         reports, knots = np.zeros((n, REPORT)), np.zeros(n, dtype=np.int64)
         xs[:, 0] = x0s
-        for i in range(n):
-            try:
+        i = 0
+        try:
+            for i in range(n):
                 rolled = self.roll(x0s[i], us[i])
                 knots[i], xs[i] = rolled.solved_steps, rolled.xs
-            except KeyboardInterrupt as stop:
-                interrupted(reports[i:], 0)
-                reports[i:] = reports[i]
-                if isinstance(stop, Interrupted):
-                    knots[i], xs[i] = stop.result.solved_steps, stop.result.xs
-                raise Interrupted((xs, reports, knots)) from None
-            reports[i] = rolled.summary()
+                reports[i] = rolled.summary()
+        except KeyboardInterrupt as stop:
+            interrupted(reports[i:], 0)
+            reports[i:] = reports[i]
+            if isinstance(stop, Interrupted):
+                knots[i], xs[i] = stop.result.solved_steps, stop.result.xs
+            raise Interrupted((xs, reports, knots)) from None
         return xs, reports, knots
 
     def roll_feedback(
@@ -51,22 +52,23 @@ class PythonLoopEngine(HighOrderEngine):
         """As Engine.roll_feedback; warm starts of the policy and another limit of iterations are not used."""
         knots = len(policy.us)
         path = self._path(knots, keep=keep, cones=False)
-        path.xs[0], total = x, 0.0
-        for t in range(knots):
-            try:
+        path.xs[0], total, t = x, 0.0, 0
+        try:
+            for t in range(knots):
                 dx = self.states.difference(policy.xs[t : t + 1], path.xs[t : t + 1])[0]
                 path.us[t] = np.clip(policy.us[t] + alpha * policy.ks[t] + policy.Ks[t] @ dx, *limits)
                 rolled = self.roll(path.xs[t], *knot_inputs(path.us, policy.wrenches, t, substeps), kappa=kappa)
-            except KeyboardInterrupt:
-                interrupted(path.report[None], 0)
-                raise Interrupted((t, path)) from None
-            add_report(path.report, rolled.summary())
-            if rolled.solved_steps < substeps:
-                return t, path
-            total += rolled.reports[:, StepReport.ITERATIONS].sum()
-            path.xs[t + 1] = rolled.xs[-1]
-            if alpha < 1.0:
-                path.xs[t + 1] = self.states.integrate(rolled.xs[-1:], (alpha - 1.0) * policy.gaps[t + 1 : t + 2])[0]
+                add_report(path.report, rolled.summary())
+                if rolled.solved_steps < substeps:
+                    return t, path
+                total += rolled.reports[:, StepReport.ITERATIONS].sum()
+                path.xs[t + 1] = rolled.xs[-1]
+                if alpha < 1.0:
+                    gap = policy.gaps[t + 1 : t + 2]
+                    path.xs[t + 1] = self.states.integrate(rolled.xs[-1:], (alpha - 1.0) * gap)[0]
+        except KeyboardInterrupt:
+            interrupted(path.report[None], 0)
+            raise Interrupted((t, path)) from None
         path.report[StepReport.ITERATIONS] = total
         return knots, path
 
