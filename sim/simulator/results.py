@@ -36,6 +36,7 @@ IMPULSE, POINT, NORMAL, MOMENT = (
     slice(int(k), k + 3) for k in (ContactRow.IMPULSE, ContactRow.POINT, ContactRow.NORMAL, ContactRow.MOMENT)
 )
 _GAP, _SLIP = int(ContactRow.GAP), int(ContactRow.SLIP)
+_LOST, _ERROR = int(StepReport.LOST), int(StepReport.ERROR)
 _OVERLAP = 1e-3  # [m] from which a message names it
 
 
@@ -457,7 +458,7 @@ def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
     parts = rows[..., NORMAL], time_step, rows[..., IMPULSE], rows[..., POINT], rows[..., _GAP], rows[..., _SLIP]
     moments = rows[..., MOMENT] if rows.shape[-1] > ContactRow.MOMENT else None
     contacts = Contacts(mech.contact_names, *parts, moments)
-    if any(c.reach is not None for c in mech.collisions):  # to look through thousands takes longer than a step
+    if any([c.reach is not None for c in mech.collisions]):  # to look through thousands takes longer than a step
         vars(contacts)["rows"] = len(mech.contacts), vars(contacts).pop("gap")
     return contacts
 
@@ -498,7 +499,7 @@ def reservation(reports: Floats, noun: str = "step") -> str:
 
     reports: (n, 9) of StepReport.   noun: of what each of them is the report; empty for a motion.
     """
-    lost, errors = reports[:, StepReport.LOST], reports[:, StepReport.ERROR]
+    lost, errors = reports[:, _LOST], reports[:, _ERROR]
     if lost.dot(lost) > 0.0:  # the product takes a fifth of the time of a maximum
         lossy = np.flatnonzero(lost)
         first, kept = lossy[0], 1.0 - lost[lossy]
@@ -522,9 +523,11 @@ def overlap(mech: Mechanism, parts: Integers, rows: Floats) -> str:
 
     parts: (T,) of each step.   rows: (T, ncontact, 11) of contacts.
     """
-    divided = np.flatnonzero(parts > 1)
     first = len(mech.contacts)
-    if not len(divided) or rows.shape[1] == first:
+    if rows.shape[1] == first:
+        return ""
+    divided = np.flatnonzero(parts > 1)
+    if not len(divided):
         return ""
     gaps = rows[divided, first:, _GAP]
     k, c = divmod(int(np.argmin(gaps)), gaps.shape[1])

@@ -33,6 +33,7 @@ from solvers.types import Cube, Floats, Integers, Vector
 # numbers of a step, in loops that follow a law one more; and of one of its contacts or limits
 REPORT, CONE, BOUND = int(StepReport.EARLIER), 16, 2
 _LARGEST = [int(StepReport.LOST), int(StepReport.ERROR)]  # of several steps, the largest
+_PARTS = int(StepReport.PARTS)
 _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 
@@ -100,7 +101,7 @@ class Rolled(NamedTuple):
     @property
     def parts(self) -> Integers:
         """(T,) steps that each was divided into, 1 for whole ones."""
-        return np.maximum(self.reports[:, StepReport.PARTS], 1.0).astype(np.int64)
+        return parts_of(self.reports)
 
     def summary(self) -> Vector:
         """(9,) report of the last step that was tried, with the largest loss and error of the solved ones."""
@@ -109,6 +110,11 @@ class Rolled(NamedTuple):
         out = self.reports[min(self.solved_steps, len(self.reports) - 1)].copy()
         out[_LARGEST] = self.reports[: self.solved_steps, _LARGEST].max(axis=0, initial=0.0)
         return np.asarray(out)
+
+
+def parts_of(reports: Floats) -> Integers:
+    """(n,) steps that each of n steps was divided into, 1 for whole ones."""
+    return np.maximum(reports[:, _PARTS], 1.0).astype(np.int64)
 
 
 def add_report(total: Vector, report: Vector) -> None:
