@@ -62,8 +62,8 @@ class MPC:
             reference of the problem at every tick).
         plan: the first plan, at the time of the first call (default None: that of `ilqr` without refinement).
         **settings: fields of `dojo.MPCSettings` by name, whose help has their units and defaults: period, kappa,
-            kappa_grad, guess, patience, rescue, gain_scale, delay, computation, servo, feedforward, time_limit,
-            mean_velocity, friction, shrinkage, learn_ground, adapt, options, first, log.
+            kappa_grad, guess, step_limit, patience, rescue, gain_scale, delay, computation, servo, feedforward,
+            time_limit, mean_velocity, friction, shrinkage, learn_ground, adapt, options, first, log.
 
     Raises:
         TypeError: for an unknown setting, or an argument of the wrong kind.
@@ -88,7 +88,7 @@ class MPC:
         self.problem = problem.with_own_terms(self.sim)
         self.start = problem.start.copy()  # (nx,) where the problem starts, and a plant may
         self.period = float(self.settings.period or self.problem.knot_time)
-        self._solver = Solver(self.problem, self.settings.planner(iterations))
+        self._solver = Solver(self.problem, self.settings.planner(iterations), self.settings.steps(self.sim.nv))
         rescue = self.settings.rescue
         self._starts = None if rescue is None else Starts(self._solver, rescue)
         self.references = References(self.problem, reference)
@@ -310,7 +310,7 @@ class MPC:
         result = solver.iterate(guess, shifted.K, began=begin[0])
         after = result.now if self._usable(result, guess) else None
         result, after = self._rescued(shifted, result, after, begin[0])
-        if after is not None and after.gaps is None:  # the violations of an inconsistent trajectory say little
+        if after is not None and after.gap == 0.0:  # the violations of an inconsistent trajectory say little
             solver.update_multipliers(after)
         taken = after is not None
         if after is None and (result.success or result.status == Status.LINE_SEARCH):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.mpc.adaptation import Adaptation
@@ -13,6 +14,7 @@ from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.short_repr import short_repr
+from solvers.types import Vector
 
 # penalties that grew with every tick would never stop; a second line search would take its time
 OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6, multiple_shooting_below=0.0)
@@ -32,6 +34,10 @@ class MPCSettings:
             a linearisation per tick).
         guess: first trajectory of a tick: "states" keeps the shifted states, "feedback" rolls out from the measured
             state under the gains, "open loop" without them (default "states").
+        step_limit: changes of coordinates in an iteration, a number or (nv,), within which a tick takes the full step
+            of its linear model without a rollout, the real-time iteration of Diehl, Bock and Schloeder (2005) [m, rad].
+            Other steps are searched for. Ticks take less time, and plans may get worse; `inf` leaves a coordinate free.
+            Multipliers of constraints change after searched steps only (default None: all steps are searched for).
         patience: ticks in a row without a new plan after which the next one begins with rollouts, whatever `guess` is;
             None never does. Manipulators get out of stalled plans, while a robot that balances may fall
             (default None).
@@ -70,6 +76,7 @@ class MPCSettings:
     kappa: float = 1e-4
     kappa_grad: float | None = None
     guess: str = "states"
+    step_limit: ArrayLike | None = None
     patience: int | None = None
     rescue: Rescue | None = None
     gain_scale: float = 1.0
@@ -117,8 +124,31 @@ class MPCSettings:
         for name in ("log", "patience"):
             if getattr(self, name) is not None:
                 whole_number(f"MPC({name}=...)", getattr(self, name))
+        if self.step_limit is not None:
+            limit = checks.floats("MPC(step_limit=...)", self.step_limit)
+            if limit.ndim > 1 or not np.all(limit > 0.0):
+                raise ValueError(f"MPC(step_limit=...): expected numbers > 0, got {checks.shown(self.step_limit)}")
         if self.friction is not None:
             checks.number("MPC(friction=...)", self.friction, at_least=0.0)
+
+    def steps(self, nv: int) -> Vector | None:
+        """The step limit of each coordinate.
+
+        Args:
+            nv: number of coordinates' velocities.
+
+        Returns:
+            (nv,) limits [m, rad]; None without.
+
+        Raises:
+            ValueError: for a limit of another shape.
+        """
+        if self.step_limit is None:
+            return None
+        limit = checks.floats("MPC(step_limit=...)", self.step_limit)
+        if limit.shape not in ((), (nv,)):
+            raise ValueError(f"MPC(step_limit=...): expected a number or ({nv},), got {limit.shape}")
+        return np.broadcast_to(limit, (nv,)).copy()
 
     def planner(self, iterations: int) -> Options:
         """Options of the planner for one tick.

@@ -39,7 +39,7 @@ from sim.simulator.derivative_results import Linearization
 from sim.simulator.results import Interrupted
 from solvers.riccati import PredictedChange
 from solvers.status import MESSAGES, Status
-from solvers.types import Matrix, Stack
+from solvers.types import Matrix, Stack, Vector
 
 __all__ = ["Solver", "ilqr"]
 
@@ -145,17 +145,18 @@ class Solver:
     """iLQR with its buffers, for problems that are solved again and again from changing starts.
 
     `solve` plans from a guess to the end. `guess` or `rollout`, and then `iterate`, take single iterations: gains,
-    multipliers and regularisation carry over from one call to the next, until `reset`.
+    multipliers and regularisation carry over from one call to the next, until `reset`. With a step limit (nv,) these
+    are real-time iterations, for `iterate` only.
     """
 
     now: Iterate  # the present trajectory
 
-    def __init__(self, problem: Problem, options: Options | None = None) -> None:
+    def __init__(self, problem: Problem, options: Options | None = None, step_limit: Vector | None = None) -> None:
         self.problem = problem
         self.options = Options() if options is None else options
         self.objective = Objective(problem, self.options)
         self._horizon = problem.sim.horizon(problem.horizon, problem.substeps, problem.control_limits)
-        self._search = Search(problem, self._horizon, self.objective, self.options)
+        self._search = Search(problem, self._horizon, self.objective, self.options, step_limit)
         start = None if problem.free_start is None else FreeStart(problem)
         self._subproblem = Subproblem(problem, self._horizon, self.objective, self.options, start)
         self._history = History(self.options)
@@ -434,8 +435,7 @@ class Solver:
 
     def _iterate(self, stage: Stage) -> Status:
         """Iterate until the stage is done (SOLVED), stuck (LINE_SEARCH), or the whole solve has to end."""
-        status = self._enter(stage)
-        if status != Status.SOLVED:
+        if (status := self._enter(stage)) != Status.SOLVED:
             return status
         local, rejections, kappa_grad = self._subproblem, self.options.rejections, stage.kappa_grad
         last = stage is self.options.stages[-1]  # it must not leave gaps; others leave them to the stages to come
@@ -443,6 +443,8 @@ class Solver:
         self._search.restart()
         self._converged = True
         for _ in range(stage.iterations):
+            if (status := self._enter(stage)) != Status.SOLVED:  # after a step that nothing was rolled out for
+                return status
             before = self.now
             if not local.is_at(before) and local.linearize(before, kappa_grad, stage.kappa_eval) != Status.SOLVED:
                 return Status.SIMULATION_FAILED
@@ -483,12 +485,7 @@ class Solver:
         """Search along the gains, and adapt the regularisation to the step size, which is 0 if none is accepted."""
         before, schedule, kappa = self.now, self._subproblem.schedule, stage.kappa_eval
         direction = self._subproblem.direction(predicted)
-        alpha, self.now = self._search.single_shooting(before, direction, kappa)
-        linear = None
-        if alpha < self.options.multiple_shooting_below and before.gaps is not None:
-            shot, there, beside = self._search.multiple_shooting(before, direction, kappa)
-            if shot > alpha:
-                alpha, self.now, linear = shot, there, beside
+        alpha, self.now, linear = self._search.step(before, direction, kappa)
         if alpha >= _GOOD_STEP:
             schedule.decrease()
         elif (
@@ -578,7 +575,7 @@ class Solver:
             K=local.K.copy(),
             k=local.k.copy(),
             violation=violation,
-            gap=np.inf if now.kappa is None else now.gap,
+            gap=now.gap,
             seconds=time.perf_counter() - history.began,
             time_step=float(self.problem.sim.time_step),
             substeps=self.problem.substeps,

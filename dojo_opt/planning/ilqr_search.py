@@ -13,7 +13,7 @@ from dojo_opt.planning.problem import Problem
 from sim.simulator.horizon import Horizon, Known
 from solvers.riccati import PredictedChange
 from solvers.status import Status
-from solvers.types import Matrix, Stack
+from solvers.types import Matrix, Stack, Vector
 
 __all__ = ["Direction", "Search"]
 
@@ -42,11 +42,20 @@ class Search:
 
     Trials that the simulator cannot step do not count.
     `single_shooting` is the usual line search of iLQR. `multiple_shooting` is for unstable robots
-    whose rollouts fall before the horizon ends. The derivation is in docs/theory/ilqr.md.
+    whose rollouts fall before the horizon ends. `small_step` is for controllers that have no time to search; it comes
+    before the others where there is a step limit (nv,). The derivation is in docs/theory/ilqr.md.
     """
 
-    def __init__(self, problem: Problem, horizon: Horizon, objective: Objective, options: Options) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        horizon: Horizon,
+        objective: Objective,
+        options: Options,
+        step_limit: Vector | None = None,
+    ) -> None:
         self._problem, self._horizon, self._objective, self._options = problem, horizon, objective, options
+        self._step_limit = step_limit
         self.forget()
 
     def forget(self) -> None:
@@ -99,6 +108,37 @@ class Search:
         self._objective.at_kappa(kappa)
         return Iterate(shot.x, shot.u, gaps, *self._objective.evaluate(shot.x, shot.u), kappa, shot.steps)
 
+    def step(self, now: Iterate, direction: Direction, kappa: float) -> tuple[float, Iterate, Any]:
+        """(step size, new iterate, derivatives there if they are known); (0, now, None) without a step."""
+        if self._step_limit is not None and (small := self.small_step(now, direction, kappa)) is not None:
+            return 1.0, small, None
+        alpha, there = self.single_shooting(now, direction, kappa)
+        if alpha < self._options.multiple_shooting_below and now.gaps is not None:
+            other = self.multiple_shooting(now, direction, kappa)
+            if other[0] > alpha:
+                return other
+        return alpha, there, None
+
+    def small_step(self, now: Iterate, direction: Direction, kappa: float) -> Iterate | None:
+        """The full step of all states along the linear model, if no coordinate changes by more than the limit.
+
+        It is the real-time iteration of Diehl, Bock and Schloeder (2005): nothing is rolled out, and the merit may
+        rise. The gaps there are found by the next derivatives.
+        """
+        dx, du = _full_step(now, direction)
+        if not np.all(np.abs(dx[:, : self._problem.sim.nv]) <= self._step_limit):
+            return None
+        x, u = self._moved(now, 1.0, dx, du)
+        self._objective.at_kappa(kappa)
+        return Iterate(x, u, None, *self._objective.evaluate(x, u))
+
+    def _moved(self, now: Iterate, alpha: float, dx: Matrix, du: Matrix) -> tuple[Matrix, Matrix]:
+        """States and inputs, within their limits, after a share of a step."""
+        x, u = self._problem.sim.integrate(now.x, alpha * dx), now.u + alpha * du
+        if self._problem.control_limits is not None:
+            np.clip(u, *self._problem.control_limits, out=u)
+        return x, u
+
     def single_shooting(self, now: Iterate, direction: Direction, kappa: float) -> tuple[float, Iterate]:
         """(step size, new iterate) of the first rollout that is good enough; (0, now) without one.
 
@@ -133,7 +173,7 @@ class Search:
 
         judged by merit + sum of price |gap|, an exact penalty with the largest costates so far as prices.
         """
-        problem, options, predicted = self._problem, self._options, direction.change
+        options, predicted = self._options, direction.change
         self._objective.at_kappa(kappa)
         dx, du = _full_step(now, direction)
         gaps = 0.0 if now.gaps is None else np.abs(now.gaps).sum(axis=0)
@@ -141,9 +181,7 @@ class Search:
         owed = float(np.sum(gaps * self._price))
         alpha = 1.0
         while alpha >= 0.5**options.halvings:
-            x, u = problem.sim.integrate(now.x, alpha * dx), now.u + alpha * du
-            if problem.control_limits is not None:
-                np.clip(u, *problem.control_limits, out=u)
+            x, u = self._moved(now, alpha, dx, du)
             linear = self._horizon.linearize(x, u, kappa)
             if not np.any(linear.status):
                 left = self._horizon.gaps(linear, x)

@@ -25,7 +25,9 @@ class Iterate(NamedTuple):
 
     @property
     def gap(self) -> float:
-        """Largest entry of the gaps."""
+        """Largest entry of the gaps, infinite as long as they are not known."""
+        if self.kappa is None:
+            return np.inf
         return 0.0 if self.gaps is None else float(np.abs(self.gaps).max())
 
 

@@ -104,6 +104,18 @@ def test_step_sizes_go_down_by_the_factor_of_the_options():
             Options(backtracking=factor)
 
 
+def test_steps_within_the_limit_are_taken_without_a_rollout():
+    """One iteration solves a linear problem from states that are no motion; the next finds nothing left to do."""
+    problem = lqr()
+    far = problem.start + np.linspace([0.0, 0.0], [0.3, -0.2], problem.horizon + 1)
+    for limit, rolled in ((np.array([np.inf]), False), (np.array([1e-9]), True)):
+        solver = Solver(problem, Options(stages=(Stage(1e-4, 1e-4, None, 1),)), limit)
+        first = solver.iterate(solver.guess(far, problem.controls0))
+        assert first.alpha == 1.0 and (first.now.kappa is not None) == rolled == np.isfinite(first.now.gap)
+        np.testing.assert_allclose(first.now.x, ilqr(problem, stages=ONE_STAGE).x, atol=1e-9)
+        assert solver.iterate(first.now).now.gap < 1e-9
+
+
 def test_iterations_one_by_one_agree_with_a_solve():
     """Gains and regularisation carry over from one call to the next."""
     problem, (stage,) = swingup(), ONE_STAGE

@@ -198,6 +198,20 @@ def test_plans_see_the_ellipsoid_nearest_to_a_hull():
     assert seen.x < 0.045 and seen.y < 0.045 and OBJECTS["airplane"].simple.y > 0.055
 
 
+def test_plans_see_a_bowl_on_the_palm_as_the_hull_of_few_of_its_corners():
+    """An ellipsoid rolls back where a bowl lies still on its side; fingers touch the ellipsoid."""
+    around = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    circles = [(0.044, 0.02), (0.02, -0.02)]
+    rows = [[r * np.cos(a), r * np.sin(a), z] for r, z in circles for a in around]
+    thing = OBJECTS["bowl"].hulled(rows)
+    shapes = {c.name: c.shape_a for c in palm_up.mechanism("bowl", thing, planned=True).collisions}
+    palm = np.asarray(shapes.pop("palm").vertices)
+    assert len(palm) == 12 and set(shapes.values()) == {thing.simple}
+    np.testing.assert_allclose(np.ptp(palm[:, 2]), 0.04, atol=1e-12)  # it stands as high
+    own = {c.name: c.shape_a for c in palm_up.mechanism("bowl", thing).collisions}
+    assert set(own.values()) == {thing.shape} and own.keys() == shapes.keys() | {"palm"}
+
+
 @pytest.mark.slow
 def test_a_hand_turns_a_cube():
     """By three quarters of a quarter turn on its palm, within .9 s; it stays there for 2 s in the benchmark."""

@@ -31,6 +31,8 @@ from support.standing_hopper import HOPPER, standing_problem
         ({"gain_scale": float("nan")}, "gain_scale"),
         ({"friction": -0.1}, "friction"),
         ({"patience": 0}, "patience"),
+        ({"step_limit": 0.0}, "step_limit"),
+        ({"step_limit": [0.1, float("nan")]}, "step_limit"),
     ],
 )
 def test_settings_are_checked(settings, message):
@@ -46,6 +48,8 @@ def test_calls_are_checked():
         mpc(np.nan, HOPPER.neutral())
     with pytest.raises(ValueError, match="whole number"):
         dojo.MPC(standing_problem(), iterations=0)
+    with pytest.raises(ValueError, match=r"step_limit.*\(7,\), got \(2,\)"):
+        dojo.MPC(standing_problem(), step_limit=[0.1, 0.1])
 
 
 def test_plans_once_per_period_and_one_iteration_each():
@@ -228,7 +232,7 @@ def test_constraints_hold_in_closed_loop():
     [
         {"rescue": dojo.Rescue(splines=1), "patience": 1, "kappa_grad": 1e-3},
         {"computation": 0.02, "servo": (1.0, 0.1), "learn_ground": True},
-        {"delay": 0.02, "guess": "feedback"},
+        {"delay": 0.02, "guess": "feedback", "step_limit": 0.01},
         {"adapt": dojo.Adaptation(["friction:*"], shear=0.2), "learn_ground": True, "friction": 0.5},
     ],
 )
@@ -266,6 +270,22 @@ def test_no_tick_loads_code(monkeypatch, settings):
     assert len(mpc.log) == 8 and log == 1
     assert (next(failed) > 10) == bool(settings.keys() & {"computation", "delay", "adapt"})  # plans refuse such steps
     assert used == before and len(compiled(users=True)) == count
+
+
+def test_a_tick_rolls_nothing_out_within_its_step_limit():
+    """Where all steps are longer than the limit, ticks are those without one."""
+    inputs, rolled = [], []
+    for limit in (None, 1e-12, np.inf):
+        mpc = dojo.MPC(standing_problem(), step_limit=limit)
+        mpc(0.0, HOPPER.neutral())
+        before = mpc._solver.step_iterations
+        pushed = HOPPER.integrate(HOPPER.neutral(), 0.01 * np.eye(14)[7])
+        inputs.append([mpc(0.05 * tick, pushed) for tick in range(1, 4)])
+        rolled.append(mpc._solver.step_iterations - before)
+        assert not any(t.fallback for t in mpc.log)
+    np.testing.assert_array_equal(inputs[1], inputs[0])
+    assert rolled[0] == rolled[1] > 0 == rolled[2]
+    np.testing.assert_allclose(inputs[2], inputs[0], atol=2.0)  # of 41 N: a step of another length, from the same gains
 
 
 @pytest.mark.parametrize("guess", ["states", "feedback", "open loop"])

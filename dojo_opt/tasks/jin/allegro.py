@@ -34,6 +34,9 @@ _LIFT, _UNBENT, _STEPS = 1e-3, 0.98, 100
 # [N s m] of plans: the gap of a contact is kappa over its impulse; at 1e-4 objects float by centimetres, near their
 # goals, and hands do not lift them
 _KAPPA = 1e-5
+# [m, rad] of the cube: a step of a plan that moves it by less is taken without a search, which takes most of a tick.
+# The other objects have a tenth of its mass: bowl and camera are thrown then, and the foam brick stays farther off
+_STEP_LIMIT = np.array([0.01] * 3 + [0.15] * 3 + [np.inf] * (FINGERS * JOINTS))
 
 
 def trial_of(item: str, number: int) -> Trial:
@@ -101,7 +104,8 @@ def allegro(item: str = "cube", trial: int = 0, hull: ArrayLike | None = None, *
     their sizes, and the torus, of which MuJoCo sees the convex hull, is a polytope of 60 corners. The others have mass,
     centre of mass, inertia and size of the publication's meshes, and are boxes or cylinders, unless the corners of
     their convex hulls are given. Plans see torus and others as ellipsoids, those of hulls the nearest ones, and tips as
-    three balls each where they see a box or a cylinder. Contacts have no torsional friction. At the start, fingers that
+    three balls each where they see a box or a cylinder; on the palm they see bowl and binoculars with a hull as that
+    of 12 of its corners. Contacts have no torsional friction. At the start, fingers that
     overlap the object are unbent, or it is lifted.
 
     Args:
@@ -127,5 +131,7 @@ def allegro(item: str = "cube", trial: int = 0, hull: ArrayLike | None = None, *
     start = _apart(given.start, hand)
     given = given._replace(start=start[BaseState.POSE])
     hand, planned = (replace(mech, neutral=start) for mech in (hand, mechanism(item, thing, planned=True)))
-    usual = {"servo": None, "iterations": 1, "kappa": _KAPPA}
+    usual: dict[str, Any] = {"servo": None, "iterations": 1, "kappa": _KAPPA}
+    if item == "cube":
+        usual["step_limit"] = _STEP_LIMIT
     return reposing(name, given, planned, hand, terms, aim, {**usual, **settings})

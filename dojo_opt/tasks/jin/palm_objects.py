@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.tasks.jin.coarse_hull import coarse_hull
 from dojo_opt.tasks.jin.fitted_ellipsoid import fitted_ellipsoid
 from sim.mechanism import checks
 from sim.mechanism.body import Body
@@ -34,6 +35,9 @@ class PalmObject(NamedTuple):
         friction: its coefficient of friction.
         simple: its shape in plans, from its centre of mass; None for the same shape.
         right_first: whether the turn to the right is the first of the two that trials choose from.
+        corners: number of corners of its hull that plans see on the palm, instead of the simple shape: an object with
+            flat sides lies still where an ellipsoid would roll; 0 for none.
+        below: its shape on the palm in plans, from its centre of mass; None for that which the fingers see.
     """
 
     center: tuple[float, float]
@@ -46,6 +50,8 @@ class PalmObject(NamedTuple):
     friction: float = 0.5
     simple: Solid | None = None
     right_first: bool = False
+    corners: int = 0
+    below: Solid | None = None
 
     def body(self, name: str) -> Body:
         """The object as a body.
@@ -65,6 +71,7 @@ class PalmObject(NamedTuple):
         """The same object with the convex hull of points as its shape.
 
         Plans see the ellipsoid that is nearest to it, if they see an ellipsoid of this object, and else its own shape.
+        On the palm they see a hull of few corners, if this object has a number of them.
 
         Args:
             points: (n, 3) points in the frame of the mesh [m].
@@ -77,7 +84,9 @@ class PalmObject(NamedTuple):
         """
         rows = checks.array("tasks.jin.allegro(hull=...)", points, (None, 3)) - np.asarray(self.com)
         shape = Polytope(rows)
-        return self._replace(shape=shape, simple=self.shape if self.simple is None else fitted_ellipsoid(rows))
+        below = Polytope(coarse_hull(shape.vertices, self.corners)) if self.corners else None
+        simple = self.shape if self.simple is None else fitted_ellipsoid(rows)
+        return self._replace(shape=shape, simple=simple, below=below)
 
 
 def _ring_hull() -> Polytope:
@@ -128,6 +137,7 @@ OBJECTS = {
         **_lump((0.088, 0.088, 0.0455), (0.0, 0.0, -0.0034), Cylinder),
         com=(0.0, 0.0, 0.003235),
         inertia=(4.928e-6, 4.928e-6, 7.872e-6),
+        corners=12,
     ),
     "airplane": PalmObject(
         (-0.03, -0.01),
@@ -145,6 +155,7 @@ OBJECTS = {
         com=(-0.00066, -0.000483, -0.002887),
         inertia=(2.902e-6, 7.966e-6, 5.822e-6, 0.0, 0.0, -5.53e-8),
         friction=0.9,
+        corners=12,
     ),
     "cup": PalmObject(
         (-0.03, 0.0),

@@ -135,6 +135,7 @@ def mechanism(item: str, thing: PalmObject, planned: bool = False) -> Mechanism:
     """
     own = links()
     shape = thing.simple or thing.shape if planned else thing.shape
+    below = thing.below or shape if planned else shape
     bodies, joints = assembled(own)
     reach, limit = (_REACH, TORQUE) if planned else (None, np.inf)
     rows = _TIP_BALLS if planned and isinstance(shape, Box | Cylinder) else 0
@@ -150,7 +151,8 @@ def mechanism(item: str, thing: PalmObject, planned: bool = False) -> Mechanism:
     at = rotation_matrix(_UP) @ np.array([-0.0093, 0.0, -0.0475])
     parts.append((None, Box(0.0408, 0.113, 0.095, center=at, orientation=_UP), max(_PALM, thing.friction), "palm"))
     collisions = [
-        Collision(item, link, shape, other, friction=grip, name=name, reach=reach) for link, other, grip, name in parts
+        Collision(item, link, below if name == "palm" else shape, other, friction=grip, name=name, reach=reach)
+        for link, other, grip, name in parts
     ]
     neutral: dict[str, Any] = {
         f"{name}_{k}": angle for name, row in zip(NAMES, _START, strict=True) for k, angle in enumerate(row)
