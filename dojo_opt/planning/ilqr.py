@@ -30,7 +30,7 @@ from dojo_opt.planning.options import RENAMED, Options, Stage
 from dojo_opt.planning.overload import overload
 from dojo_opt.planning.plan import History, Plan
 from dojo_opt.planning.problem import Problem
-from dojo_opt.planning.refinement import refine
+from dojo_opt.planning.refinement import FAILED, refine
 from dojo_opt.planning.subproblem import Subproblem
 from sim.mechanism import checks
 from sim.mechanism.renamed import renamed_keywords
@@ -42,9 +42,6 @@ from solvers.status import MESSAGES, Status
 from solvers.types import Matrix, Stack, Vector
 
 __all__ = ["Solver", "ilqr"]
-
-# ends of an attempt after which another first stage may lead further; all others end the solve
-FAILED = (Status.SIMULATION_FAILED, Status.INFEASIBLE, Status.LINE_SEARCH, Status.MAX_REGULARIZATION, Status.NOT_FINITE)
 
 _PROGRESS = 0.9  # share of the least violation so far that counts as progress
 _STALLED = 5  # multiplier updates of the last stage without progress

@@ -17,9 +17,13 @@ from sim.model.interruptible_loops import TimeUp, ends_at
 from sim.simulator.results import FeedbackRollout, Interrupted
 from solvers.status import MESSAGES, Status
 
-__all__ = ["coordinate_error", "refine", "replay_error"]
+__all__ = ["FAILED", "coordinate_error", "refine", "replay_error"]
+
+# ends of an attempt after which another first stage may lead further; all others end the solve
+FAILED = (Status.SIMULATION_FAILED, Status.INFEASIBLE, Status.LINE_SEARCH, Status.MAX_REGULARIZATION, Status.NOT_FINITE)
 
 _MOST = 32  # parts of a time step
+_HARD = 2  # last stages, of the second try
 
 Solve = Callable[[Problem, Plan, Options], Plan]  # of a problem, from a plan
 
@@ -30,6 +34,9 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
     First every time step is divided into `refinement` parts. With a `refined_accuracy` the number of parts is doubled
     until plan and replay are no further apart than that; more than 32 parts make
     problems that are hard to solve.
+
+    Smooth stages may find a cheaper motion, or lose that of the plan. If they end in a failure, the plan is solved
+    again from where it was, by the last two stages alone.
 
     A plan that is no nearer to the `refined_constraints` than the start, such as a jump that stays on the ground, is
     not refined: shorter steps have never lifted one.
@@ -59,7 +66,7 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
             if isinstance(left, Status):
                 return _ended(_joined(plans, began, options), left)
             options.say(f"Refinement: every time step divided by {count}:")
-            plans.append(solve(problem.refined(count), plans[-1], left))
+            plans += _solved(problem.refined(count), plans, options, left, solve, began)
         if asked is None or not plans[-1].success:
             return plans[0] if len(plans) == 1 else _joined(plans, began, options)  # as its own last line has it
         try:
@@ -76,6 +83,19 @@ def refine(problem: Problem, plan: Plan, options: Options, solve: Solve) -> Plan
             detail = f" {apart:.1e} apart, asked {asked:g}."
             return _ended(_joined(plans, began, options), Status.ACCURACY_NOT_REACHED, detail)
         count *= 2
+
+
+def _solved(
+    finer: Problem, plans: list[Plan], options: Options, left: Options, solve: Solve, began: float
+) -> list[Plan]:
+    """Plans of the finer problem, from the last one, in the order of the tries but for a second one that fails, too."""
+    first = solve(finer, plans[-1], left)
+    again = _left(options, [*plans, first], began)
+    if first.status not in FAILED or len(options.stages) <= _HARD or isinstance(again, Status):
+        return [first]
+    options.say(f"{first.status.name}; again from the plan before, by the last {_HARD} stages")
+    second = solve(finer, plans[-1], replace(again, stages=again.stages[-_HARD:]))
+    return [first, second] if second.success else [second, first]
 
 
 def _left(options: Options, plans: list[Plan], began: float) -> Options | Status:

@@ -8,6 +8,7 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt.planning import refinement
 from dojo_opt.planning.multi_start import of_problem
+from dojo_opt.planning.options import Options
 from dojo_opt.planning.refinement import replay_error
 from dojo_opt.problems import hop
 from sim.simulator.results import Interrupted
@@ -48,6 +49,24 @@ def test_the_refinement_is_the_first_that_is_tried_and_its_constraints_hold():
     goal = dojo.constraint.StateBounds(-np.inf, 10.0, components="body z", knots=10)
     plan = dojo.ilqr(asked(1.0, refined_constraints=(goal,)))
     assert plan.substeps == 2 and len(plan.multipliers) == len(dojo.ilqr(hop()).multipliers) + 1
+
+
+@pytest.mark.parametrize("harder", [True, False])
+def test_a_refinement_that_fails_is_tried_again_by_hard_stages(harder):
+    """From the plan before; all iterations count, and the first end is that of the solve if both fail."""
+    plan, tries = dojo.ilqr(hop()), []
+
+    def solve(finer, last, options):
+        tries.append((last, len(options.stages), options.max_iterations))
+        success = len(tries) == 2 and harder
+        status = dojo.Status.SOLVED if success else dojo.Status.LINE_SEARCH
+        return replace(last, success=success, status=status, nit=7 * len(tries), fun=float(len(tries)))
+
+    options = Options()
+    found = refinement.refine(asked(None, refinement=2), plan, options, solve)
+    most = options.max_iterations - plan.nit
+    assert tries == [(plan, 4, most), (plan, 2, most - 7)]
+    assert found.success == harder and found.fun == (2.0 if harder else 1.0) and found.nit == plan.nit + 21
 
 
 def test_a_replay_that_stays_apart_is_no_success(monkeypatch):

@@ -11,8 +11,9 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.planning.ilqr import FAILED, Solver
+from dojo_opt.planning.ilqr import Solver
 from dojo_opt.planning.ilqr_start import at_rest as resting_joint
+from dojo_opt.planning.refinement import FAILED
 from solvers.status import Status
 
 
