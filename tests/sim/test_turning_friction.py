@@ -156,6 +156,23 @@ def test_moments_between_bodies_conserve_momentum() -> None:
         np.testing.assert_allclose(after, before, atol=1e-12)
 
 
+@pytest.mark.parametrize(("torsional", "turns"), [(0.0, True), (0.002, True), (0.005, False)])
+def test_fingertips_hold_a_bar_beside_its_centre_by_torsional_friction(torsional: float, turns: bool) -> None:
+    """Against a moment of .1 kg g .05 m, with 10 N on either side: two moments of 10 N mu_t, from mu_t = 2.5 mm on."""
+    tip, y = dojo.Sphere(0.01), 0.05
+    bodies = [dojo.Body("bar", 0.1, shape=dojo.Box(0.04, 0.3, 0.04)), *(dojo.Body(n, 0.05, shape=tip) for n in "lr")]
+    joints = [dojo.Joint("floating", None, "bar")]
+    for name, side in (("l", 1.0), ("r", -1.0)):
+        joints.append(dojo.Joint("prismatic", None, name, parent_point=(-0.03 * side, y, 0), axis=(side, 0, 0)))
+    grips = [dojo.Collision(name, "bar", friction=1.0, torsional_friction=torsional) for name in "lr"]
+    mech = dojo.Mechanism(bodies, joints, inputs=[dojo.Input("l"), dojo.Input("r")], collisions=grips)
+    sim = dojo.Simulator(mech, time_step=0.01)
+    x = sim.rollout(sim.neutral(), np.full((30, 2), 10.0), throw=True).x[-1]
+    assert (abs(x[4]) > 0.1) == turns
+    if not turns:
+        assert np.abs(x[4:7]).max() < 1e-6
+
+
 def test_moments_are_saved_and_described(tmp_path: Path) -> None:
     sim, x = moving()
     t = sim.rollout(x, np.zeros((2, 0)))
