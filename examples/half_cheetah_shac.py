@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 import dojo_opt as dojo
 
-EPOCHS = 100 if QUICK else 600
+SETTINGS = {"epochs": 100} if QUICK else {}  # otherwise those of the task
 task = dojo.learn.half_cheetah()
-learned = dojo.learn.shac(task, seed=0, epochs=EPOCHS, verbose=True)
+learned = dojo.learn.shac(task, seed=0, verbose=True, **SETTINGS)
 print(learned)
 learned.policy.save("half_cheetah_shac.npz")
 harder = dojo.learn.evaluate(learned.policy, episodes=4, seed=1, substeps=10, kappa=3e-5)  # never seen while learning
