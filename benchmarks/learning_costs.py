@@ -5,7 +5,8 @@
 Tasks of Gymnasium, 64 rows that move under random actions, processor time per row and action: the least of some rounds
 taken in turns. Rows start from their states alone, or from the impulses of their last steps. Contacts beyond the cutoff
 with which the task is learnt are far, but in one column. An epoch: the means over the later epochs of a run with the
-settings of the task. Memory: the most that the process has had.
+settings of the task. Memory: the most that the process has had; where it compiles
+kernels, more than a third of that is the compiler's, so run it twice.
 """
 
 from __future__ import annotations
