@@ -157,7 +157,7 @@ def test_moments_between_bodies_conserve_momentum() -> None:
 
 
 @pytest.mark.parametrize(("torsional", "turns"), [(0.0, True), (0.002, True), (0.005, False)])
-def test_fingertips_hold_a_bar_beside_its_centre_by_torsional_friction(torsional: float, turns: bool) -> None:
+def test_fingertips_hold_a_bar_beside_its_center_by_torsional_friction(torsional: float, turns: bool) -> None:
     """Against a moment of .1 kg g .05 m, with 10 N on either side: two moments of 10 N mu_t, from mu_t = 2.5 mm on."""
     tip, y = dojo.Sphere(0.01), 0.05
     bodies = [dojo.Body("bar", 0.1, shape=dojo.Box(0.04, 0.3, 0.04)), *(dojo.Body(n, 0.05, shape=tip) for n in "lr")]
