@@ -136,6 +136,11 @@ CALLS = {
     "minimal shape": (lambda: hopper().minimal(np.zeros((2, 13))), "minimal", "(1, 13)", "(2, 13)"),
     "vjp of no trajectory": (lambda: hopper().vjp("run", np.zeros((2, 12))), "vjp(trajectory)", "'run'"),
     "terrain of a number": (lambda: dojo.Terrain.from_function(3.0, x=(-1, 1), y=(-1, 1)), "from_function(f)", "3.0"),
+    "terrain of a range": (
+        lambda: dojo.Terrain.from_function(lambda x, y: np.sin(3 * x), x=(-3, 3), y=[0.0]),
+        "from_function(x)",
+        "np.linspace(-3, 3, 61)",
+    ),
     "energy nan": (lambda: hopper().energy(state(_8=np.nan)), "energy", "nan"),
 }
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from dojo_opt.planning.options import Options
 from dojo_opt.planning.problem import REPLAY_ACCURACY
+from dojo_opt.planning.term import check_order
 from sim import drawn
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
@@ -53,6 +54,10 @@ def _check_arrays(sim: Simulator, meta: dict[str, Any], data: dict[str, Any]) ->
     check_shapes(data, {**shapes, **{name: (None, None) for name in data if name.startswith(parts)}})
     for name in shapes:
         checks.array(name, data[name], shapes[name])
+    if "control_limits" in data:
+        check_shapes(data, {"control_limits": (2, nu)})  # infinite ones are none
+        lower, upper = data["control_limits"]
+        check_order("control_limits", lower, upper, [lower, upper])
     for record in meta["history"]:
         if not all(isinstance(record[name], int | float) for name in RECORDED):
             raise ValueError(f"a record of the history: {checks.shown(record)}")
@@ -99,6 +104,8 @@ class Plan:
         penalties: likewise.
         problem: the Problem; not saved.
         simulator: the simulator (default None: that of the problem).
+        control_limits: (lower, upper), (nu,) each [N, N m], within which `replay` stays (default None: those of the
+            problem, or of the inputs of the mechanism).
     """
 
     success: bool
@@ -121,10 +128,13 @@ class Plan:
     penalties: list[Matrix] = field(default_factory=list)
     problem: Any = None
     simulator: Any = None
+    control_limits: tuple[Vector, Vector] | None = None
 
     def __post_init__(self) -> None:
         if self.simulator is None and self.problem is not None:
             self.simulator = self.problem.sim
+        if self.control_limits is None and self.problem is not None:
+            self.control_limits = self.problem.control_limits
 
     def __repr__(self) -> str:
         return (
@@ -187,10 +197,10 @@ class Plan:
             ValueError: for a plan without a simulator, an accuracy that its mechanism does not have, a time step beside
                 an accuracy, or one that does not divide a knot.
         """
-        sim, problem, steps = self.simulator, self.problem, 1
+        sim, steps = self.simulator, 1
         if sim is None:
             raise ValueError("Plan.replay: expected a plan with its simulator")
-        limits = sim.mechanism.input_limits if problem is None else problem.control_limits
+        limits = sim.mechanism.input_limits if self.control_limits is None else self.control_limits
         smoothing = {} if kappa is None else {"kappa": kappa}
         if time_step is None:
             error = REPLAY_ACCURACY if accuracy is None else accuracy
@@ -259,6 +269,7 @@ class Plan:
         head, arrays = archived(self.simulator if isinstance(self.simulator, Simulator) else None, "plan")
         arrays |= {name: getattr(self, name) for name in ("x", "u", "K", "k")}
         arrays |= {} if self.stride is None else {"stride": self.stride}
+        arrays |= {} if self.control_limits is None else {"control_limits": np.array(self.control_limits)}
         arrays |= {f"multiplier_{i}": a for i, a in enumerate(self.multipliers)}
         arrays |= {f"penalty_{i}": a for i, a in enumerate(self.penalties)}
         meta = {name: getattr(self, name) for name in SAVED} | {"status": int(self.status)}
@@ -289,7 +300,10 @@ class Plan:
             multipliers = [data[f"multiplier_{i}"] for i in range(count)]
             penalties = [data[f"penalty_{i}"] for i in range(count)]
             arrays = {name: data[name] for name in ("x", "u", "K", "k", "stride") if name in data}
-            return cls(**meta, **arrays, multipliers=multipliers, penalties=penalties, simulator=sim)
+            plan = cls(**meta, **arrays, multipliers=multipliers, penalties=penalties, simulator=sim)
+        if "control_limits" in data:
+            plan.control_limits = data["control_limits"][0], data["control_limits"][1]
+        return plan
 
     def export(self, path: str | Path) -> None:
         """Write the motion for other tools.

@@ -6,7 +6,7 @@ As in `dojo_opt.plots`: matplotlib is imported when a figure is made, and nothin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from dojo_opt.plant.tick import Tick, milliseconds
 from dojo_opt.plots.axes import finish, plain_ticks, units
 from dojo_opt.plots.trajectory import controls, state, velocities
 from dojo_opt.viewer.motion import motion
+from sim.mechanism import checks
 from solvers.types import Matrix
 
 if TYPE_CHECKING:
@@ -25,6 +26,12 @@ if TYPE_CHECKING:
 
 
 __all__ = ["base_height", "base_path", "closed_loop", "study", "survival", "tick_times", "tracking"]
+
+
+def _expect(call: str, result: Any, kind: type) -> None:
+    """Refuse results of another kind."""
+    if not isinstance(result, kind):
+        raise TypeError(f"plots.{call}: expected a {kind.__name__}, got {checks.shown(result)}")
 
 
 def _axes(ax: Axes | None) -> Axes:
@@ -46,9 +53,13 @@ def closed_loop(result: ClosedLoop) -> Figure:
 
     Returns:
         A new figure.
+
+    Raises:
+        TypeError: `result` is no closed loop.
     """
     from matplotlib.figure import Figure
 
+    _expect("closed_loop(result)", result, ClosedLoop)
     figure = Figure(figsize=(10, 7), layout="constrained")
     axes = np.ravel(figure.subplots(2, 2))
     m = motion(result)
@@ -87,6 +98,7 @@ def base_height(result: ClosedLoop, ax: Axes | None = None) -> Axes:
     Returns:
         The axes.
     """
+    _expect("base_height(result)", result, ClosedLoop)
     ax = _axes(ax)
     ax.plot(result.time, _path(result, result.x)[:, 2], label="plant")
     if result.reference is not None:
@@ -109,6 +121,7 @@ def tracking(result: ClosedLoop, ax: Axes | None = None) -> Axes:
     Raises:
         ValueError: the closed loop has no reference.
     """
+    _expect("tracking(result)", result, ClosedLoop)
     ax = _axes(ax)
     mechanism = result.simulator.mechanism
     count = mechanism.joints[0].ntrans if stands_free(mechanism) else mechanism.nv
@@ -128,6 +141,7 @@ def base_path(result: ClosedLoop, ax: Axes | None = None) -> Axes:
     Returns:
         The axes.
     """
+    _expect("base_path(result)", result, ClosedLoop)
     ax = _axes(ax)
     path = _path(result, result.x)
     planar = result.simulator.mechanism.joints[0].kind == "planar_axis"
@@ -179,6 +193,7 @@ def study(result: MonteCarlo) -> Figure:
     Returns:
         A new figure.
     """
+    _expect("study(result)", result, MonteCarlo)
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 4), layout="constrained")

@@ -31,6 +31,8 @@ __all__ = ["save_html"]
 _GRID, _SQUARE, _PIECE = 20.0, 0.5, 1.0  # edge of the drawn floor, of its squares, length of a piece of a line [m]
 _AROUND, _FINE, _LINES = 1.0, 0.02, 160  # of drawn terrain: margin, spacing [m], and lines along one axis at most
 
+_OTHERS = (".mp4", ".gif", ".webm", ".avi", ".mov", ".png", ".jpg", ".jpeg", ".svg", ".pdf")
+
 _FLOOR, _LINE = 0xECEBE7, 0xB9B7B1  # colours
 _RUBBER, _EARTH = (0.2, 0.2, 0.2), (0.6, 0.56, 0.5, 0.6)
 
@@ -68,11 +70,17 @@ def save_html(
 
     Raises:
         TypeError: the result is none of these.
-        ValueError: the result does not know its simulator, the list is empty, or there are not as many names.
+        ValueError: the result does not know its simulator, the list is empty, there are not as many names, or the path
+            is that of a picture or a video.
         SimulationError: a step of a plan cannot be solved again, for its forces.
         OSError: the file cannot be written.
     """
     target = checks.path("save_html(path)", path)
+    if target.suffix.lower() in _OTHERS:
+        raise ValueError(
+            f"save_html(path): expected a page such as {target.stem}.html, got {target.name!r}; pictures "
+            "are those of save_picture, videos those of save_video"
+        )
     results = list(result) if isinstance(result, list | tuple) else [result]
     if not results:
         raise ValueError("save_html(result): expected one result or more, got an empty list")

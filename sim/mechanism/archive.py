@@ -7,6 +7,7 @@ makes the parts anew and checks them as when a user does. Arrays are {"array": n
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from importlib import import_module
@@ -22,6 +23,7 @@ Arrays = dict[str, NDArray[Any]]
 __all__ = ["VERSION", "packed_part", "part_of"]
 
 VERSION = 1
+_SHARED = ("Polytope", "SignedDistance", "Terrain")
 PARTS = {cls.__name__: cls.__module__ for cls in Solid.__subclasses__() if cls.__module__ == Solid.__module__} | {
     "Body": "sim.mechanism.body",
     "Collision": "sim.mechanism.collision",
@@ -62,6 +64,9 @@ def packed_part(value: Any, arrays: Arrays) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, np.ndarray):
+        for name, array in arrays.items():
+            if array is value:  # of a part that others share
+                return {"array": name}
         name = f"array_{len(arrays)}"
         arrays[name] = value
         return {"array": name}
@@ -75,12 +80,15 @@ def packed_part(value: Any, arrays: Arrays) -> Any:
     raise TypeError(f"expected a part of a mechanism, a number, a text or an array, got {value!r}")
 
 
-def part_of(data: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
+def part_of(data: Any, arrays: Mapping[str, NDArray[Any]], shared: dict[str, Any] | None = None) -> Any:
     """The inverse of `packed_part`; lists come back as tuples.
+
+    A part that several others hold, such as the terrain of all contacts, is one object again.
 
     Args:
         data: numbers, texts, lists and tables.
         arrays: arrays by name.
+        shared: parts made so far that others may hold as well (default None: none).
 
     Returns:
         The part, made anew.
@@ -88,20 +96,26 @@ def part_of(data: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
     Raises:
         ValueError: the data name an unknown part, or one with values that it refuses.
     """
+    shared = {} if shared is None else shared
     if isinstance(data, list):
-        return tuple(part_of(item, arrays) for item in data)
+        return tuple(part_of(item, arrays, shared) for item in data)
     if not isinstance(data, dict):
         return data
     if "array" in data:
         return arrays[data["array"]]
     if "table" in data:
-        return {part_of(key, arrays): part_of(value, arrays) for key, value in data["table"]}
+        return {part_of(key, arrays, shared): part_of(value, arrays, shared) for key, value in data["table"]}
     kind = data.get("part")
     if kind not in PARTS:
         raise ValueError(f"expected one of {', '.join(sorted(PARTS))}, got {kind!r}")
     made = getattr(import_module(PARTS[kind]), kind)
     known = {f.name for f in fields(made) if f.init} if is_dataclass(made) else set(data)
-    given = {name: part_of(value, arrays) for name, value in data.items() if name != "part"}
+    given = {name: part_of(value, arrays, shared) for name, value in data.items() if name != "part"}
     if unknown := set(given) - known:
         raise ValueError(f"{kind} has no field {', '.join(sorted(map(repr, unknown)))}")
-    return made(**given)
+    if kind not in _SHARED:
+        return made(**given)
+    key = json.dumps(data)  # equal only where their arrays are the same ones
+    if key not in shared:
+        shared[key] = made(**given)
+    return shared[key]

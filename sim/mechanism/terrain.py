@@ -25,6 +25,7 @@ from sim.mechanism.short_repr import short_repr
 from sim.mechanism.spline import spline, spline_coefficients, spline_gradient, spline_shares
 from solvers.types import Floats
 
+_LINEAR = 1e-9  # [m] by which a function between two grid lines may be off a straight line, and of its height
 _EDGE = 16  # grid lines across an edge of a step
 _MARGIN = 8  # level grid lines around kinks: the waves of a spline fade by .27 per line
 
@@ -102,26 +103,24 @@ class Terrain:
 
         Args:
             f: heights f(X, Y) (nx, ny) [m] of places X, Y (nx, ny) [m].
-            x: grid lines (nx,) [m].
-            y: grid lines (ny,) [m].
+            x: grid lines (nx,) [m], such as np.linspace(-3, 3, 61); one if f does not depend on x.
+            y: grid lines (ny,) [m], likewise.
 
         Returns:
             The terrain.
 
         Raises:
             TypeError: `f` is not a function.
-            ValueError: the grid lines are not equally spaced, or a height is not finite.
+            ValueError: the grid lines are not equally spaced, two of them are given for an f that is not linear between
+                them, or a height is not finite.
         """
         if not callable(f):
             raise TypeError(f"Terrain.from_function(f): expected a function of (X, Y), got {f!r}")
         lines = [_lines(f"Terrain.from_function({name})", given) for name, given in (("x", x), ("y", y))]
-        X, Y = np.meshgrid(*lines, indexing="ij")
-        values = checks.floats("Terrain.from_function(f)", f(X, Y))
-        try:
-            values = np.array(np.broadcast_to(values, X.shape))
-        except ValueError:
-            raise ValueError(f"Terrain.from_function(f): expected shape {X.shape}, got {values.shape}") from None
-        heights = checks.array("Terrain.from_function(f)", values, X.shape)
+        heights = _heights(f, lines)
+        for axis, name in enumerate("xy"):
+            if len(lines[axis]) == 2:
+                _check_linear(f"Terrain.from_function({name})", f, lines, axis, heights)
         spacing = [line[1] - line[0] if len(line) > 1 else 1.0 for line in lines]
         return Terrain(heights, (lines[0][0], lines[1][0]), spacing)
 
@@ -370,6 +369,32 @@ def _places(call: str, x: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
     except ValueError:
         raise ValueError(f"{call}(x, y): the shapes {along.shape} and {across.shape} do not fit each other") from None
     return first, second
+
+
+def _heights(f: Callable[[Floats, Floats], ArrayLike], lines: list[Floats]) -> Floats:
+    """(nx, ny) heights of f above the grid."""
+    X, Y = np.meshgrid(*lines, indexing="ij")
+    values = checks.floats("Terrain.from_function(f)", f(X, Y))
+    try:
+        values = np.array(np.broadcast_to(values, X.shape))
+    except ValueError:
+        raise ValueError(f"Terrain.from_function(f): expected shape {X.shape}, got {values.shape}") from None
+    return checks.array("Terrain.from_function(f)", values, X.shape)
+
+
+def _check_linear(
+    call: str, f: Callable[[Floats, Floats], ArrayLike], lines: list[Floats], axis: int, heights: Floats
+) -> None:
+    """Refuse two grid lines along an axis, which were meant as a range, of an f that is not linear between them."""
+    between = [0.7 * line[:1] + 0.3 * line[1:] if k == axis else line for k, line in enumerate(lines)]
+    first, last = np.split(heights, 2, axis)
+    off = float(np.abs(_heights(f, between) - (0.7 * first + 0.3 * last)).max())
+    if off > _LINEAR * max(float(np.abs(heights).max()), 1.0):
+        low, high = lines[axis]
+        raise ValueError(
+            f"{call}: expected the grid lines, such as np.linspace({low:g}, {high:g}, 61); two lines give a plane, "
+            f"{off:.2g} m off the function between them"
+        )
 
 
 def _heading(call: str, direction: ArrayLike) -> tuple[float, float]:

@@ -152,4 +152,6 @@ def test_figure_of_survival_steps_down_at_every_fall():
     np.testing.assert_allclose(line.get_xdata(), [0.0, 1.0, 2.0, 4.0])
     np.testing.assert_allclose(line.get_ydata(), [1.0, 0.75, 0.5, 0.5])
     assert len(dojo.plots.study(study).axes) == 2
+    with pytest.raises(TypeError, match=r"plots.closed_loop\(result\): expected a ClosedLoop, got a? ?MonteCarlo"):
+        dojo.plots.closed_loop(study)
     assert study.interval[0] < 0.5 < study.interval[1]

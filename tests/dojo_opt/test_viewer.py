@@ -427,6 +427,8 @@ def test_motions_side_by_side_are_apart_and_end_together(quadruped, tmp_path):
     assert spacing(two) > np.ptp(two[0].bounds, axis=0)[1]
     with pytest.raises(ValueError, match="expected one result or more"):
         dojo.viewer.save_html([], tmp_path / "none.html")
+    with pytest.raises(ValueError, match=r"expected a page such as one.html, got 'one.mp4'"):
+        dojo.viewer.save_html(quadruped, tmp_path / "one.mp4")
 
 
 @pytest.mark.slow

@@ -36,6 +36,8 @@ def test_terrain_and_collisions_come_back():
     given = given.with_collisions(dojo.Collision(given.body_names[0], None, None, dojo.Polytope(points), friction=0.3))
     found = again(given)
     np.testing.assert_array_equal(found.contacts[0].terrain.heights, HILL.heights)
+    assert len({id(c.terrain) for c in found.contacts}) == 1
+    assert Simulator(found).parameters(("terrain",)).names == Simulator(given).parameters(("terrain",)).names
     np.testing.assert_array_equal(found.collisions[0].shape_b.vertices, given.collisions[0].shape_b.vertices)
 
 
@@ -51,6 +53,18 @@ def test_a_trajectory_comes_back_and_goes_on(tmp_path):
     np.testing.assert_array_equal(found.simulator.step(found.x[-1]).x, sim.step(made.x[-1]).x)
     made.save(tmp_path / "a.motion")
     np.testing.assert_array_equal(dojo.Trajectory.load(tmp_path / "a.motion").x, made.x)
+
+
+def test_a_plan_comes_back_with_the_limits_of_its_inputs(tmp_path):
+    sim = Simulator(dojo.models.cartpole(), time_step=0.05)
+    cost = dojo.cost.Tracking([0.0, np.pi, 0.0, 0.0], 1.0)
+    plan = dojo.ilqr(dojo.Problem(sim, sim.neutral(), 20, cost=cost, control_limits=(-3.0, 2.0)), max_iterations=3)
+    plan.save(tmp_path / "plan.npz")
+    found = dojo.Plan.load(tmp_path / "plan.npz")
+    np.testing.assert_array_equal(found.control_limits, [[-3.0], [2.0]])
+    made, again = (p.replay(time_step=0.01) for p in (plan, found))
+    np.testing.assert_array_equal(again.u, made.u)
+    assert again.u.min() == -3.0
 
 
 def test_a_trajectory_is_exported_by_names(tmp_path):
