@@ -76,11 +76,6 @@ def save_html(
         OSError: the file cannot be written.
     """
     target = checks.path("save_html(path)", path)
-    if target.suffix.lower() in _OTHERS:
-        raise ValueError(
-            f"save_html(path): expected a page such as {target.stem}.html, got {target.name!r}; pictures "
-            "are those of save_picture, videos those of save_video"
-        )
     results = list(result) if isinstance(result, list | tuple) else [result]
     if not results:
         raise ValueError("save_html(result): expected one result or more, got an empty list")
@@ -90,6 +85,11 @@ def save_html(
     checks.flag("save_html(together=...)", together)
     shown = {"forces": forces, "paths": traces, "ghost": goal}
     motions = [motion(one, simulator) for one in results]
+    if target.suffix.lower() in _OTHERS:
+        raise ValueError(
+            f"save_html(path): expected a page such as {target.stem}.html, got {target.name!r}; pictures "
+            "are those of save_picture, videos those of save_video"
+        )
     with whole_file(target) as file:
         file.write_text(html_of(*motions, shown=shown, names=labels, together=together), encoding="utf-8")
     return target
