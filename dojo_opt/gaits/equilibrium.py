@@ -27,6 +27,7 @@ _ROUNDS = 20
 _LEFT = 1e-3  # largest imbalance, as a share of the weight
 _NOTHING = 1e-5  # [m/s^2] times the mass: an imbalance of a body without weight, such as one that floats in water
 _FEW = 8  # contacts that a message names
+_TOUCHING = 1e-12  # [m] least distance from the ground in forces
 _NEAR = 0.01  # [m] contacts may carry that are not further from the ground than the nearest by more than this
 _LOWEST = (_NEAR, 1e-3, 1e-4)  # [m] likewise, than the nearest of their body: of a round hull few corners touch at once
 
@@ -167,7 +168,7 @@ class _Rest(NamedTuple):
     def forces(self, state: Floats, kappa: float) -> Floats:
         """(k,) vertical forces of the contacts, kappa / (h gap) along their normals."""
         gap, cosine = self.feet.gaps(state), self.feet.normals(state)[:, 2]
-        return np.asarray(kappa / (self.sim.time_step * cosine * np.maximum(gap, 1e-12)))
+        return np.asarray(kappa / (self.sim.time_step * cosine * np.maximum(gap, _TOUCHING)))
 
     def touching(self, gap: Floats, near: float) -> NDArray[np.bool_]:
         """(k,) whether contacts may carry: those that are nearly as low as any, and within `near` [m] of their body's.
@@ -219,7 +220,8 @@ class _Rest(NamedTuple):
 
     def balance(self, state: Floats, along: Floats, kappa: float) -> _Balance:
         """The forces at a state, with their derivatives by motions `along` (nv, n)."""
-        loose, gap, (down, up, _) = self.motions.loose, self.feet.gaps(state), _under(self.feet, state)
+        loose, (down, up, _) = self.motions.loose, _under(self.feet, state)
+        gap = np.maximum(self.feet.gaps(state), _TOUCHING)
         force, (below, above) = self.forces(state, kappa), _stop_distances(self.sim, state)
         gravity = potential_gradient(self.sim, state)
         left = self.motions.left(gravity - stop_torques(self.sim, state, kappa) - up.T @ force)
@@ -416,7 +418,13 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         return state, _held(sim, motions, potential_gradient(sim, state) - stop_torques(sim, state), most, "inputs")
     rest = _Rest(sim, Feet(sim, names), motions)
     found, load, force = _on_contacts(rest, state, most, iterations)
-    if rest.feet.gaps(found).min() <= 0.0:
+    gaps, left = rest.feet.gaps(found), motions.left(load)
+    held = gaps.min() > 0.0 and np.abs(left).max(initial=0.0) <= most and _near(rest, found, state)
+    if most > _LEFT * weight and not held:
+        raise ValueError(
+            f"equilibrium({mech.name}): nothing presses it onto its contacts, which push it off; begin higher"
+        )
+    if gaps.min() <= 0.0:
         gap = min((rest.feet.gaps(y) for y in (state, found)), key=np.min)
         name = names[int(gap.argmin())]
         raise ValueError(f"equilibrium({mech.name}): {name!r} is {-gap.min():.3g} m deep in the ground near x")
@@ -427,8 +435,10 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
 
 def _on_contacts(rest: _Rest, state: Floats, most: float, iterations: int) -> tuple[Floats, Floats, Floats]:
     """The state of rest near `state`, or the last one tried; the load (nv,) there, and the forces of the contacts."""
-    searches: list[Callable[[], Floats]] = [partial(rest.standing, state, near, iterations) for near in _LOWEST]
+    searches: list[Callable[[], Floats]] = [lambda: state]  # it may float, or rest already
+    searches += [partial(rest.standing, state, near, iterations) for near in _LOWEST]
     searches += [partial(rest.leaned, state, iterations), partial(rest.settled, state)]
+    heavy = most <= _LEFT * float(np.abs(potential_gradient(rest.sim, state)).max(initial=0.0))
     first = best = None
     least = np.inf
     for k, search in enumerate(searches):
@@ -440,11 +450,13 @@ def _on_contacts(rest: _Rest, state: Floats, most: float, iterations: int) -> tu
         ended = found, load, force
         left = float(np.abs(rest.motions.left(load)).max(initial=0.0))
         balanced = rest.feet.gaps(found).min() > 0.0 and left <= most
-        if balanced and left < least and (k < len(_LOWEST) or _near(rest, found, state)):
+        may_go = 0 < k <= len(_LOWEST) and heavy  # contacts push what has no weight as far as rounding lets them
+        enough = least if k else _EXACT * most if heavy else most
+        if balanced and left < enough and (may_go or _near(rest, found, state)):
             best, least = ended, left
             if left <= _EXACT * most:
                 return best
-        first = first or ended
+        first = ended if k == 1 else first
     assert first is not None
     return best or first
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from time import perf_counter, sleep
 from typing import Any
 
@@ -49,7 +50,8 @@ class _TaskEpisode:
     def __init__(self, task: Task) -> None:
         self.task, self.sim = task, task.sim
         self.observations, self.steps, self.knot_time = task.observations, task.steps, task.knot_time
-        self.edge, self.kind = np.ones(task.sim.nu), np.float32
+        self.highest, self.kind = np.ones(task.sim.nu), np.float32
+        self.lowest = -self.highest
         self.x, self._count = np.zeros((1, task.nx)), task.steps
         self._rngs, self._model = [np.random.default_rng()], Drawn.of(task)
         self._quick = task.sim.has_stepper
@@ -108,6 +110,11 @@ class _ProblemEpisode:
         self.problem = problem.with_own_terms()
         self._plant = self.plant = Plant(problem.sim, problem.start) if plant is None else plant
         self.sim, self.knot_time, self.steps, self._sampler = problem.sim, problem.knot_time, problem.horizon, sampler
+        robot, other = problem.sim.mechanism, self.plant.nominal.mechanism
+        if robot.dof_names != other.dof_names or problem.sim.nu != self.plant.nominal.nu:
+            raise ValueError(
+                f"Environment(plant=...): expected a plant of the problem's {robot.name!r}, got one of {other.name!r}"
+            )
         self._substeps = round(problem.knot_time / self.plant.nominal.time_step)
         if abs(self._substeps * self.plant.nominal.time_step - problem.knot_time) > 1e-9:
             raise ValueError(
@@ -119,7 +126,7 @@ class _ProblemEpisode:
         bounded = np.isfinite(lo) & np.isfinite(hi)
         low, high = np.where(bounded, lo, -1.0), np.where(bounded, hi, 1.0)
         self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
-        self.edge, self.kind = np.where(bounded, 1.0, np.inf), np.float64
+        self.lowest, self.highest, self.kind = np.where(bounded, -1.0, lo), np.where(bounded, 1.0, hi), np.float64
         self._xs, self._us = np.tile(problem.start, (problem.horizon + 1, 1)), np.zeros((problem.horizon, nu))
         self._knot, self._cost = problem.horizon, KnotCosts(self.problem)
 
@@ -127,6 +134,9 @@ class _ProblemEpisode:
         """Back to the start, under another perturbation when there is a sampler."""
         if self._sampler is not None:
             self.plant = self._plant.perturbed(self._sampler(rng).over(self._plant.perturbation))
+        if np.any(self.plant.perturbation.noise):  # another one in each episode
+            seed = int(rng.integers(2**31))
+            self.plant = self.plant.perturbed(replace(self.plant.perturbation, seed=seed))
         self.plant.reset()
         self._knot = 0
         self._xs[:] = self.plant.x
@@ -138,7 +148,7 @@ class _ProblemEpisode:
         if t >= self.steps:
             raise RuntimeError("Environment.step: the episode is over, or has not begun; call reset()")
         us, plant = self._us, self.plant
-        limited = np.minimum(np.maximum(_numbers(action, us.shape[1]), -self.edge), self.edge)  # faster than np.clip
+        limited = np.minimum(np.maximum(_numbers(action, us.shape[1]), self.lowest), self.highest)  # faster than clip
         us[t] = self._middle + self._half * limited
         message = plant.hold(us[t], self._substeps)
         self._knot = t + 1
@@ -166,13 +176,13 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
         problem       one episode is one horizon, a step is one knot
           observation   state x (nx,), measured
           action        (nu,) in [-1, 1] between the problem's control limits, beyond which inputs are limited, too;
-                        inputs [N, N m] where it has none
+                        inputs [N, N m] where it has none, or one on one side only, which holds
           reward        minus the problem's costs at the knot, and with the last step those at the end
           terminated    the robot has fallen, or a step could not be solved: see `info["message"]`
           truncated     the horizon is over; `info["violation"]` is the largest violation of a constraint
 
     plant        of a problem, by default its own simulator from its start; its time step divides a knot
-    sampler      generator -> Perturbation, drawn at every reset from the environment's seed
+    sampler      generator -> Perturbation, drawn at every reset from the environment's seed, as the noise is
     render_mode  None, "rgb_array", or "human": every step is shown in the browser, at `view.url`, in real time
     """
 
@@ -207,7 +217,7 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
         e = self._episode
         self.metadata = {**type(self).metadata, "render_fps": round(1.0 / e.knot_time)}
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (e.observations,), np.float64)
-        self.action_space = gymnasium.spaces.Box((-e.edge).astype(e.kind), e.edge.astype(e.kind), dtype=e.kind)
+        self.action_space = gymnasium.spaces.Box(e.lowest.astype(e.kind), e.highest.astype(e.kind), dtype=e.kind)
 
     @property
     def sim(self) -> Simulator:

@@ -91,3 +91,23 @@ def test_a_plant_that_does_not_fit_is_refused():
         dojo.Environment(problem, dojo.Plant(problem.sim.replace(time_step=0.03)))
     with pytest.raises(TypeError, match=r"Environment\(source\): expected a Task or a Problem"):
         dojo.Environment(problem.sim)
+    with pytest.raises(ValueError, match=r"expected a plant of the problem's 'raiberthopper', got one of 'quadruped'"):
+        dojo.Environment(problem, dojo.Plant(dojo.Simulator(dojo.models.quadruped(), time_step=0.01)))
+
+
+def test_a_limit_on_one_side_holds():
+    sim = dojo.Simulator(dojo.models.cartpole(), time_step=0.05)
+    cost = dojo.cost.Effort(1.0)
+    env = dojo.Environment(dojo.Problem(sim, sim.neutral(), 5, cost=cost, control_limits=(0.0, np.inf)))
+    assert env.action_space.low == 0.0 and env.action_space.high == np.inf
+    env.reset(seed=0)
+    below, inside = (env.step(np.array([force]))[1] for force in (-50.0, 2.0))
+    assert below == 0.0 and inside < 0.0
+
+
+def test_noise_differs_from_episode_to_episode_and_comes_from_the_seed():
+    problem = dojo.problems.hop()
+    env = dojo.Environment(problem, dojo.Plant(problem.sim, start=problem.start, noise=0.01))
+    seen = [env.reset(seed=seed)[0] for seed in (1, None, 1, 2)]
+    np.testing.assert_array_equal(seen[0], seen[2])
+    assert all(np.abs(seen[i] - seen[j]).max() > 1e-4 for i, j in ((0, 1), (0, 3), (1, 3)))

@@ -27,6 +27,16 @@ def bent(sim, rng):
     return sim.integrate(sim.neutral(), dx)
 
 
+def test_a_robot_without_weight_rests_where_it_is_or_is_refused():
+    sim = dojo.Simulator(dojo.models.uuv(), time_step=0.01)
+    np.testing.assert_array_equal(dojo.equilibrium(sim)[0], sim.neutral())
+    block = dojo.Simulator(replace(dojo.models.block(), gravity=(0.0, 0.0, 0.0)), time_step=0.01)
+    with pytest.raises(ValueError, match="nothing presses it onto its contacts"):
+        dojo.equilibrium(block)
+    aloft = block.neutral() + np.eye(13)[2]
+    np.testing.assert_array_equal(dojo.equilibrium(block, aloft)[0], aloft)
+
+
 def test_positions_agree_with_the_contacts(sim, rng):
     x = bent(sim, rng)
     step = sim.step(x)
