@@ -273,7 +273,8 @@ def identify(
 
     Raises:
         TypeError: for an argument of the wrong kind.
-        ValueError: for a value out of range, or an unknown name.
+        ValueError: for a value out of range, an unknown name, or a Trajectory under external wrenches, with another
+            time step, or with velocities of another kind (means over steps, or those at nodes).
     """
     call = "identify"
     if not isinstance(sim, Simulator):

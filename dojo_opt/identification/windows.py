@@ -94,6 +94,8 @@ def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None,
     if isinstance(trajectories, tuple) and [getattr(part, "ndim", 0) for part in trajectories] == [2, 2]:
         raise TypeError(f"{call}: expected a list of motions, got one pair; give a list: [(states, inputs)]")
     for number, given in enumerate(trajectories):
+        if isinstance(given, Trajectory):
+            _check_made(f"{call}: motion {number}", sim, given)
         raw = (given.x, given.u) if isinstance(given, Trajectory) else states_and_inputs(call, given)
         us = checks.array(call, raw[1], ("T", sim.nu))
         xs = checks.array(call, raw[0], (len(us) + 1, sim.nx))
@@ -102,6 +104,21 @@ def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None,
     if not out:
         raise ValueError(f"{call}: expected motions of at least one step, got none")
     return out
+
+
+def _check_made(name: str, sim: Simulator, given: Trajectory) -> None:
+    """Refuse motions under pushes that the fit does not know, and those whose states mean something else."""
+    if given.wrenches is not None and np.any(given.wrenches):
+        raise ValueError(f"{name}: expected no external wrenches, which the fit would take for other parameters")
+    if not np.isclose(given.simulator.time_step, sim.time_step, rtol=1e-9):
+        raise ValueError(f"{name}: expected the time step {sim.time_step:g} s, got {given.simulator.time_step:g} s")
+    nodes, wanted = (s.order > 2 or s.accuracy is not None for s in (given.simulator, sim))
+    if nodes != wanted:
+        kinds = ("means over the step before", "those at the nodes")
+        raise ValueError(
+            f"{name}: expected velocities that are {kinds[wanted]}, as the simulator has them, got {kinds[nodes]}; "
+            "measure with a simulator of the same order"
+        )
 
 
 def difference_slopes(layout: Integers, differences: Floats) -> Floats:

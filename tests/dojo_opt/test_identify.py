@@ -389,3 +389,18 @@ def test_feet_that_stand_on_a_terrain_tell_its_heights():
         assert abs(own.height(x, y) - terrain(heights).height(x, y)) < 2e-3
     deviation = found.deviation.reshape(heights.shape)
     assert np.all(deviation[5] > 0.025) and np.all(deviation[1:3] < 0.02), deviation
+
+
+@pytest.mark.parametrize(
+    ("made", "wrenches", "message"),
+    [
+        ({}, {"link": (0.0, 0.1, 0.0, 0.2, 0.0, 0.0)}, "motion 0: expected no external wrenches"),
+        ({"time_step": 0.01}, None, "motion 0: expected the time step 0.02 s, got 0.01 s"),
+        ({"order": 4}, None, "expected velocities that are means over the step before, .*got those at the nodes"),
+    ],
+)
+def test_motions_that_the_simulator_would_misread_are_refused(made, wrenches, message):
+    sim = _arm()
+    motion = sim.replace(**made).rollout(np.array([0.5, 0.0]), steps=5, wrenches=wrenches)
+    with pytest.raises(ValueError, match=message):
+        dojo.identify(sim, [motion], ("damper",), noise=0.05)
