@@ -153,8 +153,9 @@ def quadruped(
 ) -> Task:
     """Keep a velocity: 36 observations, 12 actions, 0.02 s each.
 
-    Actions move the targets of position servos about the angles of the neutral state. An episode ends where the robot
-    falls; the command changes every two seconds. `policy.commanded((0.5, 0.0, 0.0))` is a controller.
+    Actions move the targets of position servos about the angles of the neutral state, whose torques stay within the
+    limits of the robot's inputs. An episode ends where the robot falls; the command changes every two seconds.
+    `policy.commanded((0.5, 0.0, 0.0))` is a controller.
 
     Args:
         mechanism: a robot with a floating base and hinges, as from `load_urdf`; its neutral state stands (default None:
@@ -168,15 +169,20 @@ def quadruped(
         The task.
 
     Raises:
-        ValueError: the robot has another base or other joints, or a number is out of range.
+        ValueError: the robot has another base or other joints, inputs for some of them only or more than one for a
+            joint, limits of effort on one side, or a number is out of range.
     """
     call = "quadruped"
     mech = default_quadruped() if mechanism is None else mechanism
     limits = np.array(checks.vector(f"{call}(fastest=...)", fastest, 3))
     base, *legs = mech.joints
-    if base.nv != 6 or any(joint.nv != 1 for joint in legs):
+    if base.nv != 6 or not legs or any(joint.nv != 1 for joint in legs):
         raise ValueError(f"{call}(mechanism): expected a floating base and hinges, got {mech!r}")
-    servos = [Input(joint.name, servo="position", stiffness=stiffness, damping=damping) for joint in legs]
+    efforts = _efforts(call, mech)
+    servos = [
+        Input(joint.name, servo="position", stiffness=stiffness, damping=damping, force_limits=effort)
+        for joint, effort in zip(legs, efforts, strict=True)
+    ]
     mech = replace(mech, inputs=servos)
     home, nq = np.array(mech.neutral, dtype=np.float64), mech.nq
     angles = home[_JOINTS:]
@@ -200,6 +206,25 @@ def quadruped(
             "randomization": WALKING,
         },
     )  # fmt: skip
+
+
+def _efforts(call: str, mech: Mechanism) -> list[tuple[float, float]]:
+    """Limits of the force of each hinge, those of the inputs of the robot: none where these have none."""
+    names = [joint.name for joint in mech.joints[1:]]
+    inputs = list(mech.inputs or ())
+    given = [part.joint for part in inputs]
+    if not given:
+        return [(-np.inf, np.inf)] * len(names)
+    if sorted(map(str, given)) != sorted(names):
+        lacking = ", ".join(sorted(map(repr, set(names) - set(given)))) or "one input for each joint"
+        raise ValueError(f"{call}(mechanism): expected an input for every hinge, and nothing else; check {lacking}")
+    parts = {str(part.joint): part for part in inputs}
+    found = [parts[name].force_limits if parts[name].servo else parts[name].limits for name in names]
+    out = [(float(low), float(high)) for low, high in found]
+    for name, limits in zip(names, out, strict=True):
+        if np.isfinite(limits[0]) != np.isfinite(limits[1]):
+            raise ValueError(f"{call}(mechanism): {name!r}: expected limits on both sides or on none, got {limits}")
+    return out
 
 
 def go2(urdf: str | Path | None = None, **options: Any) -> Task:

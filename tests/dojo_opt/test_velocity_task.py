@@ -88,3 +88,14 @@ def test_learning_under_pushes_repeats_to_the_bit_and_gives_a_controller(task):
 def test_robots_of_another_kind_are_refused():
     with pytest.raises(ValueError, match="expected a floating base and hinges"):
         dojo.learn.quadruped(dojo.models.cartpole())
+    with pytest.raises(ValueError, match="expected a floating base and hinges"):
+        dojo.learn.quadruped(dojo.models.sphere())
+
+
+def test_servos_keep_the_limits_of_the_inputs():
+    mech = dojo.models.quadruped()
+    weak = replace(mech, inputs=[replace(part, limits=(-1.0, 2.0)) for part in mech.inputs])
+    made = dojo.learn.quadruped(weak).sim.mechanism
+    assert {part.force_limits for part in made.inputs} == {(-1.0, 2.0)}
+    with pytest.raises(ValueError, match="expected an input for every hinge, and nothing else; check 'RL_"):
+        dojo.learn.quadruped(replace(weak, inputs=weak.inputs[:9]))
