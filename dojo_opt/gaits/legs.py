@@ -34,6 +34,7 @@ _THERE = 1e-4  # [m] error of a stance whose feet are at their places
 _MIRRORED = 0.1  # [rad] bends of front and hind knees in the neutral state beyond which they face each other
 _PITCH = 0.7  # cosine between the axis of a hinge that bends a leg and y
 _TIPPED = 0.7  # cosine between the z axes of the base and the world below which a robot does not stand
+_UPRIGHT = 0.5  # least cosine between gravity and -z of robots that stand
 _TRIES = 4  # starts of each search
 _A1 = (0.29, 118.0)  # height [m] and weight [N] of the robot whose weights the problems have
 
@@ -59,7 +60,7 @@ class Legs:
         share: of the usual damper, on flat feet, where none is given.
 
     Raises:
-        ValueError: the robot has no legs, no stance is found, or a name is unknown.
+        ValueError: the robot has no legs, no stance is found, gravity does not point down, or a name is unknown.
     """
 
     def __init__(
@@ -77,6 +78,11 @@ class Legs:
             raise TypeError(f"Legs(robot): expected a Mechanism or a Simulator, got {checks.shown(robot)}{hint}")
         if mech.joints[0].kind != "floating" or mech.nv == 6:
             raise ValueError(f"Legs(robot): expected a robot with legs on a floating base, got {mech!r}")
+        gravity = np.asarray(mech.gravity, dtype=np.float64)
+        if not -gravity[2] > _UPRIGHT * np.linalg.norm(gravity):
+            raise ValueError(
+                f"Legs(robot): expected gravity that presses {mech.name!r} onto its feet, got {mech.gravity}"
+            )
         if stance is not None:
             try:
                 mech = replace(mech, neutral=stance)

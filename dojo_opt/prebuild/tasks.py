@@ -178,7 +178,7 @@ def _flight(calls: Callable[[Any], None], order: int) -> None:
 
 def _grounds() -> None:
     hill = dojo.Terrain.from_function(
-        lambda x, y: 0.1 * np.sin(x) + 0.1 * np.cos(y), np.linspace(-2, 2, 9), [-1.0, 1.0]
+        lambda x, y: 0.1 * np.sin(x) + 0.1 * np.cos(y), np.linspace(-2, 2, 9), [-1.0, 0.0, 1.0]
     )
     for more in ({}, {"terrain": hill}, {"law": "linear"}, {"law": "impact"}, {"restitution": 0.5}):
         foot = dojo.Contact("ball", radius=0.1, **more)

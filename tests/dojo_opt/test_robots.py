@@ -84,6 +84,12 @@ def test_a_robot_on_its_back_is_refused(straight):
         dojo.problems.stand_up(replace(straight, neutral=q))
 
 
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, 0.0), (0.0, 0.0, 9.81), (9.81, 0.0, 0.0)])
+def test_a_robot_that_nothing_presses_onto_its_feet_is_refused(straight, gravity):
+    with pytest.raises(ValueError, match=r"\(robot\): expected gravity that presses 'quadruped' onto its feet"):
+        dojo.problems.trot(replace(straight, gravity=gravity))
+
+
 def test_a_robot_stands_up_and_the_plan_holds_at_a_fifth_of_the_step(straight):
     problem = dojo.problems.stand_up(straight)
     plan = dojo.ilqr(problem)
