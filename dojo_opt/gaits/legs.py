@@ -34,7 +34,7 @@ _THERE = 1e-4  # [m] error of a stance whose feet are at their places
 _MIRRORED = 0.1  # [rad] bends of front and hind knees in the neutral state beyond which they face each other
 _PITCH = 0.7  # cosine between the axis of a hinge that bends a leg and y
 _TIPPED = 0.7  # cosine between the z axes of the base and the world below which a robot does not stand
-_UPRIGHT = 0.5  # least cosine between gravity and -z of robots that stand
+_DOWNWARDS = 0.5  # least cosine between gravity and -z of robots that stand
 _TRIES = 4  # starts of each search
 _A1 = (0.29, 118.0)  # height [m] and weight [N] of the robot whose weights the problems have
 
@@ -79,7 +79,7 @@ class Legs:
         if mech.joints[0].kind != "floating" or mech.nv == 6:
             raise ValueError(f"Legs(robot): expected a robot with legs on a floating base, got {mech!r}")
         gravity = np.asarray(mech.gravity, dtype=np.float64)
-        if not -gravity[2] > _UPRIGHT * np.linalg.norm(gravity):
+        if not -gravity[2] > _DOWNWARDS * np.linalg.norm(gravity):
             raise ValueError(
                 f"Legs(robot): expected gravity that presses {mech.name!r} onto its feet, got {mech.gravity}"
             )
