@@ -79,12 +79,9 @@ def step(
         minimum_jerk((time - begin) / span) for begin, span in ((0.0, shift), (shift, swing), (shift + swing, shift))
     )
     start = sim.neutral() if after is None else _end(sim, after)
-    path = np.tile(feet.positions(start), (len(time), 1, 1))
-    path[:, swung, 0] += length * over[:, None]
-    path[:, swung, 2] += step_height * (4.0 * over * (1.0 - over))[:, None]
-    last = path[-1, :, :2].mean(axis=0)
+    path = _swing_path(feet.positions(start), swung, over, length, step_height)
     first = path[0, :, :2].mean(axis=0) if after is None else _center(sim, start[None])[0]
-    stance = path[0, ~swung, :2].mean(axis=0)
+    stance, last = path[0, ~swung, :2].mean(axis=0), path[-1, :, :2].mean(axis=0)
     goal = first + out[:, None] * (stance - first) + back[:, None] * (last - stance)
     x = np.tile(start, (len(time), 1))
     x[:, 2] += out * (sim.neutral()[2] - lower - start[2])
@@ -96,6 +93,14 @@ def step(
     contact[:, swung] = ((over <= 0.0) | (over >= 1.0))[:, None]
     gait = assemble(sim, "step", base, path, contact, names=feet.names)
     return gait if after is None else after.then(gait)
+
+
+def _swing_path(feet: Floats, swung: NDArray[np.bool_], over: Floats, length: float, height: float) -> Floats:
+    """(T, k, 3) places of the contacts, of which those that swing have gone the share `over` (T,) of a step."""
+    path = np.tile(feet, (len(over), 1, 1))
+    path[:, swung, 0] += length * over[:, None]
+    path[:, swung, 2] += height * (4.0 * over * (1.0 - over))[:, None]
+    return path
 
 
 def _swung(feet: Feet, swinging: str | None) -> NDArray[np.bool_]:

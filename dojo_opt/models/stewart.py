@@ -16,6 +16,8 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import Cylinder
 from solvers.types import Floats
 
+_RADII = {"cylinder": 0.025, "rod": 0.015}  # of both parts of a leg [m]
+
 
 @checked_numbers("models")
 def stewart(
@@ -61,24 +63,9 @@ def stewart(
     for k, (foot, top) in enumerate(zip(feet, tops, strict=True)):
         leg = top + np.array([0.0, 0.0, height]) - foot
         length = float(np.linalg.norm(leg))
-        half = length / 2
-        turn = np.array(from_z(leg / length))
-        bodies += [
-            Body(f"cylinder_{k}", leg_mass, shape=Cylinder(0.025, half)),
-            Body(f"rod_{k}", leg_mass, shape=Cylinder(0.015, half)),
-        ]
-        low, end = (0.0, 0.0, -half / 2), (0.0, 0.0, half / 2)
-        slider: dict[str, Any] = {
-            "spring": spring,
-            "damper": damper,
-            "parent_point": (0.0, 0.0, half),
-            "name": f"slider_{k}",
-        }
-        joints += [
-            Joint("orbital", None, f"cylinder_{k}", f"hinge_{k}", foot, low, orientation=turn),
-            Joint("prismatic", f"cylinder_{k}", f"rod_{k}", **slider),
-        ]
-        upright = turn * (1.0, -1.0, -1.0, -1.0)
+        bodies += [Body(f"{name}_{k}", leg_mass, shape=Cylinder(r, length / 2)) for name, r in _RADII.items()]
+        joints += _leg_joints(k, foot, leg, spring, damper)
+        end, upright = (0.0, 0.0, length / 4), np.array(from_z(leg / length)) * (1.0, -1.0, -1.0, -1.0)
         closing.append(Joint("spherical", f"rod_{k}", "plate", f"ball_{k}", end, top, orientation=upright, close=k > 0))
     bodies.append(Body("plate", plate_mass, shape=Cylinder(plate_radius, 0.03)))
     return Mechanism(
@@ -88,6 +75,17 @@ def stewart(
         gravity=gravity,
         name="stewart",
     )
+
+
+def _leg_joints(k: int, foot: Floats, leg: Floats, spring: float, damper: float) -> list[Joint]:
+    """The joints of leg k, a vector from its foot on the ground: its hinge there, and its slider."""
+    length = float(np.linalg.norm(leg))
+    turn, low = from_z(leg / length), (0.0, 0.0, -length / 4)
+    slider: dict[str, Any] = {"parent_point": (0.0, 0.0, length / 2), "spring": spring, "damper": damper}
+    return [
+        Joint("orbital", None, f"cylinder_{k}", f"hinge_{k}", foot, low, orientation=turn),
+        Joint("prismatic", f"cylinder_{k}", f"rod_{k}", f"slider_{k}", **slider),
+    ]
 
 
 def _hexagon(radius: float, spread: float) -> Floats:

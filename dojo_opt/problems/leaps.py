@@ -78,8 +78,8 @@ def leap(
     sim = Simulator(models.quadruped(damper=damping, **model), time_step=step, kappa=PLANNED)
     start, _ = equilibrium(sim)
     still, torques = standing(sim)
-    low, apex, goal = (_moved(start, *by) for by in ((0.0, -crouch), (0.5 * distance, height), (distance, 0.0)))
     check_room(f"{call}(duration=...)", horizon, 8.0 * sim.nx, "leap in less time, or with longer knots", "knots")
+    low, apex, goal = (_moved(start, *by) for by in ((0.0, -crouch), (0.5 * distance, height), (distance, 0.0)))
     down, up = round(0.2 * horizon), round(0.4 * horizon)
     poses = np.array([low] * down + [apex] * up + [goal] * (horizon + 1 - down - up))
     return Problem(

@@ -92,20 +92,15 @@ def follow(
             f"problems.follow(substeps=...): {len(gait.x) - 1} time steps are not a multiple of {substeps}"
         )
     reference = gait.x[::substeps]
-    horizon = len(reference) - 1
     knot = sim.time_step * substeps
-    if guess == "reference":
-        states, controls = reference, gait.torques().reshape(horizon, substeps, sim.nu).mean(axis=1)
-    else:
-        still, torques = standing(sim, gait.foot_names)
-        states, controls = np.tile(still, (horizon + 1, 1)), np.tile(torques, (horizon, 1))
+    states, controls = _along(gait, substeps) if guess == "reference" else _still(gait, len(reference) - 1)
     constraint: Any = Goal(reference[-1], components=np.arange(6))
     if periodic:
         constraint = Periodic(_stride(sim, reference))
     return Problem(
         sim,
         reference[0],
-        horizon,
+        len(reference) - 1,
         cost=[Tracking(reference, knot * weights(sim, place, attitude, ANGLE)), Effort(knot * effort)],
         constraints=[constraint],
         free_start=np.setdiff1d(np.arange(sim.ndx), [0, 1, 5]) if periodic else None,
@@ -115,6 +110,18 @@ def follow(
         states0=states,
         advice={"jump": JUMP_ADVICE, "stand": "", "stand up": RISE_ADVICE}.get(gait.name, GAIT_ADVICE),
     )
+
+
+def _along(gait: Gait, substeps: int) -> tuple[Floats, Floats]:
+    """States (T + 1, nx) of a gait at the knots, and its mean torques (T, nu) between them."""
+    torques = gait.torques()
+    return gait.x[::substeps], torques.reshape(-1, substeps, torques.shape[1]).mean(axis=1)
+
+
+def _still(gait: Gait, horizon: int) -> tuple[Floats, Floats]:
+    """States (T + 1, nx) and torques (T, nu) of the robot of a gait that stands still."""
+    state, torques = standing(gait.simulator, gait.foot_names)
+    return np.tile(state, (horizon + 1, 1)), np.tile(torques, (horizon, 1))
 
 
 def weights(sim: Simulator, place: ArrayLike, attitude: float, angle: float) -> Floats:

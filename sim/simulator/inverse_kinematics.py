@@ -105,21 +105,8 @@ def ik(
     q = np.array(neutral if start is None else checks.array("ik(start=...)", start, (kin.sim.nq,)))
     low, high, free = _bounds(kin, fixed, limits)
     q = _inside(kin, q, low, high)
-    search = _Search(kin, wanted, kin.sim.closure(), low, high, free, 0.1 * tolerance, max_iterations)
-    q, r, count = search.descend(q)
-    rng = np.random.default_rng(0)
-    for attempt in range(attempts - 1):
-        if max(search.errors(q, r).values()) <= tolerance:
-            break
-        dq = np.zeros(kin.sim.nv)
-        dq[free] = (_NEAR if attempt < _NEARBY else _FAR) * rng.normal(size=len(free))
-        other, r_other, more = search.descend(_inside(kin, kin.moved(q, dq), low, high))
-        count += more
-        if r_other @ r_other < r @ r:
-            q, r = other, r_other
-    if max(search.errors(q, r).values()) > tolerance:  # out of reach: as near as possible
-        q, r, more = search.descend(q, idle_at_most=max_iterations)
-        count += more
+    search = _Search(kin, wanted, kin.sim.closure(), low, high, free, tolerance, max_iterations)
+    q, r, count = search.nearest(q, attempts)
     errors = search.errors(q, r)
     worst = max(errors, key=lambda name: errors[name])
     success = errors[worst] <= tolerance
@@ -139,15 +126,37 @@ class _Search(NamedTuple):
     low: Floats
     high: Floats
     free: NDArray[np.int64]
-    enough: float
+    tolerance: float
     max_iterations: int
+
+    def nearest(self, q: Floats, attempts: int) -> tuple[Floats, Floats, int]:
+        """(coordinates, residual, iterations) from a start within the limits, and from random ones around the best."""
+        q, r, count = self.descend(q)
+        rng = np.random.default_rng(0)
+        for attempt in range(attempts - 1):
+            if self.met(q, r):
+                break
+            dq = np.zeros(self.kin.sim.nv)
+            dq[self.free] = (_NEAR if attempt < _NEARBY else _FAR) * rng.normal(size=len(self.free))
+            other, r_other, more = self.descend(_inside(self.kin, self.kin.moved(q, dq), self.low, self.high))
+            count += more
+            if r_other @ r_other < r @ r:
+                q, r = other, r_other
+        if self.met(q, r):
+            return q, r, count
+        q, r, more = self.descend(q, idle_at_most=self.max_iterations)  # out of reach: as near as possible
+        return q, r, count + more
+
+    def met(self, q: Floats, r: Floats) -> bool:
+        """Whether all errors r at q are within the tolerance."""
+        return max(self.errors(q, r).values()) <= self.tolerance
 
     def descend(self, q: Floats, idle_at_most: int = _IDLE) -> tuple[Floats, Floats, int]:
         """(coordinates, residual, iterations) from a start within the limits, up to some idle iterations in a row."""
-        kin, free = self.kin, self.free
+        kin, free, enough = self.kin, self.free, 0.1 * self.tolerance
         r, J = self.residual(q)
         damping, count, idle = _ACCEPT, 0, 0
-        while count < self.max_iterations and np.abs(r).max() > self.enough and damping < _MOST and idle < idle_at_most:
+        while count < self.max_iterations and np.abs(r).max() > enough and damping < _MOST and idle < idle_at_most:
             count += 1
             dq = np.zeros(kin.sim.nv)
             dq[free] = _step(J[:, free], r, damping, *(b[free] for b in _room(kin, q, self.low, self.high)))

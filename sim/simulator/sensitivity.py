@@ -18,7 +18,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.model.interruptible_loops import pieces
 from sim.model.record_columns import StepReport
 from sim.simulator.engines.division import DIVISIBLE
-from sim.simulator.engines.engine import REPORT, DividedStep, Engine, Rolled, contact_columns, refuse
+from sim.simulator.engines.engine import REPORT, DividedStep, Engine, Rolled, contact_rows, refuse
 from sim.simulator.link_kernels import link_heights, link_parameters
 from solvers.status import Status
 from solvers.types import Floats, Vector
@@ -176,7 +176,7 @@ def roll_parameters(
         if reports[knot, StepReport.STATUS] != Status.SOLVED:
             break
         knot += 1
-    contacts = np.zeros((0, engine.sizes.ncontact, contact_columns(engine.sizes)))
+    contacts = contact_rows(engine.sizes, 0)
     return Rolled(knot, xs, reports, contacts, A, B), J
 
 

@@ -39,9 +39,9 @@ class Effect(Code):
     GEAR_OFFSET = 25  # [gear]
     INPUT = 26  # force and torque per unit of an input on a body [input, which of the six]
     SHAPE_SIZE = 27  # of the shapes of a collision [pair of the first point; SIDE side + shape_kinds.Size]
-    TURNING_FRICTION = 30  # torsional or rolling [contact, MomentRow]
-    SEEN = 29  # inertia that a damper sees [degree of freedom]
     TERRAIN = 28  # a height of the grid of a terrain, by number; it has no list of terms, see terrain_parameters.py
+    SEEN = 29  # inertia that a damper sees [degree of freedom]
+    TURNING_FRICTION = 30  # torsional or rolling [contact, MomentRow]
 
 
 class ParameterTerm(Code):

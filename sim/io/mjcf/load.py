@@ -92,34 +92,49 @@ def load_mjcf(
             collisions=None if isinstance(collisions, bool) else collisions,
             turning_friction=turning_friction,
         )
-        groups, where = find_groups(model)
-        bodies, joints, homes = _tree(model, groups, merge, choices, notes)
-        if not joints:
-            raise ValueError(f"load_mjcf: {file}: no joint is free to move")
-        inputs, gear, low, high = find_inputs(model, homes, where, notes)
-        note_omitted(model, collisions, choices, notes)
-        mech = MjcfMechanism(
-            bodies,
-            [*with_friction(model, joints, homes, choices.joint_friction, notes), *find_loops(model, where, notes)],
-            find_contacts(model, where, choices, collisions is True, notes) if choices.ground else [],
-            inputs,
-            gravity=choices.gravity,
-            name=Path(file).stem,
-            neutral=_neutral(model, keyframe, notes),
-            collisions=[
-                *(find_on_planes(model, where, choices) if choices.ground else []),
-                *(find_collisions(model, where, choices, notes) if collisions is True else []),
-            ],
-            gears=find_gears(model, homes, notes),
-        )
+        mech = _mechanism(model, file, merge, collisions, keyframe, choices, notes)
         mech = _without_constant_gaps(mech, notes)
         mech = _clear(mech) if keyframe is None else mech
         _note_penetrations(mech, keyframe, notes)
         mech = with_self_collisions(mech, choices, notes, slippery=True) if choices.itself else mech
-        known = {model.joint(j).name or f"joint_{j}": home for j, home in homes.items()}
-        report = MjcfReport(file, notes.close(), _frames(model, where), known, gear, low, high)
+        assert mech.report is not None
+        report = replace(mech.report, notes=notes.close())
         _warn(report)
         return replace(mech, report=report)
+
+
+def _mechanism(
+    model: Any,
+    file: str,
+    merge: bool,
+    collisions: bool | str,
+    keyframe: int | None,
+    choices: LoaderChoices,
+    notes: Notes,
+) -> MjcfMechanism:
+    """The mechanism with all its parts, and a report without notes."""
+    groups, where = find_groups(model)
+    bodies, joints, homes = _tree(model, groups, merge, choices, notes)
+    if not joints:
+        raise ValueError(f"load_mjcf: {file}: no joint is free to move")
+    inputs, gear, low, high = find_inputs(model, homes, where, notes)
+    note_omitted(model, collisions, choices, notes)
+    known = {model.joint(j).name or f"joint_{j}": home for j, home in homes.items()}
+    return MjcfMechanism(
+        bodies,
+        [*with_friction(model, joints, homes, choices.joint_friction, notes), *find_loops(model, where, notes)],
+        find_contacts(model, where, choices, collisions is True, notes) if choices.ground else [],
+        inputs,
+        gravity=choices.gravity,
+        name=Path(file).stem,
+        neutral=_neutral(model, keyframe, notes),
+        collisions=[
+            *(find_on_planes(model, where, choices) if choices.ground else []),
+            *(find_collisions(model, where, choices, notes) if collisions is True else []),
+        ],
+        gears=find_gears(model, homes, notes),
+        report=MjcfReport(file, (), _frames(model, where), known, gear, low, high),
+    )
 
 
 def _warn(report: MjcfReport) -> None:

@@ -32,7 +32,7 @@ from sim.model.interruptible_loops import pieces
 from sim.model.model import Model
 from sim.model.record_columns import ContactRow, StepReport, StepSetting
 from sim.simulator.central_differences import central_differences
-from sim.simulator.engines.engine import REPORT, Engine, Floats, Rolled, contact_columns, interrupted, refuse
+from sim.simulator.engines.engine import REPORT, Engine, Floats, Rolled, contact_rows, interrupted, refuse
 from sim.simulator.engines.linear_systems import solved
 from sim.simulator.engines.node_states import ClosingStates
 from sim.simulator.engines.python_loop_engine import PythonLoopEngine
@@ -111,9 +111,9 @@ class AdaptiveEngine(PythonLoopEngine):
                 np.zeros((2, nx)),
                 np.zeros(len(Clock)),
                 np.zeros(REPORT),
-                np.zeros((3, ncontact, contact_columns(self.sizes))),
+                contact_rows(self.sizes, 3),
                 np.zeros(ncontact),
-                np.zeros((ncontact, contact_columns(self.sizes))),
+                contact_rows(self.sizes),
                 np.zeros((_ROWS, nx)),
                 np.zeros(_ROWS),
                 np.zeros(_ROWS, dtype=np.int64),
@@ -192,7 +192,7 @@ class AdaptiveEngine(PythonLoopEngine):
         """The node one step of order 2 after x (nx,).   parts: as in `part_of` of node_step.py."""
         (u, wrench), xs = held, np.zeros((2, self.nx))
         xs[0] = self._mean(x, held, h)[1]
-        contacts = np.zeros((1, self.sizes.ncontact, contact_columns(self.sizes)))
+        contacts = contact_rows(self.sizes, 1)
         line = MotionBuffers(xs, u[None], wrench, np.zeros((1, REPORT)), contacts, *self.no_predictions[:2])
         model, data = self._second.step_table(), self._scratch.table()
         if roll(model, data, self._part_settings(h, kappa, parts), line, 0, None, None) < 1:
@@ -445,7 +445,7 @@ class AdaptiveEngine(PythonLoopEngine):
         )
         goal, (A, B) = self._goal(settings), self.no_predictions[:2]
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
-        contacts = np.zeros((steps, self.sizes.ncontact, contact_columns(self.sizes)))
+        contacts = contact_rows(self.sizes, steps)
         xs[0], line.clock[Clock.BEGUN], knot = x, 0.0, 0
         line = line._replace(wrench=np.zeros_like(external[:1]))
         path = SubstepMotion(us, external, xs, reports, contacts)
@@ -463,7 +463,7 @@ class AdaptiveEngine(PythonLoopEngine):
         """`roll` with the derivatives of its steps."""
         steps = len(us)
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
-        contacts = np.zeros((steps, self.sizes.ncontact, contact_columns(self.sizes)))
+        contacts = contact_rows(self.sizes, steps)
         A, B = np.zeros((steps, self.ndx, self.ndx)), np.zeros((steps, self.ndx, self.nu))
         external = self.external(wrenches)
         xs[0], knot = x, 0

@@ -38,9 +38,9 @@ _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 
 
-def contact_columns(sizes: Sizes) -> int:
-    """Columns of the row of a contact: with its moment where a contact has torsional or rolling friction."""
-    return int(ContactRow.MOMENT) + (3 if sizes.nmoment else 0)
+def contact_rows(sizes: Sizes, *counts: int) -> Floats:
+    """(*counts, ncontact, 11) zeros, 14 with the moments where a contact has torsional or rolling friction."""
+    return np.zeros((*counts, sizes.ncontact, int(ContactRow.MOMENT) + (3 if sizes.nmoment else 0)))
 
 
 class DividedStep(NamedTuple):
@@ -181,7 +181,7 @@ class Engine(LinkedModel):
             np.empty((0, *shape))
             for shape in (
                 (self.sizes.nbody, 6),
-                (self.sizes.ncontact, contact_columns(self.sizes)),
+                contact_rows(self.sizes).shape,
                 (self.ndx, self.ndx),
                 (self.ndx, self.nu),
                 (self.sizes.ncontact, CONE),
@@ -226,7 +226,7 @@ class Engine(LinkedModel):
             A, B = np.empty((steps, self.ndx, self.ndx)), np.empty((steps, self.ndx, self.nu))
             model = self.gradient_table()
         else:
-            contacts = np.zeros((steps, self.sizes.ncontact, contact_columns(self.sizes)))
+            contacts = contact_rows(self.sizes, steps)
             model = self.step_table()
         motion = MotionBuffers(xs, us, self.external(wrenches), reports, contacts, A, B)
         try:

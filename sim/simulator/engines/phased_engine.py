@@ -28,7 +28,7 @@ from sim.model.model import Model
 from sim.model.record_columns import StepReport
 from sim.simulator.engines.dividing_engine import DividingEngine
 from sim.simulator.engines.division import DIVISIBLE
-from sim.simulator.engines.engine import REPORT, Engine, Floats, Rolled, contact_columns, interrupted
+from sim.simulator.engines.engine import REPORT, Engine, Floats, Rolled, contact_rows, interrupted
 from sim.simulator.engines.linear_systems import solved
 from sim.simulator.engines.python_loop_engine import PythonLoopEngine
 from sim.simulator.link_kernels import link_flight
@@ -71,10 +71,7 @@ class PhasedEngine(PythonLoopEngine):
         """Steps from x under us (T, nu) and external wrenches (T, nbody, 6)."""
         steps, t = len(us), 0
         xs, means, near = np.zeros((steps + 1, self.nx)), np.zeros((steps + 1, self.nx)), np.zeros(steps, np.int64)
-        reports, contacts = (
-            np.zeros((steps, REPORT)),
-            np.zeros((steps, self.sizes.ncontact, contact_columns(self.sizes))),
-        )
+        reports, contacts = np.zeros((steps, REPORT)), contact_rows(self.sizes, steps)
         motion = MotionBuffers(means, us, self.external(wrenches), reports, contacts, *self.no_predictions[:2])
         path = Phases(xs, motion, near, not self.second_order_reason, self.settings.divide)
         xs[0], settings, (models, data_tables) = x, self._second.settings.array(kappa), self._lines()
