@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pose import quat_product
-from sim.mechanism.rising_bases import rising_bases
 from sim.model.state_columns import BaseState
 from solvers.types import Matrix, Vector
 
@@ -53,8 +51,7 @@ class GroundPlane(NamedTuple):
         """
         out, nq = np.array(x, dtype=np.float64), mechanism.nq
         if self.level:
-            bases = rising_bases(mechanism.joints, mechanism.bodies, np.asarray(mechanism.neutral))
-            for _, places, rates in islice(bases, 1):
+            for _, places, rates in mechanism.rising_bases[:1]:
                 out[:, places] += self.height * rates
             return out
         n = self.normal

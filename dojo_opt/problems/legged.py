@@ -38,9 +38,9 @@ _LOOSE = 0.2  # of the usual damper, which takes much of the torque of ankles th
 _SHARES = (1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2)  # of the usual distance and height of a jump, from the most
 _STRAIN = 1.3  # times the torque limits: largest torques of the reference of a jump, which plans spread over more time
 _CROUCH = 0.8  # of the way down that the legs allow, at most, before a jump
-# regularisation of the gains of a jump on flat feet: they act for a part of a knot in the air, too, and where they are
-# higher, with 10, they turn the ankles of Talos to their stops before it lands
-_CALM = 100.0
+# regularisation of the gains of a jump on flat feet, which act for a part of a knot in the air, too: with 100 Talos
+# stumbles in four of five landings, and with 10 its ankles turn to their stops before them
+_CALM = 1600.0
 _LEAST = 1e-3  # [s] time steps are multiples of this
 
 

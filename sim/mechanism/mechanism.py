@@ -34,7 +34,7 @@ from sim.mechanism.shapes import Solid, Sphere
 from sim.mechanism.terrain import Terrain
 from sim.mechanism.tree import check_axes, check_loops, check_masses, sort_tree
 from sim.mechanism.visual import Visual
-from solvers.types import Floats
+from solvers.types import Floats, Integers
 
 
 @dataclass(frozen=True, repr=False)
@@ -179,6 +179,11 @@ class Mechanism:
     def coordinate_limits(self) -> tuple[Floats, Floats]:
         """(lower, upper) limits of the coordinates, (nq,) each, infinite where there are none [m, rad]."""
         return coordinate_limits(self.joints)
+
+    @cached_property
+    def rising_bases(self) -> tuple[tuple[str, Integers, Floats], ...]:
+        """Bases that can move straight up in the neutral state: see rising_bases.py."""
+        return tuple(rising_bases(self.joints, self.bodies, np.asarray(self.neutral)))
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -527,7 +532,7 @@ def _standing(mech: Mechanism) -> Floats:
     """Neutral coordinates with every base that can rise as high as its lowest contact touches the ground."""
     q = np.array(mech.neutral, dtype=np.float64)
     at = body_poses(mech.joints, q)
-    for base, place, rates in rising_bases(mech.joints, mech.bodies, q):
+    for base, place, rates in mech.rising_bases:
         hanging = {base}
         for other in mech.joints:
             if other.parent in hanging:

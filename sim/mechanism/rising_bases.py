@@ -30,7 +30,7 @@ def rising_bases(joints: Sequence[Joint], bodies: Sequence[Body], q: Floats) -> 
     Yields:
         Name of the body, places (n,) in q of the coordinates that move it, and their rates per metre (n,).
     """
-    at: dict[str, Pose] = {}  # only for bases on others, as poses take a millisecond, and controllers ask in every tick
+    at: dict[str, Pose] = {}  # only for bases on others, as poses take a millisecond
     frames = {WORLD}  # the world, and bodies without mass between it and a base
     light = {body.name for body in bodies if body.mass == 0.0}
     limits = coordinate_limits(joints)
