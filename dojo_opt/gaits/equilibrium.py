@@ -41,6 +41,8 @@ _STRIDE, _HALVINGS = 0.1, 20  # [m, rad] largest step of a settling robot, and h
 _ALOFT = 1e-4  # [m] above the ground, where settling begins
 _EXACT = 1e-2  # of the largest imbalance: below it no other search is tried
 _SUM = 1e3  # [m] weight of the sum of factors, much more than the size of a robot
+_ROUNDED, _HARDEST = 1e-10, 4e-15  # of the size: gaps with forces right to a thousandth, and with any at all
+_UNLOADED = 1e-6  # share of the weight
 _BESIDE = 1e-4  # [m] a distance that a weight beside its contacts has at least
 _ABOUND = (
     1e-3  # of the largest load, and of the range of a joint: torque of a stop, and distance from it, that are small
@@ -388,6 +390,10 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     moved off it, so little that the torque of the stop is a small part of the load. Contacts of bodies with one another
     carry nothing.
 
+    With steps of order 4 to 8 the velocity is that of the node before the ground acts: standing still, g h/2. Where kappa
+    is so small that rounding changes the distances it belongs to, as with an accuracy, a larger one finds the forces;
+    the distances are then those of the small one, as far as rounding allows.
+
     The state need not be stable: under constant torques a robot on legs falls within some tenths of a second.
 
     Args:
@@ -406,10 +412,70 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     """
     if not isinstance(sim, Simulator):
         raise TypeError(f"equilibrium(sim): expected a Simulator, got {sim!r}")
-    mech = sim.mechanism
     state = np.array(sim.neutral() if x is None else checks.array("equilibrium(x)", x, (sim.nx,)))
     state[sim.nq :] = 0.0
-    state = sim.close(_off_stops(sim, state))
+    kappa = max(sim.kappa, _level(sim, state))
+    hard = kappa > sim.kappa
+    soft = sim.replace(order=2, accuracy=None, kappa=kappa) if hard else sim
+    found, u = _at_rest(soft, state, iterations)
+    if hard:
+        found = _pressed_harder(soft, found, sim.kappa)
+    return _with_velocity(sim, found, u), u
+
+
+def _level(sim: Simulator, state: Floats) -> float:
+    """The kappa with gaps that rounding leaves right, at least [N s m]."""
+    weight = float(np.abs(potential_gradient(sim, state)).max(initial=0.0))
+    return _ROUNDED * _size(sim, state) * sim.time_step * weight
+
+
+def _size(sim: Simulator, state: Floats) -> float:
+    """Largest coordinate of a body, by which distances are rounded [m]."""
+    return max(float(np.abs(sim.maximal(state)[:, :3]).max(initial=0.0)), _NEAR)
+
+
+def _pressed_harder(sim: Simulator, state: Floats, kappa: float) -> Floats:
+    """The state of rest at a smaller kappa than that of `sim`, with the same forces.
+
+    Distances of loaded contacts and stops fall with kappa, no further than rounding allows: by less than a thousandth
+    of the millionth part of the robot's size.
+    """
+    motions, names = StaticMotions.at(sim, state), sim.mechanism.ground_contact_names
+    rows, distances = [np.eye(sim.nv), -np.eye(sim.nv)], list(_stop_distances(sim, state))
+    slopes = [np.ones(sim.nv), np.ones(sim.nv)]
+    if names:
+        feet = Feet(sim, names)
+        down, _, cosine = _under(feet, state)
+        rows, distances, slopes = [*rows, down], [*distances, feet.gaps(state)], [*slopes, cosine]
+    weight = float(np.abs(potential_gradient(sim, state)).max(initial=0.0))
+    force = sim.kappa / (sim.time_step * np.concatenate(slopes) * np.concatenate(distances))
+    loaded = force > _UNLOADED * weight
+    distance, along = np.concatenate(distances)[loaded], np.concatenate(rows)[loaded] @ motions.allowed
+    wanted = np.minimum(np.maximum(distance * kappa / sim.kappa, _HARDEST * _size(sim, state)), distance)
+    by = np.linalg.lstsq(along, wanted - distance, rcond=_RANK)[0]
+    return motions.move(sim, state, motions.allowed @ by)
+
+
+def _with_velocity(sim: Simulator, state: Floats, u: Floats) -> Floats:
+    """The state of rest with the velocity that steps of order 2 among those of higher order begin with.
+
+    That is the velocity of the node before the ground acts. Which order a step has, a step tells.
+    """
+    if sim.order == 2 or sim.accuracy is not None or np.array_equal(sim.step(state, u).x, state):
+        return state
+    near = np.concatenate([state[: sim.nq], sim.replace(order=2).velocity(state)])
+    starts = np.stack([state, near])
+    ends = [sim.step(x, u) for x in starts]
+    moved = [
+        float(np.abs(sim.difference(end.x, x)).max()) if end.success else np.inf
+        for x, end in zip(starts, ends, strict=True)
+    ]
+    return starts[int(np.argmin(moved))]
+
+
+def _at_rest(sim: Simulator, x: Floats, iterations: int) -> tuple[Floats, Floats]:
+    """`equilibrium` near a state (nx,) without velocity, at a kappa that rounding allows."""
+    mech, state = sim.mechanism, sim.close(_off_stops(sim, x))
     weight = float(np.abs(potential_gradient(sim, state)).max(initial=0.0))
     most = max(_LEFT * weight, _NOTHING * sum(body.mass for body in mech.bodies))
     motions = StaticMotions.at(sim, state)

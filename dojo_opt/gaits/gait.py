@@ -36,7 +36,8 @@ class Gait:
 
     The velocity of row t is that of the interval from t - 1 to t, as in every state of order 2. x[0] has that of the
     interval before the motion, which for a periodic gait is the last one of a period. For a simulator whose states have
-    the velocity at the node, it is the mean of those of the intervals before and after the row.
+    the velocity at the node, it is the mean of those of the intervals before and after the row. With orders 4 to 8, a
+    motion from rest on the ground begins at the state of `equilibrium`, which has the velocity before the ground acts.
 
     Attributes:
         name: name of the gait.

@@ -121,6 +121,32 @@ def test_equilibrium_stays(contacts, kappa):
     assert np.abs(u).max() < 10.0
 
 
+@pytest.mark.parametrize(
+    "settings", [{"order": 4}, {"order": 8}, {"accuracy": 1e-4}, {"kappa": 1e-13}, {"kappa": 1e-16, "order": 4}]
+)
+@pytest.mark.parametrize("make", [models.quadruped, models.block, models.panda])
+def test_equilibrium_stays_with_all_steps(make, settings):
+    """As with order 2, whose inputs they are; the joints of the panda are damped, so its steps are of order 2."""
+    plain = Simulator(make(), time_step=0.01)
+    robot = plain.replace(**settings)
+    (x0, u0), (x, u) = equilibrium(plain), equilibrium(robot)
+    np.testing.assert_allclose(u, u0, atol=1e-4)
+    np.testing.assert_allclose(x[: plain.nq], x0[: plain.nq], atol=1e-7)
+    still, moved = plain.rollout(x0, np.tile(u0, (10, 1))), robot.rollout(x, np.tile(u, (10, 1)))
+    drifts = [np.abs(robot.difference(path.x[-1], path.x[0])[: robot.nv]).max() for path in (still, moved)]
+    exact = set(settings) == {"order"}
+    assert drifts[1] < 1.1 * drifts[0] + (1e-14 if exact else 2e-6), drifts
+
+
+def test_arms_in_flight_have_no_velocity_at_rest():
+    """An arm with stops takes steps of higher order, which begin with the true velocity, where it is not at one."""
+    arm = Simulator(models.acrobot(), time_step=0.01, order=4)
+    stops = replace(arm.mechanism, joints=[replace(j, limits=[(-2.0, 2.0)]) for j in arm.mechanism.joints])
+    for robot in (arm, arm.replace(mechanism=stops)):
+        x, u = equilibrium(robot)
+        assert not x[robot.nq :].any() and np.abs(robot.step(x, u).x - x).max() < 1e-9
+
+
 def test_equilibrium_of_another_stance(sim):
     x = sim.neutral()
     feet = Feet(sim)
