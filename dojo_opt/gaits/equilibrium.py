@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import NamedTuple
 
@@ -10,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.gaits.feet import Feet
-from dojo_opt.gaits.static_motions import StaticMotions
+from dojo_opt.gaits.static_motions import StaticMotions, pushes
 from dojo_opt.planning.manifold import cross
 from sim.mechanism import checks
 from sim.simulator.kinematics import Kinematics
 from sim.simulator.simulator import Simulator
 from solvers.types import Floats
 
-__all__ = ["equilibrium", "potential_gradient"]
+__all__ = ["at_rest_on_ground", "equilibrium", "potential_gradient"]
 
 _STEP = 1e-5
 _NOISE = 1e-7  # singular values below this part of the largest are those of differences in Jacobians
@@ -381,18 +382,19 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     """A state of rest near x, and the input that holds it: for arms, hands and robots on feet or lying on the ground.
 
     The contacts press straight down, so nothing creeps on level ground, and share the load as evenly as balance allows.
-    The joints balance gravity and springs, loops and gears included. Inputs that act on bodies are zero. On the central
-    path a contact with the normal impulse g floats kappa / g above the ground: the state is moved to those heights. On
-    slopes friction carries a share of the weight, and creeps by an amount proportional to kappa. Contacts that carry
-    load have to be within 1 cm of the same distance from the ground: `dojo_opt.gaits.feet.Feet.place` puts a robot with
-    legs there on terrain. A robot whose weight is beside its feet bends its joints to lean over them, or sinks onto the
-    ground with its joints as they are, by a twentieth of its size, or 1 cm if that is more. A joint at its stop is
-    moved off it, so little that the torque of the stop is a small part of the load. Contacts of bodies with one another
-    carry nothing.
+    The joints balance gravity and springs, loops and gears included. Inputs that act on bodies are zero, and so are
+    forces on a free base that is on the ground. Contacts of a robot that its inputs hold entirely carry nothing. On the
+    central path a contact with the normal impulse g floats kappa / g above the ground: the state is moved to those
+    heights. On slopes friction carries a share of the weight, and creeps by an amount proportional to kappa. Contacts
+    that carry load have to be within 1 cm of the same distance from the ground: `dojo_opt.gaits.feet.Feet.place` puts a
+    robot with legs there on terrain. A robot whose weight is beside its feet bends its joints to lean over them, or
+    sinks onto the ground with its joints as they are, by a twentieth of its size, or 1 cm if that is more. A joint at
+    its stop is moved off it, so little that the torque of the stop is a small part of the load. Contacts of bodies with
+    one another carry nothing.
 
-    With steps of order 4 to 8 the velocity is that of the node before the ground acts: standing still, g h/2. Where kappa
-    is so small that rounding changes the distances it belongs to, as with an accuracy, a larger one finds the forces;
-    the distances are then those of the small one, as far as rounding allows.
+    With steps of order 4 to 8 the velocity is that of the node before the ground acts: standing still, g h/2. Where
+    kappa is so small that rounding changes the distances that belong to it, as with an accuracy, a larger one finds the
+    forces; the distances are then those of the small one, as far as rounding allows.
 
     The state need not be stable: under constant torques a robot on legs falls within some tenths of a second.
 
@@ -456,15 +458,23 @@ def _pressed_harder(sim: Simulator, state: Floats, kappa: float) -> Floats:
     return motions.move(sim, state, motions.allowed @ by)
 
 
-def _with_velocity(sim: Simulator, state: Floats, u: Floats) -> Floats:
-    """The state of rest with the velocity that steps of order 2 among those of higher order begin with.
+def at_rest_on_ground(sim: Simulator, x: Floats) -> Floats:
+    """States (..., nx) that rest on the ground at the coordinates of x (..., nx).
 
-    That is the velocity of the node before the ground acts. Which order a step has, a step tells.
+    With orders 4 to 8 they have the velocity of the node before the ground acts, otherwise none.
     """
+    rest = x.copy()
+    rest[..., sim.nq :] = 0.0
+    if sim.order > 2 and sim.accuracy is None:
+        rest[..., sim.nq :] = sim.replace(order=2).velocity(rest)
+    return rest
+
+
+def _with_velocity(sim: Simulator, state: Floats, u: Floats) -> Floats:
+    """The state of rest with its velocity: which order a step has, and so what rests, a step tells."""
     if sim.order == 2 or sim.accuracy is not None or np.array_equal(sim.step(state, u).x, state):
         return state
-    near = np.concatenate([state[: sim.nq], sim.replace(order=2).velocity(state)])
-    starts = np.stack([state, near])
+    starts = np.stack([state, at_rest_on_ground(sim, state)])
     ends = [sim.step(x, u) for x in starts]
     moved = [
         float(np.abs(sim.difference(end.x, x)).max()) if end.success else np.inf
@@ -478,10 +488,22 @@ def _at_rest(sim: Simulator, x: Floats, iterations: int) -> tuple[Floats, Floats
     mech, state = sim.mechanism, sim.close(_off_stops(sim, x))
     weight = float(np.abs(potential_gradient(sim, state)).max(initial=0.0))
     most = max(_LEFT * weight, _NOTHING * sum(body.mass for body in mech.bodies))
-    motions = StaticMotions.at(sim, state)
-    names = mech.ground_contact_names
-    if not names:
-        return state, _held(sim, motions, potential_gradient(sim, state) - stop_torques(sim, state), most, "inputs")
+    if not mech.ground_contact_names:
+        load = potential_gradient(sim, state) - stop_torques(sim, state)
+        return state, _held(sim, StaticMotions.at(sim, state), load, most, "inputs")
+    idle = pushes(sim)
+    if idle.any() and Feet(sim, mech.ground_contact_names).gaps(state).min() < _NEAR:  # it is on the ground
+        with suppress(ValueError):
+            return _on_ground(sim, state, most, StaticMotions.at(sim, state, idle), iterations)
+    return _on_ground(sim, state, most, StaticMotions.at(sim, state), iterations)
+
+
+def _on_ground(
+    sim: Simulator, state: Floats, most: float, motions: StaticMotions, iterations: int
+) -> tuple[Floats, Floats]:
+    """The state of rest near `state` of a robot with contacts, and the inputs; most: imbalance that may remain."""
+    mech, names = sim.mechanism, sim.mechanism.ground_contact_names
+    weight = float(np.abs(potential_gradient(sim, state)).max(initial=0.0))
     rest = _Rest(sim, Feet(sim, names), motions)
     found, load, force = _on_contacts(rest, state, most, iterations)
     gaps, left = rest.feet.gaps(found), motions.left(load)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dojo_opt.gaits.equilibrium import least_pushes
+from dojo_opt.gaits.equilibrium import at_rest_on_ground, least_pushes
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.static_motions import input_map
 from sim.mechanism import checks
@@ -25,6 +25,7 @@ _ALOFT = 100.0  # [m] where no foot feels the ground
 _FAR = 1e3  # [rad, m] where no joint feels its stops
 _LONGEST = 100_000  # time steps: half an hour at 20 ms, whose inverse kinematics take seconds
 _SAME = 1e-9  # share of a time step by which equal ones may differ
+_STILL = 1e-9  # [m/s, rad/s] velocities of states at rest
 _JOINED = 1e-3  # [m, rad] between the ends of two motions that follow one another
 _EVEN = 1e-4  # weight of small foot forces against the balance of the base
 
@@ -36,8 +37,8 @@ class Gait:
 
     The velocity of row t is that of the interval from t - 1 to t, as in every state of order 2. x[0] has that of the
     interval before the motion, which for a periodic gait is the last one of a period. For a simulator whose states have
-    the velocity at the node, it is the mean of those of the intervals before and after the row. With orders 4 to 8, a
-    motion from rest on the ground begins at the state of `equilibrium`, which has the velocity before the ground acts.
+    the velocity at the node, it is the mean of those of the intervals before and after the row. With orders 4 to 8,
+    `stand` has the velocity before the ground acts, as states at rest on the ground have: see Simulator.
 
     Attributes:
         name: name of the gait.
@@ -130,6 +131,9 @@ class Gait:
         driven = replace(mech, joints=joints, inputs=[Input(j.name, dof=d) for j in mech.joints for d in range(j.nv)])
         sim = self.simulator.replace(mechanism=driven)
         x = self.x.copy()
+        if sim.mean_over == 0.0 and not sim.second_order_reason:  # in the air, what rests has no velocity
+            still = np.isclose(x, at_rest_on_ground(sim, x), rtol=0.0, atol=_STILL).all(axis=1)
+            x[still, sim.nq :] = 0.0
         x[:, 2] += _ALOFT
         tau = np.zeros((len(x) - 1, sim.nv))
         for _ in range(iterations):

@@ -8,6 +8,7 @@ of the bodies at the ends of the tree. The base looks along x.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from inspect import signature
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.gaits.biped import balanced
+from dojo_opt.gaits.equilibrium import at_rest_on_ground
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.footfall import Footfall
 from dojo_opt.gaits.gait import Gait, assemble, check_length
@@ -200,7 +202,8 @@ def stand(sim: Simulator, *, duration: float = 1.0, height: float | None = None)
     if height is not None:
         base[:, 2] = checks.number("gaits.stand(height=...)", height)
     places = np.tile(ground, (steps + 2, 1, 1))
-    return assemble(sim, "stand", base, places, np.ones(places.shape[:2], dtype=bool), names=feet.names)
+    made = assemble(sim, "stand", base, places, np.ones(places.shape[:2], dtype=bool), names=feet.names)
+    return replace(made, x=at_rest_on_ground(sim, made.x))
 
 
 def jump(

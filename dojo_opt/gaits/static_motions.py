@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from sim.mechanism.joint import WORLD
 from sim.simulator.simulator import Simulator
 from solvers.types import Floats
 
-__all__ = ["StaticMotions", "input_map"]
+__all__ = ["StaticMotions", "input_map", "pushes"]
 
 _STEP = 1e-4  # of the differences of the closed states, which are right to 1e-12
 _PROJECTED = 0.5  # singular values of a projection are 0, or 1 and more
@@ -26,6 +28,17 @@ def input_map(sim: Simulator) -> Floats:
     return out
 
 
+def pushes(sim: Simulator) -> NDArray[np.bool_]:
+    """(nu,) whether inputs are forces on a body that moves and turns freely in space or in a plane."""
+    free = {
+        joint.name: joint.ntrans
+        for joint in sim.mechanism.joints
+        if joint.parent == WORLD and joint.ntrans > 1 and joint.nrot
+    }
+    parts = sim.mechanism.inputs or ()
+    return np.array([part.joint in free and part.dof < free[part.joint] for part in parts], dtype=bool)
+
+
 class StaticMotions(NamedTuple):
     """Bases of the motions at a state.
 
@@ -38,9 +51,11 @@ class StaticMotions(NamedTuple):
     loose: Floats  # (nv, m) those of them that no input drives
 
     @classmethod
-    def at(cls, sim: Simulator, x: Floats) -> StaticMotions:
-        """Motions at a state (nx,) whose loops are closed."""
+    def at(cls, sim: Simulator, x: Floats, idle: NDArray[np.bool_] | None = None) -> StaticMotions:
+        """Motions at a state (nx,) whose loops are closed.   idle: (nu,) inputs that are zero (default None: none)."""
         B, mech = input_map(sim), sim.mechanism
+        if idle is not None:
+            B[:, idle] = 0.0
         if not (mech.loops or mech.gears):
             return cls(B, np.eye(sim.nv), np.eye(sim.nv)[:, ~B.any(axis=1)])
         steps = _STEP * np.eye(sim.nv, sim.ndx)

@@ -138,6 +138,18 @@ def test_equilibrium_stays_with_all_steps(make, settings):
     assert drifts[1] < 1.1 * drifts[0] + (1e-14 if exact else 2e-6), drifts
 
 
+def test_the_ground_carries_a_body_that_pushes_could_hold():
+    """Forces along a planar base: a block on the ground needs none, and one in the air is held."""
+    block = Simulator(models.block2d(), time_step=0.01)
+    x, u = equilibrium(block)
+    assert not u.any() and np.abs(block.step(x, u).x - x).max() < 1e-12
+    assert block.step(x, u).contacts.normal_force.sum() == pytest.approx(9.81)
+    aloft = block.neutral()
+    aloft[1] += 0.5
+    x, u = equilibrium(block, aloft)
+    assert x[1] == aloft[1] and u == pytest.approx([0.0, 9.81, 0.0], abs=1e-6)
+
+
 def test_arms_in_flight_have_no_velocity_at_rest():
     """An arm with stops takes steps of higher order, which begin with the true velocity, where it is not at one."""
     arm = Simulator(models.acrobot(), time_step=0.01, order=4)

@@ -164,6 +164,18 @@ def test_standing_takes_the_torques_of_equilibrium(sim):
     np.testing.assert_allclose(us, np.tile(equilibrium(sim)[1], (5, 1)), atol=2e-2)
 
 
+@pytest.mark.parametrize("order", [4, 8])
+@pytest.mark.parametrize("damper", [0.0, 0.5])
+def test_standing_stands_with_steps_of_higher_order(order, damper):
+    """With a damper that is too stiff for order 4, and with springs."""
+    plain = Simulator(models.quadruped(damper=damper, spring=damper), time_step=0.02)
+    first, g = (gaits.stand(sim, duration=0.2) for sim in (plain, plain.replace(order=order)))
+    us = g.torques()
+    np.testing.assert_allclose(us, first.torques(), atol=1e-6)
+    ends = g.simulator.rollout(g.x[0], us).x[-1], plain.rollout(first.x[0], us).x[-1]
+    np.testing.assert_allclose(ends[0][: plain.nq], ends[1][: plain.nq], atol=1e-9)
+
+
 def test_torques_move_the_reference_as_it_moves(sim):
     g = gaits.trot(sim, speed=0.2, period=0.4)
     us = g.torques()
