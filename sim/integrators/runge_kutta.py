@@ -51,6 +51,7 @@ _NOT_FINITE = int(Status.NOT_FINITE)
 _SINGULAR = int(Status.SINGULAR)
 _TURN_TOO_LARGE = int(Status.TURN_TOO_LARGE)
 _ENERGY_GAIN = int(Status.ENERGY_GAIN)
+_ROUNDED = 1e-12  # [m, rad]
 
 
 @kernel
@@ -95,6 +96,17 @@ def _evaluate(model: Model, data: Data, h: float, weights: Vector, count: int, q
     displace(model, q, data.stage_shift, 1.0, data.theta1)
     place(model, data)
     return velocity_of_momenta(model, data, data.stage_momenta)
+
+
+@kernel
+def _moves(data: Data) -> bool:
+    """Whether a step changes a coordinate by more than rounding does, as of a robot in balance, whose energies are
+    noise.
+    """
+    for d in range(data.stage_shift.shape[0]):
+        if not abs(data.stage_shift[d]) < _ROUNDED:
+            return True
+    return False
 
 
 @kernel
@@ -143,7 +155,8 @@ def advance(model: Model, data: Data, h: float, u: Vector, x: Vector, tangents: 
     after = node_energy(model, data)
     stored = abs(after[1] - before[1])
     gain = after[0] + after[1] - before[0] - before[1] - given
-    return _ENERGY_GAIN if gain > LARGEST_GAIN * max(before[0], stored + abs(given)) else _SOLVED
+    gained = gain > LARGEST_GAIN * max(before[0], stored + abs(given)) and _moves(data)
+    return _ENERGY_GAIN if gained else _SOLVED
 
 
 @kernel
