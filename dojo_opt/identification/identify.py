@@ -1,9 +1,9 @@
 """identify: parameters of a simulator from measured motions, by Gauss-Newton over multiple shooting.
 
-    min over theta and the starts s_k    sum_k sum_t rho(|r_kt|^2) + max(1, rms^2) sum_i ((theta_i - m_i)/s_i)^2
+    min over theta and the starts s_k    sum_k sum_t rho(|r_kt|^2) + max(1, v) sum_i ((theta_i - m_i)/s_i)^2
 
-with r of windows.py, and prior knowledge of some parameters, m_i +- s_i. Errors of the
-model add to the noise of the measurement; rms^2 measures by how much, and the data are down-weighted by it.
+with r of windows.py, and prior knowledge of some parameters, m_i +- s_i. Errors of the model add to the noise of the
+measurement; v, the variance of r without outliers, measures by how much, and the data are down-weighted by it.
 
 Starts are eliminated window by window (Schur complement), so the work grows with the data and not with its square. rho
 is Huber's, by iteratively reweighted least squares: a state whose scaled error has a root mean square above `outlier`
@@ -32,13 +32,13 @@ from dojo_opt.identification.normal_equations import NormalEquations
 from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.identification.prior import Prior
 from dojo_opt.identification.shooting_fit import Expectation, ShootingFit
-from dojo_opt.identification.windows import Predictor, Window, cut_windows
+from dojo_opt.identification.windows import Predictor, Window, WindowErrors, cut_windows
 from dojo_opt.planning.executors import check_executor, results_in_order
 from sim.mechanism import checks
 from sim.mechanism.memory_limit import room_for
 from sim.mechanism.renamed import renamed, renamed_keywords
 from sim.mechanism.short_repr import short_table
-from sim.simulator.results import Trajectory
+from sim.simulator.results import Interrupted, Trajectory
 from sim.simulator.simulator import Simulator
 from solvers.status import MESSAGES, Status
 from solvers.types import Floats
@@ -71,14 +71,15 @@ class Identified:
         success: whether the fit converged to a model that explains the data.
         status: SOLVED, or the reason why not: MAX_ITERATIONS, LINE_SEARCH if no damped step decreases the cost as the
             linear model expects, SIMULATION_FAILED if no window can be predicted, NOT_EXPLAINED if more than a
-            tenth of the states are outliers.
+            tenth of the states are outliers, INTERRUPTED after Ctrl-C.
         message: the same as a sentence.
         labels: names of the fitted values.
         values: (n,) fitted values, in the units of their parameters.
         start: (n,) values before the fit.
         covariance: (n, n); infinite on the diagonal for parameters that the data do not determine.
         simulator: the simulator with the fitted values, and the kappa of the one that the fit began with.
-        rms: root mean square of the errors over their noise: 1 if the given noise is right.
+        rms: root mean square of the errors over their noise, to which outliers count linearly: 1 if the given noise is
+            right.
         unseen: combinations, by label, that change no prediction and have no prior: changes of the values over
             `ParameterSpace.scale`.
         outliers: share of states with reduced weight.
@@ -275,6 +276,8 @@ def identify(
         TypeError: for an argument of the wrong kind.
         ValueError: for a value out of range, an unknown name, or a Trajectory under external wrenches, with another
             time step, or with velocities of another kind (means over steps, or those at nodes).
+        Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the best of the finished fits, or else the fit
+            so far, INTERRUPTED, by the windows that it has got to; None before its first predictions.
     """
     call = "identify"
     if not isinstance(sim, Simulator):
@@ -298,7 +301,16 @@ def identify(
     checks.whole_number(f"{call}(seed=...)", seed, 0)
     first = _first_values(space, known, count, seed)
     calls = [(space, windows, deviations, o, known, seed, values) for values in first]
-    found = list(results_in_order(_fitted, calls, executor))
+    found: list[Identified] = []
+    try:
+        found.extend(results_in_order(_fitted, calls, executor))  # those before Ctrl-C stay
+    except KeyboardInterrupt as stop:
+        raise Interrupted(_best(found) if found else getattr(stop, "result", None)) from None
+    return _best(found)
+
+
+def _best(found: list[Identified]) -> Identified:
+    """The best of several fits, with the time of all."""
     best = min(found, key=lambda each: (each.unsolved, each.cost))
     return replace(best, cpu_seconds=sum(each.cpu_seconds for each in found))
 
@@ -333,6 +345,21 @@ def _fitted(
     fit = ShootingFit(space, windows, Predictor(space, noise, o.every), o.outlier, known)
     fit.theta = values.copy()
     history: list[dict[str, Any]] = []
+    try:
+        kappa, status = _descended(fit, windows, o, seed, began, history)
+        errors = fit.errors(fit.theta, fit.starts, kappa, slopes=True) or []
+    except KeyboardInterrupt:
+        if fit.reached is None:
+            raise
+        fit.theta, fit.windows, fit.starts, kappa, errors = fit.reached
+        raise Interrupted(_identified(fit, kappa, errors, Status.INTERRUPTED, history, began)) from None
+    return _identified(fit, kappa, errors, status, history, began)
+
+
+def _descended(
+    fit: ShootingFit, windows: list[Window], o: IdentifyOptions, seed: int, began: float, history: list[dict[str, Any]]
+) -> tuple[float, Status]:
+    """All stages of a fit: the smoothing of the last one, and how it ended."""
     rng, stages, status = np.random.default_rng(seed), _stages(fit, windows, o), Status.SOLVED
     for before, stage in zip((None, *stages), stages, strict=False):
         fit.cut(windows, stage.length)
@@ -346,7 +373,7 @@ def _fitted(
         if status == Status.SIMULATION_FAILED:
             break
     fit.cut(windows, stages[-1].length)
-    return _identified(fit, stage.kappa, status, history, began)
+    return stage.kappa, status
 
 
 class _Stage(NamedTuple):
@@ -375,6 +402,7 @@ def _descend(fit: ShootingFit, stage: _Stage, began: float, history: list[dict[s
     found = fit.errors(fit.theta, fit.starts, kappa, slopes=True)
     if found is None:
         return Status.SIMULATION_FAILED
+    fit.reach(kappa, found)
     usable = [w.solved for w in found]
     data, weights, far = fit.weigh(found, usable)
     damping, cost = _DAMPING, fit.rest(data, found, usable)
@@ -405,6 +433,7 @@ def _descend(fit: ShootingFit, stage: _Stage, began: float, history: list[dict[s
         fit.theta, fit.starts = theta, starts
         again = fit.errors(theta, starts, kappa, slopes=True)
         assert again is not None
+        fit.reach(kappa, again)
         found, usable = again, [w.solved for w in again]
         data, weights, far = fit.weigh(found, usable)
         cost = fit.rest(data, found, usable)
@@ -438,11 +467,15 @@ def _stopped(expected: Expectation, cost: float, o: IdentifyOptions) -> Status:
 
 
 def _identified(
-    fit: ShootingFit, kappa: float, status: Status, history: list[dict[str, Any]], began: float
+    fit: ShootingFit,
+    kappa: float,
+    found: list[WindowErrors],
+    status: Status,
+    history: list[dict[str, Any]],
+    began: float,
 ) -> Identified:
-    """The result, with the covariance of the parameters at the end."""
+    """The result, with the covariance of the parameters at the end, where the windows have the errors `found`."""
     space, n = fit.space, len(fit.theta)
-    found = fit.errors(fit.theta, fit.starts, kappa, slopes=True) or []
     usable = [w.solved for w in found]
     cost, weights, far = fit.weigh(found, usable)
     equations = NormalEquations(found, weights, fit.unit)
@@ -453,8 +486,7 @@ def _identified(
     elif far > _MISSED:
         message = f"{message} {missed}"
     count = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
-    free = count - n - sum(usable) * fit.base.ndx
-    variance = max(cost / max(free, 1), 1e-30)
+    variance = max(fit.noise_variance(cost, found, usable, n + sum(usable) * fit.base.ndx), 1e-30)
     known = fit.prior.precision * fit.unit**2
     covariance, shares, axes = _covariance(H / variance + np.diag(known), np.diag(equations.PP) / variance + known)
     covariance = covariance * np.outer(fit.unit, fit.unit)

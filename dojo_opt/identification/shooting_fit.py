@@ -13,7 +13,7 @@ from dojo_opt.identification.windows import Predictor, Window, WindowErrors
 from sim.simulator.simulator import Simulator
 from solvers.types import Floats
 
-__all__ = ["Expectation", "ShootingFit"]
+__all__ = ["Expectation", "Reached", "ShootingFit"]
 
 _MISSED = 2.0  # times the cost of most windows, or that of the noise: windows whose starts are drawn again
 _DRAWS = 32  # starts of a missed window, the measured one among them
@@ -29,6 +29,16 @@ class Expectation(NamedTuple):
     deviations: float  # by which the parameters change, in standard deviations
 
 
+class Reached(NamedTuple):
+    """Where a fit has got to, all of one moment."""
+
+    theta: Floats
+    windows: list[Window]
+    starts: list[Floats]
+    kappa: float
+    found: list[WindowErrors]  # with derivatives
+
+
 class ShootingFit:
     """Parameters and starts of windows, from one step to the next."""
 
@@ -40,7 +50,13 @@ class ShootingFit:
         self.prior_weight = 1.0  # of the prior
         self.starts = [w.x[0].copy() for w in windows]
         self.unit = space.scale  # coordinates differ in size by orders of magnitude
-        self.variance = 0.0  # of the errors over their noise
+        self.variance = 0.0  # of the errors over their noise, without outliers
+        self.reached: Reached | None = None  # that Ctrl-C leaves
+
+    def reach(self, kappa: float, found: list[WindowErrors]) -> None:
+        """Note the errors here, in one assignment."""
+        if any(w.solved for w in found):
+            self.reached = Reached(self.theta, self.windows, self.starts, kappa, found)
 
     def cut(self, windows: list[Window], length: int) -> None:
         """Replace the windows by pieces of these ones; starts stay where a window began there before."""
@@ -80,10 +96,28 @@ class ShootingFit:
         """Cost of the distance from the prior."""
         return self.prior_weight * self.prior.cost(theta)
 
+    def noise_variance(self, cost: float, found: list[WindowErrors], usable: list[bool], fitted: int = 0) -> float:
+        """Variance of the errors over their noise, by so many fitted values fewer than errors: Huber's estimate.
+
+            sum min(|r|, k)^2 / (share of inliers)    over the errors that are free
+
+        An outlier counts as one at the threshold k, however far it is (Huber and Ronchetti, Robust Statistics, 7.6).
+        The normal equations count outliers by their weights already, so the share is no square. Where outliers are
+        many, they are errors of the model: the variance is at most that of the cost.
+        """
+        sizes, total, count = [], 0.0, 0
+        for w, use in zip(found, usable, strict=True):
+            if use:
+                size = np.sqrt(np.mean(w.errors**2, axis=1))
+                total += float((np.minimum(size, self.outlier) ** 2).sum()) * w.errors.shape[1]
+                count += w.errors.size
+                sizes.append(size)
+        inside = float(np.mean(np.concatenate(sizes) <= self.outlier)) if sizes else 1.0
+        return min(cost, total / max(inside, 1e-12)) / max(count - fitted, 1)
+
     def rest(self, cost: float, found: list[WindowErrors], usable: list[bool]) -> float:
         """The cost of the data and the prior, whose share is chosen anew."""
-        values = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
-        self.variance = cost / max(values, 1)
+        self.variance = self.noise_variance(cost, found, usable)
         self.prior_weight = max(1.0, self.variance)
         return cost + self.pull(self.theta)
 

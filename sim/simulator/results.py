@@ -57,8 +57,8 @@ class Interrupted(KeyboardInterrupt):
 
     Attributes:
         result: return value of the call so far: the Trajectory, FeedbackRollout or RolloutBatch of a rollout with the
-            solved steps, the Plan of `ilqr` with the trajectory of its last iteration, the ClosedLoop of
-            `dojo.closed_loop`; None if nothing was done yet. Calls that compute derivatives only raise
+            solved steps, the Plan of `ilqr` and the Identified of `identify` as of their last iterations, the
+            ClosedLoop of `dojo.closed_loop`; None if nothing was done yet. Calls that compute derivatives only raise
             KeyboardInterrupt.
     """
 

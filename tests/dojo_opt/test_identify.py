@@ -56,6 +56,20 @@ def test_outliers_are_resisted():
     assert errors[0] < 3.0 * robust.deviation[0] and errors[0] < 0.5 * errors[1] and robust.outliers > 0.01
 
 
+@pytest.mark.parametrize("prior", [None, {"damper": (0.25, 0.01)}])
+def test_an_outlier_changes_neither_deviations_nor_the_weight_of_a_prior(prior):
+    truth, sd = _arm(), np.array([0.01, 0.05])
+    motions = _motions(truth, np.random.default_rng(2), sd)
+    fits = []
+    for far in (0.0, 50.0):
+        motions[0][0][17, 0] += far
+        fits.append(dojo.identify(_arm(0.1, 1.6), motions, ("damper", "mass"), noise=sd, prior=prior))
+    clean, one = fits
+    assert clean.success and one.success and one.outliers > 0.0
+    np.testing.assert_allclose(one.deviation, clean.deviation, rtol=0.15)
+    assert np.abs((one.values - clean.values) / clean.deviation).max() < 0.5
+
+
 def test_a_model_that_does_not_explain_the_data_is_told():
     """A lighter arm with any damper moves otherwise than the measured one."""
     sd = np.array([1e-5, 1e-4])
@@ -88,6 +102,33 @@ def test_a_fit_whose_steps_all_raise_the_cost_is_not_called_solved(monkeypatch):
     )
     assert [record["kappa"] for record in found.history] == [1e-4]
     assert not found.success and found.status == Status.LINE_SEARCH and "cost" in found.message
+
+
+@pytest.mark.parametrize("fits", [1, 2])
+def test_ctrl_c_leaves_the_best_fit_so_far(monkeypatch, fits):
+    """In the third step of a fit alone; in that of a second one, the first is left."""
+    truth, sd, count, before = _arm(), np.array([0.01, 0.05]), iter(range(100)), ShootingFit.step
+    motions = _motions(truth, np.random.default_rng(4), sd)
+    whole = dojo.identify(_arm(0.1, 1.6), motions, ("damper", "mass"), noise=sd)
+    late = len(whole.history) + 4 if fits == 2 else 2
+
+    def step(self, *args):
+        if next(count) == late:
+            raise KeyboardInterrupt
+        return before(self, *args)
+
+    monkeypatch.setattr(ShootingFit, "step", step)
+    with pytest.raises(dojo.Interrupted) as stop:
+        dojo.identify(_arm(0.1, 1.6), motions, ("damper", "mass"), noise=sd, fits=fits)
+    found = stop.value.result
+    if fits == 2:
+        assert found.success and np.array_equal(found.values, whole.values)
+        return
+    assert found.status == Status.INTERRUPTED and not found.success and "Ctrl-C" in found.message
+    assert 0 < len(found.history) <= late and found.cost == pytest.approx(found.history[-1]["cost"], rel=0.1)
+    assert np.isfinite(found.deviation).all() and found.summary() and len(found.predictions()) == len(found.windows)
+    off, first = (np.abs((values - whole.values) / whole.deviation).max() for values in (found.values, whole.start))
+    assert off < 0.5 * first
 
 
 def test_a_fit_without_any_prediction_is_not_called_solved():
