@@ -17,10 +17,7 @@ from solvers.status import Status
 
 __all__ = ["learn"]
 
-_UNTRAINED = (
-    "All epochs are done, but the policy before the first is the best. Actions at their limits have no gradient: try a "
-    "smaller range (low, high), another reward, a smaller rate, or another seed."
-)
+_UNTRAINED = "All epochs are done, but the policy before the first is the best. "
 
 
 def learn(
@@ -84,13 +81,14 @@ def _run_epochs(search: Any, resume: Learned | None) -> Learned:
             status = progress.add(**record)
     except KeyboardInterrupt:  # in the middle of an epoch: resume from its start
         status = Status.INTERRUPTED
-    success = search.epoch == o.epochs
+    success = search.epoch >= o.epochs  # a run that is resumed may have done more
     if not np.isfinite(search.best):
         search.assess()
     status = Status.SOLVED if success else status
     if not np.isfinite(search.best):  # a reward that is no number is none to learn from
         success, status = False, Status.NOT_FINITE
-    message = _UNTRAINED if success and search.chosen_at == 0 else progress.message(status)
+    untrained = success and search.chosen_at == 0
+    message = _UNTRAINED + search.advice if untrained else progress.message(status)
     return Learned(
         search.chosen, success, status, message, name, search.seed, search.best, search.steps,
         search.unsolved, search.infinite, progress.seconds, progress.records, state,

@@ -115,6 +115,10 @@ class _Imitation(Training):
     """Policy and random numbers of a run."""
 
     algorithm = "imitate"
+    advice = (
+        "It does not follow the plans, or their motions have a smaller return: try more epochs or copies, a smaller "
+        "spread, or more plans, made for the reward of the task."
+    )
     plans: Sequence[Any] = ()
 
     def __init__(self, task: Task, options: ImitationOptions, seed: int) -> None:

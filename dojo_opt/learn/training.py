@@ -25,6 +25,10 @@ class Training:
     """
 
     algorithm = ""
+    advice = (  # where no policy is better than the one before the first epoch
+        "Actions at their limits have no gradient: try a smaller range (low, high), another reward, a smaller rate, or "
+        "another seed."
+    )
     executor: Executor | None = None
     policy: LearnedPolicy  # moves in place
     chosen: LearnedPolicy  # the best so far

@@ -152,3 +152,20 @@ def test_a_run_is_resumed_from_its_own_state_only():
     end = (POLICY, False, Status.STOPPED, "", "ars", 0, 1.0, 1, 0, 0, 1.0)
     with pytest.raises(ValueError, match=r"ars\(resume=\.\.\.\): its 'epoch' is missing"):
         dojo.learn.ars(TASK, resume=Learned(*end, state={"weights": np.zeros(3)}))
+
+
+def test_a_run_that_is_resumed_for_fewer_epochs_has_done_them():
+    options = {"directions": 2, "best": 1, "episodes": 1}
+    longer = dojo.learn.ars(TASK, epochs=3, **options)
+    again = dojo.learn.ars(TASK, epochs=2, **options, resume=longer)
+    assert again.success and again.status == Status.SOLVED and again.message == longer.message
+    assert len(again.history) == 3 and np.array_equal(again.policy.weights, longer.policy.weights)
+
+
+def test_advice_is_that_of_the_algorithm():
+    """An imitation of pushes has a smaller return than no action, which the policy begins with."""
+    still = replace(TASK, reward=lambda x, a, after: -(a[0] ** 2))
+    pushes = np.zeros((6, 2)), np.full((5, 1), 0.9), np.zeros((5, 1, 2))
+    options = {"epochs": 3, "hidden": (), "rate": 0.3, "evaluations": 1, "episodes": 1}
+    learned = dojo.learn.imitate(still, [pushes], **options)
+    assert learned.success and "does not follow the plans" in learned.message and "limits" not in learned.message
