@@ -19,6 +19,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is imported, so not here
 os.environ.setdefault("DOJO_OPT_JOBS", "1")  # workers of pytest-xdist share the cores already
 os.environ["PYTHONSAFEPATH"] = "1"  # nor do processes that tests start import the folder they run in: it has no kernels
+_AT_IMPORT: list[str] = []
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -35,6 +36,8 @@ def pytest_collection_finish() -> None:
     """Collect garbage seldom, and never among modules and tests: that took a tenth of the processor time."""
     gc.freeze()
     gc.set_threshold(50_000, 20, 100)
+    if "solvers.compiler" in sys.modules:
+        _AT_IMPORT.extend(sys.modules["solvers.compiler"].compiled_signatures())
 
 
 def pytest_sessionfinish() -> None:
@@ -54,6 +57,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             case = seen[function] = seen.get(function, -1) + 1
             if case % sweep.args[0]:
                 item.add_marker(pytest.mark.slow)
+
+
+@pytest.fixture
+def kernels_at_import() -> list[str]:
+    """Kernels that were compiled or loaded while modules of tests were imported."""
+    return _AT_IMPORT
 
 
 @pytest.fixture

@@ -355,6 +355,11 @@ def test_processes_may_write_at_once(filled: FilledCache) -> None:
 # -- kernels -----------------------------------------------------------------------------------------------------------
 
 
+def test_modules_of_tests_take_no_steps_when_they_are_imported(kernels_at_import: list[str]) -> None:
+    """All workers would compile the same at the same time."""
+    assert len(kernels_at_import) < 20, kernels_at_import
+
+
 @pytest.mark.slow
 def test_rare_features_are_compiled_only_by_their_scenes() -> None:
     program = """

@@ -1,5 +1,7 @@
 """A user's count that sizes arrays is refused by name where the memory does not hold them, before any work."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,12 @@ BATCHED, ORDER6 = dojo.Simulator(dojo.models.block()), SIM.replace(order=6)
 X, ZERO = SIM.neutral(), np.zeros(1)
 PLANT = dojo.Plant(SIM)
 PROBLEM = dojo.Problem(SIM, X, 10, cost=dojo.cost.Effort(1.0))
-MOTION = SIM.rollout(X, steps=3)
+
+
+@cache
+def motion():
+    """A trajectory at rest."""
+    return SIM.rollout(X, steps=3)
 
 
 def still(time, x):
@@ -66,7 +73,7 @@ COUNTS = {
     "pendulums": (lambda: dojo.models.npendulum(N), "npendulum(n)"),
     "sliders": (lambda: dojo.models.nslider(N), "nslider(n)"),
     "links": (lambda: dojo.models.orbital(N), "orbital(n)"),
-    "fits": (lambda: dojo.identify(SIM, [MOTION], ["mass"], fits=N), "identify(fits=...)"),
+    "fits": (lambda: dojo.identify(SIM, [motion()], ["mass"], fits=N), "identify(fits=...)"),
     "environments": (lambda: dojo.learn.shac(task(), environments=N), "shac(environments=..., horizon=...)"),
     "directions": (lambda: dojo.learn.ars(task(), directions=N), "ars(directions=..., horizon=...)"),
     "models": (lambda: dojo.learn.Randomization(models=N), "Randomization(models=...)"),

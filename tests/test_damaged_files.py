@@ -1,6 +1,7 @@
 """Saved files that are damaged or hostile: a ValueError that names the call and the file, or a result that works."""
 
 import warnings
+from functools import cache
 
 import numpy as np
 import pytest
@@ -12,19 +13,27 @@ from dojo_opt.learn.training_result import Learned
 from support.damaged_files import Bomb, damaged_npz
 
 SIM = dojo.Simulator(dojo.models.pendulum(), time_step=0.05)
-PLAN = dojo.ilqr(
-    dojo.Problem(SIM, SIM.neutral(), 5, cost=dojo.cost.Effort(1.0), constraints=dojo.constraint.Goal([1, 0]))
-)
 POLICY = LearnedPolicy(Network((2, 3, 1)), np.ones(13), np.zeros(2), np.ones(2))
 RECORD = dict.fromkeys(("epoch", "steps", "unsolved", "infinite"), 1)
 RECORD |= dict.fromkeys(("return", "evaluated", "gradient", "clipped", "seconds"), 0.5)
 END = (True, dojo.Status.SOLVED, "All epochs are done.", "shac", 0, 1.0, 10, 0, 0, 2.0, [RECORD])
 SAVED = {
-    "Plan": (PLAN, dojo.Plan, lambda found: (found.summary(), found.time, found.repeated)),
-    "Trajectory": (SIM.rollout(SIM.neutral(), steps=3), dojo.Trajectory, lambda found: (repr(found), found.contacts)),
-    "LearnedPolicy": (POLICY, LearnedPolicy, lambda found: found.action(np.ones(found.network.sizes[0]))),
-    "Learned": (Learned(POLICY, *END, {"weights": np.ones(13)}), Learned, lambda found: found.summary()),
+    "Plan": (lambda: plan(), dojo.Plan, lambda found: (found.summary(), found.time, found.repeated)),
+    "Trajectory": (
+        lambda: SIM.rollout(SIM.neutral(), steps=3),
+        dojo.Trajectory,
+        lambda found: (repr(found), found.contacts),
+    ),
+    "LearnedPolicy": (lambda: POLICY, LearnedPolicy, lambda found: found.action(np.ones(found.network.sizes[0]))),
+    "Learned": (lambda: Learned(POLICY, *END, {"weights": np.ones(13)}), Learned, lambda found: found.summary()),
 }
+
+
+@cache
+def plan():
+    """Five knots of a pendulum."""
+    cost, goal = dojo.cost.Effort(1.0), dojo.constraint.Goal([1, 0])
+    return dojo.ilqr(dojo.Problem(SIM, SIM.neutral(), 5, cost=cost, constraints=goal))
 
 
 def outcome(kind, path):
@@ -40,7 +49,7 @@ def outcome(kind, path):
 def attack(kind, folder, seeds):
     """Load damaged files; the number of refusals."""
     path, refused = folder / "saved.npz", 0
-    SAVED[kind][0].save(path)
+    SAVED[kind][0]().save(path)
     whole = path.read_bytes()
     assert outcome(kind, path) == ""
     for seed in seeds:
@@ -64,13 +73,13 @@ def test_damaged_files_are_refused_by_name_or_work(kind, seeds, tmp_path):
 
 def test_paths_that_are_none_are_refused(tmp_path):
     calls = {
-        "save_html": lambda path: dojo.viewer.save_html(PLAN, path),
-        "save_picture": lambda path: dojo.viewer.save_picture(PLAN, path),
-        "save_video": lambda path: dojo.viewer.save_video(PLAN, path),
+        "save_html": lambda path: dojo.viewer.save_html(plan(), path),
+        "save_picture": lambda path: dojo.viewer.save_picture(plan(), path),
+        "save_video": lambda path: dojo.viewer.save_video(plan(), path),
         "load_urdf": dojo.load_urdf,
-        **{f"{kind}.save": SAVED[kind][0].save for kind in SAVED},
+        **{f"{kind}.save": SAVED[kind][0]().save for kind in SAVED},
         **{f"{kind}.load": SAVED[kind][1].load for kind in SAVED},
-        "Plan.export": PLAN.export,
+        "Plan.export": plan().export,
     }
     for name, call in calls.items():
         for path in (None, b"a.npz", 3, ""):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,13 @@ import dojo_opt as dojo
 
 SIM = dojo.Simulator(dojo.models.npendulum(2), time_step=0.02)
 X, US = SIM.neutral(), np.zeros((3, SIM.nu))
-MOTION = SIM.rollout(X + 0.1, US)
 Q, V = X[: SIM.nq], X[SIM.nq :]
+
+
+@cache
+def motion() -> dojo.Trajectory:
+    """Two links that fall."""
+    return SIM.rollout(X + 0.1, US)
 
 
 def swingup() -> dojo.Problem:
@@ -22,7 +28,7 @@ def swingup() -> dojo.Problem:
 
 def fitted(**fits: int) -> dojo.Identified:
     """A fit of dampers to a motion of two links."""
-    return dojo.identify(SIM, [MOTION], ["damper:*"], noise=1e-3, seed=2, max_iterations=3, **fits)
+    return dojo.identify(SIM, [motion()], ["damper:*"], noise=1e-3, seed=2, max_iterations=3, **fits)
 
 
 OLD: dict[str, tuple[Callable[[], Any], Callable[[], Any], str]] = {

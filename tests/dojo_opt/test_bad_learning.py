@@ -1,6 +1,7 @@
 """Learning and identification refuse wrong arguments by name, before any work."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,8 +15,13 @@ from support.refusals import check_refused
 
 NAN = np.nan
 SIM = dojo.Simulator(dojo.models.pendulum(), time_step=0.05)
-MOTION = SIM.rollout(SIM.neutral(), steps=3)
 ONE = np.ones(1)
+
+
+@cache
+def motion():
+    """A trajectory at rest."""
+    return SIM.rollout(SIM.neutral(), steps=3)
 
 
 def observation(x, out):
@@ -67,12 +73,12 @@ CALLS = {
     **{f"{name} {key} {bad}": (lambda name=name, key=key, bad=bad: getattr(dojo.learn, name)(TASK, **{key: bad}),
                                f"{name}({key}=...)")
        for name, cases in LEARNING.items() for key, bad in cases},
-    **{f"identify {key} {bad}": (lambda key=key, bad=bad: dojo.identify(SIM, [MOTION], ["mass"], **{key: bad}), key)
+    **{f"identify {key} {bad}": (lambda key=key, bad=bad: dojo.identify(SIM, [motion()], ["mass"], **{key: bad}), key)
        for key, bad in (("bounds", 3), ("prior", 3), ("noise", [1, 2, 3, 4]), ("noise", None), ("kappas", 3.5 + 1j),
                         ("bounds", {"mass": 1}), ("bodies", 3), ("fits", 0), ("window", 0))},
     "no motions": (lambda: dojo.identify(SIM, None, ["mass"]), "identify(trajectories)", "None"),
-    "one motion": (lambda: dojo.identify(SIM, MOTION, ["mass"]), "identify(trajectories)", "list"),
-    "no names": (lambda: dojo.identify(SIM, [MOTION], None), "identify(parameters)", "None"),
+    "one motion": (lambda: dojo.identify(SIM, motion(), ["mass"]), "identify(trajectories)", "list"),
+    "no names": (lambda: dojo.identify(SIM, [motion()], None), "identify(parameters)", "None"),
     "space of nothing": (lambda: dojo.ParameterSpace(None, ["mass"]), "ParameterSpace(sim)"),
     "space of a number": (lambda: dojo.ParameterSpace(SIM, 3), "ParameterSpace(names)", "3"),
     "plans of nothing": (lambda: dojo.learn.imitate(TASK, None), "imitate(plans)", "None"),

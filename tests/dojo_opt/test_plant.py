@@ -1,6 +1,7 @@
 """Plant and perturbation: pushes, payload, slope, friction, delay, noise, limits; closed loops."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -17,9 +18,12 @@ HOPPER = dojo.Simulator(dojo.models.raiberthopper(), time_step=5e-3, kappa=1e-8)
 BLOCK = dojo.Simulator(dojo.models.block(friction=0.5), time_step=5e-3, kappa=1e-8)
 
 
-STILL = dojo.closed_loop(
-    lambda t, x: np.zeros(3), Plant(HOPPER), 0.005, reference=lambda t: np.tile(HOPPER.neutral(), (len(t), 1))
-)
+@cache
+def still():
+    """A closed loop of one step without forces."""
+    return dojo.closed_loop(
+        lambda t, x: np.zeros(3), Plant(HOPPER), 0.005, reference=lambda t: np.tile(HOPPER.neutral(), (len(t), 1))
+    )
 
 
 def gaps(sim, x):
@@ -223,7 +227,7 @@ def test_error_is_measured_from_the_reference():
         (lambda: dojo.closed_loop(lambda t, x: np.zeros(3), Plant(HOPPER), 0.002), r"a step of the plant, 0\.005 s"),
         (lambda: dojo.closed_loop(lambda t, x: 0, Plant(HOPPER), 0.1, reference=np.zeros(3)), "function of the times"),
         (lambda: dojo.closed_loop(lambda t, x: 0, Plant(HOPPER), 0.1, reference=lambda t: t), r"shape \(2, 15\)"),
-        (lambda: STILL.rms("v"), "expected coordinates, got velocities among 'v'"),
+        (lambda: still().rms("v"), "expected coordinates, got velocities among 'v'"),
         (lambda: dojo.monte_carlo(lambda t, x: 0, Plant(HOPPER), Perturbation, 0.1, components=[9]), "got velocities"),
         (lambda: Plant(HOPPER, payload_inertia=(1.0, 2.0)), r"a number, or three, got shape \(2,\)"),
         (lambda: dojo.Disturbances(1, velocity=0.1), "nv >= 2, got nv = 1"),
