@@ -88,22 +88,21 @@ def distances(points: Floats, corners: Floats) -> Floats:
 def _to_triangles(points: Floats, triangles: Any) -> Floats:
     """(n,) distance of each point from the nearest of the triangles (k, 3, 3) [m].
 
-    The nearest point is the foot in the plane where that lies inside, or else on one of the edges.
+    The nearest point is the foot in the plane where that lies inside, or else on one of the edges. One coordinate at a
+    time, in arrays (n, k): NumPy is slow along axes of three.
     """
-    a, b, c = (triangles[None, :, k] for k in range(3))
-    p = points[:, None]
+    a, b, c = (triangles[:, k] for k in range(3))
     normal = np.cross(b - a, c - a)
     area = np.linalg.norm(normal, axis=-1)
-    unit = normal / np.where(area > 0.0, area, 1.0)[..., None]
-    height = ((p - a) * unit).sum(axis=-1)
-    foot = p - height[..., None] * unit
-    inside = np.ones(height.shape, dtype=bool)
-    nearest = np.full(height.shape, np.inf)
+    unit = normal / np.where(area > 0.0, area, 1.0)[:, None]
+    height = points @ unit.T - (a * unit).sum(axis=-1)
+    inside = np.tile(area > 0.0, (len(points), 1))
+    nearest = np.full(height.shape, np.inf)  # squared
     for start, end in ((a, b), (b, c), (c, a)):
-        edge = end - start
-        inside &= (np.cross(edge, foot - start) * unit).sum(axis=-1) >= 0.0
-        share = ((p - start) * edge).sum(axis=-1) / np.maximum((edge * edge).sum(axis=-1), 1e-300)
-        on = start + np.clip(share, 0.0, 1.0)[..., None] * edge
-        nearest = np.minimum(nearest, np.linalg.norm(p - on, axis=-1))
-    nearest = np.where(inside & (area > 0.0), np.abs(height), nearest)
-    return np.asarray(nearest.min(axis=1))
+        edge, inwards = end - start, np.cross(unit, end - start)
+        inside &= points @ inwards.T >= (start * inwards).sum(axis=-1)
+        length = np.maximum((edge * edge).sum(axis=-1), 1e-300)
+        share = np.clip((points @ edge.T - (start * edge).sum(axis=-1)) / length, 0.0, 1.0)
+        offsets = (start[:, k] + share * edge[:, k] - points[:, k : k + 1] for k in range(3))
+        nearest = np.minimum(nearest, sum(offset * offset for offset in offsets))
+    return np.asarray(np.where(inside, np.abs(height), np.sqrt(nearest)).min(axis=1))
