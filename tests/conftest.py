@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
+    from collections.abc import Generator
+
     import numpy as np
 
 sys.path.append(str(Path(__file__).parent.parent))  # benchmarks; at the end, so that an installed dojo_opt is tested
@@ -20,6 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is importe
 os.environ.setdefault("DOJO_OPT_JOBS", "1")  # workers of pytest-xdist share the cores already
 os.environ["PYTHONSAFEPATH"] = "1"  # nor do processes that tests start import the folder they run in: it has no kernels
 _AT_IMPORT: list[str] = []
+_APART = ("test_shipped.py", "test_cache.py")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -46,8 +49,8 @@ def pytest_sessionfinish() -> None:
     gc.freeze()
 
 
-@pytest.hookimpl(tryfirst=True)  # before `-m` chooses
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+@pytest.hookimpl(wrapper=True, tryfirst=True)  # before `-m` chooses, and after
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> Generator[None, None, None]:
     """Of the cases of a function marked `sweep(n)`, `-m "not slow"` takes every n-th."""
     seen: dict[str, int] = {}
     for item in items:
@@ -57,6 +60,23 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             case = seen[function] = seen.get(function, -1) + 1
             if case % sweep.args[0]:
                 item.add_marker(pytest.mark.slow)
+    yield
+    items[:] = _divided(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
+
+
+def _divided(items: list[pytest.Item], workers: int) -> list[pytest.Item]:
+    """The items in parts, of which each worker gets one. All but the first begin with tests that compile in caches of
+    their own: workers that all begin with steps compile the same ones at the same time.
+    """
+    rest = [item for item in items if item.path.name not in _APART]
+    out: list[pytest.Item] = []
+    for k in range(workers):
+        names = _APART[k - 1 :: workers - 1] if k else ()
+        first = [item for name in names for item in items if item.path.name == name]
+        count = max((len(items) - len(out)) // (workers - k) - len(first), 0)
+        out += first + (rest[:count] if k < workers - 1 else rest)
+        del rest[:count]
+    return out if workers > 1 else items
 
 
 @pytest.fixture
