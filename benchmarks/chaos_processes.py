@@ -27,7 +27,8 @@ LONG = {
     "rollout": "sim.rollout(x, np.zeros((400_000, sim.nu)))",
     "batch": "sim.rollout_batch(np.tile(x, (64, 1)), np.zeros((64, 8_000, sim.nu)))",
     "derivatives": "sim.linearize_trajectory(np.tile(x, (40_000, 1)), np.zeros((40_000, sim.nu)))",
-    "gradient": "sim.vjp((np.tile(x, (20_001, 1)), np.zeros((20_000, sim.nu))), np.zeros((20_001, sim.ndx)))",
+    "gradient": "sim.vjp((np.tile(x, (20_001, 1)), np.zeros((20_000, sim.nu))), "
+    "np.zeros((20_001, sim.ndx)), kappa=1e-4)",
 }
 # one process per call: it says when a call begins, gets a signal, and says when it has heard it
 VICTIM = """

@@ -52,6 +52,8 @@ class Status(Code):
     ACCURACY_NOT_REACHED = 17
     # of a fit
     NOT_EXPLAINED = 18
+    # of the gradient of a motion
+    OTHER_SOLUTION = 19
 
     ANGULAR_STEP = _Old("TURN_TOO_LARGE")
     LOOP_STEP = _Old("LOOP_SINGULAR")
@@ -85,4 +87,6 @@ MESSAGES: dict[Status, str] = {
     Status.NOT_EXPLAINED: "The predictions miss too many measurements by far more than the noise: do not trust the "
     "values; fit more parameters, give shorter windows, or end kappas=... with that of the motions.",
     Status.INTERRUPTED: "Ctrl-C interrupted the computation.",
+    Status.OTHER_SOLUTION: "The step ends elsewhere than in the motion: it has several solutions, or the states "
+    "are not those of this simulator.",
 }

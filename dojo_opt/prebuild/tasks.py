@@ -99,7 +99,7 @@ def parameters(sim: Simulator) -> None:
     kinds = tuple(dict.fromkeys(name.split(":")[0].split("[")[0] for name in sim.parameters().names))
     sim.linearize(x, us[0], wrt=kinds)
     sim.linearize_rollout(x, us, wrt=kinds)
-    sim.vjp((np.stack([x] * 3), us), np.zeros((3, sim.ndx)), wrt=("state", "input", *kinds))
+    sim.vjp(sim.rollout(x, us), np.zeros((3, sim.ndx)), wrt=("state", "input", *kinds))
 
 
 def _every(sim: Simulator) -> None:
@@ -163,7 +163,7 @@ def derivatives_of_order(sim: Simulator) -> None:
     """Of steps and sweeps at the kappa of the simulator."""
     x, us = sim.neutral(), np.zeros((2, sim.nu))
     sim.linearize(x, us[0])
-    sim.vjp((np.stack([x] * 3), us), np.zeros((3, sim.ndx)))
+    sim.vjp(sim.rollout(x, us), np.zeros((3, sim.ndx)))
 
 
 def _flight(calls: Callable[[Any], None], order: int) -> None:

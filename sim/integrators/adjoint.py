@@ -4,7 +4,8 @@
 
 A step's unknown v25 feels a parameter by -H^-1 dR/dp, so y = H^-T w with w the gradient by v25, and a parameter costs
 a column of dR and a scalar product. Each step is solved anew from its state (its solution is known: one iteration), so
-the sweep keeps nothing but one step: its memory is that of the trajectory and of the gradient.
+the sweep keeps nothing but one step: its memory is that of the trajectory and of the gradient. A step with several
+solutions may end in another one than that of the trajectory, whose derivatives are not those of the loss.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from solvers.rotation import left_jacobian
 from solvers.status import Status
 from solvers.types import Cube, IntegerMatrix, Matrix, Vector
 
-_SOLVED = int(Status.SOLVED)
+_SOLVED, _OTHER = int(Status.SOLVED), int(Status.OTHER_SOLUTION)
 _TIME_STEP = int(Effect.TIME_STEP)
 
 
@@ -61,10 +62,13 @@ def sweep(
     terms: IntegerMatrix,
     weights: Vector,
     left: int,
+    near: float,
 ) -> int:
     """Gradients of the loss by the first `left` steps; returns how many are still left.
 
     Without the report of an unsolved step, which is the last of those left, that is none, or the deadline is over.
+
+    near: distance from the next state, over its largest entry or 1, beyond which a step is another one.
     """
     model = model_view(model_at)
     data = data_view(data_at)
@@ -77,6 +81,8 @@ def sweep(
         wrenches = line.wrenches[t : t + 1]
         one = Linearized(line.xs[t : t + 1], line.us[t : t + 1], wrenches, line.A, line.B, line.x_next, line.report)
         linearize(model_at, data_at, settings, (0, 0, 1), 1, one)
+        if line.report[0, StepReport.STATUS] == _SOLVED and not _is_near(line.x_next[0], line.xs[t + 1], near):
+            line.report[0, StepReport.STATUS] = _OTHER
         if line.report[0, StepReport.STATUS] != _SOLVED:
             return t + 1
         if line.parameters.shape[0] > 0 or line.heights.shape[1] > 0:
@@ -98,6 +104,18 @@ def sweep(
         if seconds() > settings[StepSetting.DEADLINE]:
             return t
     return 0
+
+
+@kernel
+def _is_near(x: Vector, goal: Vector, near: float) -> bool:
+    """Whether a state is no further from another one than `near`, over its largest entry or 1."""
+    size = 1.0
+    for k in range(goal.shape[0]):
+        size = max(size, abs(goal[k]))
+    for k in range(goal.shape[0]):
+        if abs(x[k] - goal[k]) > near * size:
+            return False
+    return True
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,7 @@ from solvers.types import Floats, Vector
 
 _TWISTS = 12  # rows of scratch for twists at three configurations
 _PIECE = 64  # steps whose (A, B) are kept at once
+_NEAR, _LOOSE = 1e-4, 1e2  # how near to the state of a motion its step has to end again: so far, or times the tolerance
 
 
 def parameter_columns(
@@ -46,7 +47,7 @@ def parameter_columns(
     return out
 
 
-def adjoint_products(engine: Engine, line: Sweep, kappa: float | None) -> int:
+def adjoint_products(engine: Engine, line: Sweep, kappa: float | None, near: float) -> int:
     """The sweep by state and input where steps are not one kernel, from (A, B) of a piece of the trajectory at a time:
 
     l_T = dL/dx_T,    l_t = A_t^T l_t+1 + dL/dx_t,    dL/du_t = B_t^T l_t+1;  the step that was not solved, or -1.
@@ -54,12 +55,15 @@ def adjoint_products(engine: Engine, line: Sweep, kappa: float | None) -> int:
     costate = line.loss[-1]
     for last in range(len(line.us), 0, -_PIECE):
         first = max(last - _PIECE, 0)
-        A, B, _, reports = engine.linearize(
+        A, B, x_next, reports = engine.linearize(
             line.xs[first : last + 1], line.us[first:last], 1, kappa, None, line.wrenches[first:last]
         )
         for t in range(last - 1, first - 1, -1):
             line.report[0] = reports[t - first]
-            if reports[t - first, StepReport.STATUS] != Status.SOLVED:
+            solved = reports[t - first, StepReport.STATUS] == Status.SOLVED
+            if solved and not _is_near(x_next[t - first], line.xs[t + 1], near):
+                line.report[0, StepReport.STATUS] = Status.OTHER_SOLUTION
+            if line.report[0, StepReport.STATUS] != Status.SOLVED:
                 return t
             line.inputs[t] = B[t - first].T @ costate
             costate = A[t - first].T @ costate + line.loss[t]
@@ -233,18 +237,20 @@ def adjoint_sweep(
         places=np.zeros((1, 3 * (sizes.ncontact - sizes.npair))),
         heights=np.zeros((1, sizes.nheight if len(plan.heights) else 0)),
     )
+    known = kappa is None or kappa == engine.settings.kappa  # otherwise the steps end elsewhere
+    near = max(_NEAR, _LOOSE * engine.settings.tolerance) if known else np.inf
     if not engine.in_one_kernel:
-        return adjoint_products(engine, line, kappa), line
+        return adjoint_products(engine, line, kappa, near), line
     needs = (link_parameters, link_heights) if len(plan.heights) else (link_parameters,)
     model, data = engine.tables(*needs[: 2 if plan.size else 0])
     settings, left = engine.settings.array(kappa), len(us)
     line.costate[0] = loss[-1]
     while left:
         for _ in pieces(settings, left):
-            left = int(sweep(model, data, settings, line, plan.terms, plan.weights, left))
+            left = int(sweep(model, data, settings, line, plan.terms, plan.weights, left, near))
             if left == 0 or line.report[0, StepReport.STATUS] != Status.SOLVED:
                 break
-        if left == 0 or not _sweep_divided(engine, request, line, kappa, left - 1):
+        if left == 0 or not _sweep_again(engine, request, line, kappa, left - 1, near):
             break
         left -= 1
     if len(plan.heights):
@@ -252,15 +258,44 @@ def adjoint_sweep(
     return left - 1, line
 
 
-def _sweep_divided(engine: Engine, request: Request, line: Sweep, kappa: float | None, t: int) -> bool:
-    """The sweep over step t, which could not be solved as a whole; False where division does not solve it."""
+def _sweep_again(engine: Engine, request: Request, line: Sweep, kappa: float | None, t: int, near: float) -> bool:
+    """The sweep over step t, which was not solved, or had another solution; False where it stays so."""
     step = line.xs[t], line.us[t], line.wrenches[t : t + 1]
-    slopes = divided_slopes(engine, request, step, line.report[0], kappa)
-    if slopes.report[StepReport.STATUS] != Status.SOLVED:
-        return False
-    line.report[0] = 0.0
-    costate = line.costate[0].copy()
-    line.inputs[t] = slopes.B.T @ costate
-    line.parameters[:] += slopes.J.T @ costate
-    line.costate[0] = slopes.A.T @ costate + line.loss[t]
-    return True
+    for slopes in _all_slopes(engine, request, step, line.report[0], kappa):
+        if slopes.report[StepReport.STATUS] != Status.SOLVED:
+            line.report[0] = slopes.report
+            continue
+        if not _is_near(slopes.x_next, line.xs[t + 1], near):
+            line.report[0, StepReport.STATUS] = Status.OTHER_SOLUTION
+            continue
+        line.report[0] = 0.0
+        costate = line.costate[0].copy()
+        line.inputs[t] = slopes.B.T @ costate
+        line.parameters[:] += slopes.J.T @ costate
+        line.costate[0] = slopes.A.T @ costate + line.loss[t]
+        return True
+    return False
+
+
+def _all_slopes(
+    engine: Engine, request: Request, step: tuple[Vector, Vector, Floats], report: Vector, kappa: float | None
+) -> Iterator[StepSlopes]:
+    """Derivatives of all solutions of a step that are found, after one that ended as in `report` (9,).
+
+    Where that was not solved, the step is divided; where it was another solution than that of the motion, the step
+    begins as it does alone. If these are others, too, it is divided in all ways.
+    """
+    if report[StepReport.STATUS] == Status.OTHER_SOLUTION:
+        yield step_slopes(engine, request, step, kappa)
+    else:
+        found = divided_slopes(engine, request, step, report.copy(), kappa)
+        yield found
+        if found.report[StepReport.STATUS] != Status.SOLVED:
+            return
+    for divided in engine.divisions(*step, kappa):
+        yield _products(engine, request, step, divided, kappa)
+
+
+def _is_near(x: Vector, goal: Vector, near: float) -> bool:
+    """As in adjoint.py."""
+    return bool(np.abs(x - goal).max() <= near * max(1.0, np.abs(goal).max()))

@@ -553,6 +553,7 @@ class Simulator(StateSpace):
         """Gradient of a scalar L(x_0, ..., x_T) of a rollout, by one sweep from its end.
 
         The steps are solved again at `kappa`, and one step is stored at a time: the memory is that of the trajectory.
+        Of several solutions, and divisions, that of the trajectory counts, if `kappa` is that of the simulator.
 
         Args:
             trajectory: result of `rollout`, or (states (T + 1, nx), inputs (T, nu)).

@@ -197,6 +197,22 @@ def test_sweep_and_products_agree(divided: tuple[dojo.Simulator, dojo.Trajectory
     assert np.allclose(knots.A, linear.A, rtol=1e-6, atol=1e-6 * np.abs(linear.A).max())
 
 
+def test_a_gradient_is_that_of_the_division_of_the_motion(divided: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
+    """A step that was divided, as rollouts do where their warm start fails, and can be solved as a whole."""
+    sim, motion = divided
+    t = int(np.flatnonzero(motion.parts == 1)[0])
+    x, u, eps = motion.x[t], motion.u[t], 1e-7
+    path, loss = np.stack([x, forced(sim, x, u, 4)]), np.random.default_rng(2).normal(size=(2, sim.ndx))
+    assert np.abs(path[1] - motion.x[t + 1]).max() > 1e-3
+    found = sim.vjp((path, u[None]), loss, throw=True)
+    for k, dx in enumerate(eps * np.eye(sim.ndx)):
+        ahead, behind = (forced(sim, sim.integrate(x, s * dx), u, 4) for s in (1.0, -1.0))
+        expected = loss[0, k] + loss[1] @ sim.difference(ahead, behind) / (2.0 * eps)
+        assert found["state"][k] == pytest.approx(expected, rel=1e-5, abs=1e-5 * np.abs(loss).max())
+    path[1, -1] += 1e-2
+    assert sim.vjp((path, u[None]), loss).status == dojo.Status.OTHER_SOLUTION
+
+
 def test_batches_and_closed_loops_divide(divided: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
     sim, motion = divided
     x0, us = motion.x[0], motion.u

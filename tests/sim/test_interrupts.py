@@ -32,7 +32,8 @@ def standing(sim: Any, steps: int) -> Any:
 
 
 def gradient(sim: Any, steps: int, wrt: tuple[str, ...]) -> Any:
-    return sim.vjp(standing(sim, steps), np.zeros((steps + 1, sim.ndx)), wrt=wrt)
+    elsewhere = 2.0 * sim.kappa  # where steps need not end in the states of the path
+    return sim.vjp(standing(sim, steps), np.zeros((steps + 1, sim.ndx)), wrt=wrt, kappa=elsewhere)
 
 
 def rows(sim: Any, count: int) -> Any:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -126,7 +127,7 @@ class DividingEngine(Engine):
         the state nearest to it. None where no division ends; with derivatives also where the end loses momentum, which
         has none. More parts might keep it, but they would be another step.
         """
-        divisions = self._divisions(x, derivatives)
+        divisions = self._numbers_of_parts(x, derivatives)
         for parts in divisions:
             found = self.in_parts(parts, x, (u, wrench), kappa, derivatives=derivatives)
             if found is not None:
@@ -143,7 +144,14 @@ class DividingEngine(Engine):
                     return found
         return None
 
-    def _divisions(self, x: Vector, derivatives: bool) -> list[int]:
+    def divisions(self, x: Vector, u: Vector, wrench: Cube, kappa: float | None) -> Iterator[DividedStep]:
+        """As Engine.divisions."""
+        for parts in self._numbers_of_parts(x, derivatives=True):
+            found = self.in_parts(parts, x, (u, wrench), kappa, derivatives=True)
+            if found is not None and found.share == 1.0:
+                yield found
+
+    def _numbers_of_parts(self, x: Vector, derivatives: bool) -> list[int]:
         """Numbers of parts to try for a step from x (nx,): few with derivatives, many for joints that turn fast."""
         parts = [2]
         turn = 0.0 if derivatives else self.intervals.turn(x)

@@ -8,6 +8,7 @@ with the part of the result that is done.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import isfinite
 from typing import NamedTuple
 
@@ -282,6 +283,10 @@ class Engine(LinkedModel):
     ) -> DividedStep | None:
         """None: this engine refuses steps that it cannot solve. See dividing_engine.py."""
         return None
+
+    def divisions(self, x: Vector, u: Vector, wrench: Cube, kappa: float | None) -> Iterator[DividedStep]:
+        """The step in 2, 4, ... parts, with derivatives, in all ways that keep its momentum: none here."""
+        return iter(())
 
     def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Vector) -> Floats:
         """(n, nx) states at any times of a motion; only engines with an accuracy have them."""
