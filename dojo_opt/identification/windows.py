@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from dojo_opt.planning.manifold import tangent_layout
+from dojo_opt.planning.same_robot import check_same_robot, check_same_velocities
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.derivative_results import Linearization
@@ -95,6 +96,7 @@ def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None,
         raise TypeError(f"{call}: expected a list of motions, got one pair; give a list: [(states, inputs)]")
     for number, given in enumerate(trajectories):
         if isinstance(given, Trajectory):
+            check_same_robot(f"{call}: expected motions", sim, given.simulator, given.x)
             _check_made(f"{call}: motion {number}", sim, given)
         raw = (given.x, given.u) if isinstance(given, Trajectory) else states_and_inputs(call, given)
         us = checks.array(call, raw[1], ("T", sim.nu))
@@ -112,13 +114,7 @@ def _check_made(name: str, sim: Simulator, given: Trajectory) -> None:
         raise ValueError(f"{name}: expected no external wrenches, which the fit would take for other parameters")
     if not np.isclose(given.simulator.time_step, sim.time_step, rtol=1e-9):
         raise ValueError(f"{name}: expected the time step {sim.time_step:g} s, got {given.simulator.time_step:g} s")
-    nodes, wanted = (s.order > 2 or s.accuracy is not None for s in (given.simulator, sim))
-    if nodes != wanted:
-        kinds = ("means over the step before", "those at the nodes")
-        raise ValueError(
-            f"{name}: expected velocities that are {kinds[wanted]}, as the simulator has them, got {kinds[nodes]}; "
-            "measure with a simulator of the same order"
-        )
+    check_same_velocities(name, sim, given.simulator)
 
 
 def difference_slopes(layout: Integers, differences: Floats) -> Floats:

@@ -181,7 +181,8 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
           terminated    the robot has fallen, or a step could not be solved: see `info["message"]`
           truncated     the horizon is over; `info["violation"]` is the largest violation of a constraint
 
-    plant        of a problem, by default its own simulator from its start; its time step divides a knot
+    plant        of a problem, by default its own simulator from its start; its time step divides a knot. Where the
+                 start is free, that is its guess: Plant(problem.sim, plan.x[0]) begins where a plan does
     sampler      generator -> Perturbation, drawn at every reset from the environment's seed, as the noise is
     render_mode  None, "rgb_array", or "human": every step is shown in the browser, at `view.url`, in real time
     """

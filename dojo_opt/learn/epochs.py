@@ -11,6 +11,7 @@ import numpy as np
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.training_result import Learned, LearningProgress
 from dojo_opt.planning.executors import check_executor
+from dojo_opt.planning.same_robot import check_same_names, check_same_velocities
 from sim.mechanism import checks
 from sim.mechanism.renamed import renamed_keywords
 from solvers.status import Status
@@ -43,6 +44,16 @@ def learn(
     return _run_epochs(run, resume)
 
 
+def _check_task(call: str, task: Task, before: Task | None) -> None:
+    """Refuse a run of another robot, or with other control steps; one without its task, as of a file, is not judged."""
+    if before is None or before is task:
+        return
+    check_same_names(call, task.sim.mechanism.dof_names, before.sim.mechanism.dof_names)
+    check_same_velocities(call, task.sim, before.sim)
+    if not np.isclose(task.knot_time, before.knot_time, rtol=1e-9):
+        raise ValueError(f"{call}: expected control steps of {task.knot_time:g} s, got {before.knot_time:g} s")
+
+
 def _check_state(call: str, own: dict[str, Any], given: dict[str, Any]) -> None:
     """Refuse a state to resume from that is not like one's own, as of a damaged file or of other options."""
     for name, value in own.items():
@@ -64,6 +75,7 @@ def _run_epochs(search: Any, resume: Learned | None) -> Learned:
             raise ValueError(
                 f"{name}(resume=...): expected a run of {name} with seed {search.seed} and this policy, got {resume!r}"
             )
+        _check_task(f"{name}(resume=...)", search.task, resume.policy.task)
         _check_state(f"{name}(resume=...)", search.state(), resume.state)
         search.resume(resume)
     progress = LearningProgress(o, resume.history if resume else [], resume.seconds if resume else 0.0)

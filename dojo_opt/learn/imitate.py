@@ -27,6 +27,7 @@ from dojo_opt.learn.task import Task
 from dojo_opt.learn.training import Training
 from dojo_opt.learn.training_result import Learned
 from dojo_opt.planning.plan import Plan
+from dojo_opt.planning.same_robot import check_same_knots, check_same_robot, check_same_velocities
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from solvers.types import Floats
@@ -97,11 +98,10 @@ class _Knots:
             raw = (given.x, given.u, given.K) if isinstance(given, Plan) else given
             if not isinstance(raw, tuple | list) or len(raw) != 3:
                 raise TypeError(f"{call}: expected plans, or (states, inputs, gains), got {given!r}")
-            if isinstance(given, Plan) and abs(given.substeps * given.time_step - task.knot_time) > 1e-9:
-                raise ValueError(
-                    f"{call}: expected knots of {task.knot_time:g} s, as the actions of the task, got "
-                    f"{given.substeps * given.time_step:g} s"
-                )
+            if isinstance(given, Plan):
+                check_same_robot(f"{call}: expected plans", sim, given.simulator, given.x, given.u.shape[1])
+                check_same_velocities(call, sim, given.simulator)
+                check_same_knots(call, given, task.knot_time, "the actions of the task")
             us = checks.array(call, raw[1], ("T", sim.nu))
             xs = checks.array(call, raw[0], (len(us) + 1, sim.nx))
             Ks = checks.array(call, raw[2], (len(us), sim.nu, sim.ndx))

@@ -15,12 +15,13 @@ from dojo_opt.learn.network import Network, number_of, perceptron
 from dojo_opt.learn.onnx_file import write_onnx
 from dojo_opt.learn.policy_controller import Command, PolicyController
 from dojo_opt.learn.task import Task
+from dojo_opt.planning.same_robot import check_same_names
 from sim.mechanism import checks
 from sim.mechanism.short_repr import short_repr
 from sim.simulator.npz_file import check_head, check_shapes, read_npz, reading, write_npz
 from solvers.types import Floats, Integers
 
-__all__ = ["LearnedPolicy", "policy_of"]
+__all__ = ["LearnedPolicy", "policy_head", "policy_of"]
 
 _SPAN = 10.0  # standard deviations: scaled observations beyond are cut off, without a derivative
 
@@ -173,7 +174,7 @@ class LearnedPolicy:
         Args:
             path: of the file.
         """
-        shape = {"sizes": self.network.sizes, "activation": self.network.activation}
+        shape = policy_head(self)
         arrays = {"weights": self.weights, "mean": self.mean, "deviation": self.deviation}
         write_npz("LearnedPolicy.save(path)", path, shape, arrays, "network")
 
@@ -196,14 +197,34 @@ class LearnedPolicy:
         with reading(call, path, "policy"):
             shape, arrays = read_npz(call, path, "network")
             alone = policy_of(shape, arrays, None)
+        _check_robot("LearnedPolicy.load(task=...)", shape, task)
         return replace(alone, task=task)
+
+
+def policy_head(policy: LearnedPolicy) -> dict[str, Any]:
+    """The head of the file of a policy.
+
+    Args:
+        policy: the policy.
+
+    Returns:
+        What `policy_of` reads beside the arrays, with the names of the robot's degrees of freedom if its task is known.
+    """
+    head = {"sizes": policy.network.sizes, "activation": policy.network.activation}
+    return head if policy.task is None else head | {"dofs": policy.task.sim.mechanism.dof_names}
+
+
+def _check_robot(call: str, shape: Mapping[str, Any], task: Task | None) -> None:
+    """Refuse a task of another robot than that of a file which names it."""
+    if task is not None and "dofs" in shape:
+        check_same_names(call, shape["dofs"], task.sim.mechanism.dof_names)
 
 
 def policy_of(shape: Mapping[str, Any], arrays: Mapping[str, Any], task: Task | None) -> LearnedPolicy:
     """The policy of a file.
 
     Args:
-        shape: {"sizes": of the layers, "activation": name}.
+        shape: {"sizes": of the layers, "activation": name, "dofs": of the robot, if it is known}.
         arrays: "weights", "mean" and "deviation".
         task: the task of the policy, if it is known.
 
@@ -211,9 +232,10 @@ def policy_of(shape: Mapping[str, Any], arrays: Mapping[str, Any], task: Task | 
         The policy.
 
     Raises:
-        ValueError: an entry is missing, or does not fit the others.
+        ValueError: an entry is missing, or does not fit the others or the robot of the task.
     """
-    check_head(shape, {"sizes": list, "activation": str})
+    check_head(shape, {"sizes": list, "activation": str} | ({"dofs": list} if "dofs" in shape else {}))
+    _check_robot("task", shape, task)
     network = Network(tuple(shape["sizes"]), shape["activation"])
     lengths = {"weights": network.count, "mean": network.sizes[0], "deviation": network.sizes[0]}
     check_shapes(arrays, {name: (length,) for name, length in lengths.items()})

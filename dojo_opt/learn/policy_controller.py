@@ -41,6 +41,11 @@ class PolicyController:
         self._felt: Floats | None = None if task.touch else np.zeros(0)
         self._groups: ContactGroups | None = None
 
+    @property
+    def sim(self) -> Simulator:
+        """The simulator of the task."""
+        return self._task.sim
+
     def __repr__(self) -> str:
         return f"PolicyController({self._task.name})"
 

@@ -30,6 +30,7 @@ from dojo_opt.learn.randomization import Models, Randomization
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.training import Training
 from dojo_opt.learn.training_result import Learned
+from dojo_opt.planning.same_robot import check_same_names
 from sim.mechanism import checks
 from solvers.types import Flags, Floats
 
@@ -154,6 +155,9 @@ class ShacTraining(Training):
         self.critic = value_network(task, o.hidden, o.activation)
         self.policy = LearnedPolicy(network, network.start(rng, 0.1), *self._scale(None), task)
         if o.start is not None:
+            if o.start.task is not None:
+                names = (t.sim.mechanism.dof_names for t in (task, o.start.task))
+                check_same_names("shac(start=...)", *names)
             network = o.start.network
             self.policy = replace(o.start, weights=o.start.weights.copy(), task=task)
         self.value = self.critic.start(rng)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dojo_opt.learn.policy import LearnedPolicy, policy_of
+from dojo_opt.learn.policy import LearnedPolicy, policy_head, policy_of
 from dojo_opt.learn.task import Task
 from sim.mechanism.short_repr import short_table
 from sim.simulator.npz_file import check_head, read_npz, reading, write_npz
@@ -106,7 +106,7 @@ class Learned:
         arrays: dict[str, Any] = {f"state_{k}": v for k, v in self.state.items() if isinstance(v, np.ndarray)}
         meta["state"] = {k: v for k, v in self.state.items() if not isinstance(v, np.ndarray)}
         p = self.policy
-        meta["network"] = {"sizes": p.network.sizes, "activation": p.network.activation}
+        meta["network"] = policy_head(p)
         arrays |= {"weights": p.weights, "mean": p.mean, "deviation": p.deviation}
         write_npz("Learned.save(path)", path, meta, arrays)
 

@@ -26,6 +26,7 @@ from dojo_opt.planning.ilqr import Solver
 from dojo_opt.planning.iterate import Iterate, Iteration
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
+from dojo_opt.planning.same_robot import check_same_knots, check_same_robot, check_same_velocities
 from dojo_opt.planning.term import StateTerm
 from dojo_opt.plant.monte_carlo import MonteCarlo, Sampler, monte_carlo
 from dojo_opt.plant.plant import Plant
@@ -60,14 +61,16 @@ class MPC:
             equalities. Inequalities take about 3, because an iteration from the feasible side ignores them.
         reference: states to track over time, see `dojo_opt.mpc.moving_reference.References` (default None: the
             reference of the problem at every tick).
-        plan: the first plan, at the time of the first call (default None: that of `ilqr` without refinement).
+        plan: the first plan, at the time of the first call, of the problem's robot, horizon and knots (default None:
+            that of `ilqr` without refinement). One with shorter time steps, as of a refined problem, has these knots.
         **settings: fields of `dojo.MPCSettings` by name, whose help has their units and defaults: period, kappa,
             kappa_grad, guess, step_limit, patience, rescue, gain_scale, delay, computation, servo, feedforward,
             time_limit, mean_velocity, friction, shrinkage, learn_ground, adapt, options, first, log.
 
     Raises:
         TypeError: for an unknown setting, or an argument of the wrong kind.
-        ValueError: for a setting out of range, a reference of the wrong shape, or a plan that takes longer than its
+        ValueError: for a setting out of range, a reference of the wrong shape or of another robot, a first plan with
+            another robot, horizon, length of the knots or kind of velocities, or a plan that takes longer than its
             period.
     """
 
@@ -106,9 +109,8 @@ class MPC:
         self._tracking = next(terms, None)  # whose error is logged
         if plan is not None and not isinstance(plan, Plan):
             raise TypeError(f"MPC(plan=...): expected a Plan, got {checks.shown(plan)}")
-        shape = (problem.horizon, self.sim.nu)
-        if plan is not None and (plan.u.shape != shape or plan.x.shape[1] != self.sim.nx):
-            raise ValueError(f"MPC(plan=...): expected inputs of shape {shape}, got {plan.u.shape}, of its robot")
+        if plan is not None:
+            _check_plan(problem, plan)
         self._first = plan
         self._ground = Ground(self.sim, self.settings.kappa if self.settings.learn_ground == "slope" else None)
         self.estimator: ParameterEstimator | None = None  # of the parameters that `adapt` names
@@ -415,6 +417,17 @@ def _near(there: Iterate, guess: Iterate) -> bool:
 def _another(problem: Problem, iterations: int, *, reference: Any, **arguments: Any) -> MPC:
     """A controller whose reference is its own."""
     return MPC(problem, iterations, reference=own_reference(reference), **arguments)
+
+
+def _check_plan(problem: Problem, plan: Plan) -> None:
+    """Refuse a first plan that is not one of the problem: its knots are taken for those of the problem."""
+    call = "MPC(plan=...)"
+    check_same_robot(f"{call}: expected a plan", problem.sim, plan.simulator, plan.x, plan.u.shape[1])
+    shape = (problem.horizon, problem.sim.nu)
+    if plan.u.shape != shape:
+        raise ValueError(f"{call}: expected inputs of shape {shape}, got {plan.u.shape}")
+    check_same_knots(call, plan, problem.knot_time, "the problem")
+    check_same_velocities(call, problem.sim, plan.simulator)
 
 
 def _check_points(problem: Problem, labels: Sequence[str]) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.planning.component_names import chosen_components
 from dojo_opt.planning.problem import Problem
+from dojo_opt.planning.same_robot import check_same_robot
 from dojo_opt.planning.term import PickTerm, StateTerm
 from dojo_opt.plant.ground_plane import GroundPlane
 from sim.mechanism import checks
@@ -281,6 +282,8 @@ class References:
         if callable(value):
             return value
         if hasattr(value, "x") and hasattr(value, "time"):
+            if isinstance(other := getattr(value, "simulator", None), Simulator):
+                check_same_robot(f"{call}: expected a motion", self._sim, other, np.asarray(value.x))
             return SampledReference(value.time, value.x, self._sim)
         rows = checks.array(call, value, (None, self._sim.nx if of_states else self._sim.nu))
         return SampledReference(self._h * np.arange(len(rows)), rows, self._sim if of_states else None)

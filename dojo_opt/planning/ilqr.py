@@ -31,6 +31,7 @@ from dojo_opt.planning.overload import overload
 from dojo_opt.planning.plan import History, Plan
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.refinement import FAILED, refine
+from dojo_opt.planning.same_robot import check_warm_start
 from dojo_opt.planning.subproblem import Subproblem
 from sim.mechanism import checks
 from sim.mechanism.renamed import renamed_keywords
@@ -101,17 +102,16 @@ def ilqr(
 
     Raises:
         TypeError: for an unknown setting, or an argument of the wrong kind.
-        ValueError: for a guess of the wrong shape, or with numbers that are not finite.
+        ValueError: for a guess of the wrong shape or of another robot, or with numbers that are not finite.
         Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the Plan of the last iteration, INTERRUPTED.
     """
     renamed_keywords("ilqr", settings, RENAMED)
     checks.keywords("ilqr(...)", settings, Options.__dataclass_fields__)
     if options is not None and not isinstance(options, Options):
         raise TypeError(f"ilqr(options=...): expected Options, got {options!r}")
-    if warm_start is not None and not isinstance(warm_start, Plan):
-        raise TypeError(f"ilqr(warm_start=...): expected a Plan, got {warm_start!r}")
     if not isinstance(problem, Problem):
         raise TypeError(f"ilqr(problem): expected a Problem, got {problem!r}")
+    check_warm_start(problem.sim, warm_start)
     options = Options(**settings) if options is None else replace(options, **settings)
     check_executor("ilqr", executor)
     checks.whole_number("ilqr(seed=...)", seed, 0)

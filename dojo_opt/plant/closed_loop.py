@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.planning.component_names import chosen_components
+from dojo_opt.planning.same_robot import check_same_names
 from dojo_opt.plant.ground_plane import GroundPlane
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import Tick
@@ -158,7 +159,8 @@ def closed_loop(
 
     Raises:
         TypeError: for an argument of the wrong kind.
-        ValueError: for a number out of range, or an answer of the controller of the wrong shape.
+        ValueError: for a number out of range, a plant of another robot than that of the controller, if it has a
+            simulator `sim`, or an answer of the controller of the wrong shape.
         Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the ClosedLoop until then.
     """
     if not isinstance(plant, Plant):
@@ -168,6 +170,10 @@ def closed_loop(
         raise TypeError(f"closed_loop(controller): expected the controller of a {name}, such as policy.controller")
     if not callable(controller):
         raise TypeError(f"closed_loop(controller): expected an MPC or a function of (time, x), got {controller!r}")
+    model = getattr(controller, "sim", None)
+    if isinstance(model, Simulator):
+        names = (sim.mechanism.dof_names for sim in (model, plant.nominal))
+        check_same_names("closed_loop(plant)", *names)
     h, steps = plant.nominal.time_step, steps_of("closed_loop(duration)", plant, duration)
     every = 1 if control_step is None else round(checks.number("closed_loop(control_step=...)", control_step) / h)
     if every < 1 or (control_step is not None and abs(every * h - control_step) > 1e-9):

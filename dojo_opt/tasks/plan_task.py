@@ -13,7 +13,7 @@ from dojo_opt.planning.ilqr import ilqr
 from dojo_opt.planning.options import Stage
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
-from dojo_opt.tasks.same_robot import check_same_robot
+from dojo_opt.planning.same_robot import check_same_robot
 from sim.mechanism.checks import shown
 from sim.mechanism.short_repr import short_repr
 
@@ -88,8 +88,8 @@ class PlanTask:
         """
         if not isinstance(plan, Plan):
             raise TypeError(f"PlanTask.outcome(plan): expected a Plan, as from run(), got {shown(plan)}")
-        call = "PlanTask.outcome(plan): expected a plan"
-        check_same_robot(call, self.name, self.problem.sim, plan.simulator, plan.x)
+        expected = f"PlanTask.outcome(plan): expected a plan of {self.name!r}"
+        check_same_robot(expected, self.problem.sim, plan.simulator, plan.x)
         done, measures = self.judge(plan)
         return PlannedOutcome(plan.success and done, measures, float(plan.fun), int(plan.nit), float(plan.gap))
 

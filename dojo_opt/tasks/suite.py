@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.cost import ResidualCost, Tracking
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.mpc.servo import ModelServo
+from dojo_opt.planning.same_robot import check_same_robot
 from dojo_opt.plant.closed_loop import ClosedLoop, closed_loop
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import milliseconds
-from dojo_opt.tasks.same_robot import check_same_robot
 from sim.mechanism.checks import shown, whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.overlaps import overlaps
@@ -165,7 +165,8 @@ class SuiteTask:
         """
         if not isinstance(loop, ClosedLoop):
             raise TypeError(f"SuiteTask.outcome(loop): expected a ClosedLoop, as from run(), got {shown(loop)}")
-        check_same_robot("SuiteTask.outcome(loop): expected a run", self.name, self.model, loop.simulator, loop.x)
+        expected = f"SuiteTask.outcome(loop): expected a run of {self.name!r}"
+        check_same_robot(expected, self.model, loop.simulator, loop.x)
         done, measures = self.judge(loop)
         ms = milliseconds(loop.log, cpu=True)
         times = (float(np.median(ms)), float(np.percentile(ms, 99))) if ms.size else (np.nan, np.nan)

@@ -175,3 +175,63 @@ def test_advice_is_that_of_the_algorithm():
     options = {"epochs": 3, "hidden": (), "rate": 0.3, "evaluations": 1, "episodes": 1}
     learned = dojo.learn.imitate(still, [pushes], **options)
     assert learned.success and "does not follow the plans" in learned.message and "limits" not in learned.message
+
+
+SLIDER = dojo.Simulator(dojo.models.slider(), time_step=0.05)  # states and inputs of the same size
+QUICK, OTHERS = {"directions": 2, "best": 1, "episodes": 1}, "got one with"
+
+
+def _problem(sim=SIM):
+    return dojo.Problem(sim, sim.neutral(), 4, cost=[dojo.cost.Tracking(sim.neutral(), 1.0), dojo.cost.Effort(0.1)])
+
+
+def _trained(**changes):
+    return dojo.learn.ars(replace(TASK, **changes), epochs=1, **QUICK)
+
+
+SWAPPED = {
+    "plan to begin with": (lambda: dojo.MPC(_problem(), plan=dojo.ilqr(_problem(SLIDER))), "got one of 'slider'"),
+    "plan with other knots": (
+        lambda: dojo.MPC(_problem(), plan=dojo.ilqr(_problem(SIM.replace(time_step=0.1)))),
+        "expected knots of 0.05 s, as those of the problem, got 0.1 s",
+    ),
+    "plan with other velocities": (
+        lambda: dojo.MPC(_problem(), plan=dojo.ilqr(_problem(SIM.replace(order=4)))),
+        "expected velocities that are means over the step before",
+    ),
+    "plan to imitate": (lambda: dojo.learn.imitate(TASK, [dojo.ilqr(_problem(SLIDER))]), "got one of 'slider'"),
+    "warm start": (lambda: dojo.ilqr(_problem(), warm_start=dojo.ilqr(_problem(SLIDER))), "got one of 'slider'"),
+    "reference": (lambda: dojo.MPC(_problem(), reference=SLIDER.rollout(np.zeros(2), steps=4)), "got one of 'slider'"),
+    "plant": (lambda: dojo.closed_loop(dojo.MPC(_problem()), dojo.Plant(SLIDER), 0.1), OTHERS),
+    "plant of a policy": (lambda: dojo.closed_loop(POLICY.controller, dojo.Plant(SLIDER), 0.1), OTHERS),
+    "policy to begin with": (
+        lambda: dojo.learn.shac(TASK, start=replace(POLICY, task=replace(TASK, sim=SLIDER)), epochs=1),
+        OTHERS,
+    ),
+    "run to resume": (lambda: dojo.learn.ars(TASK, epochs=2, **QUICK, resume=_trained(sim=SLIDER)), OTHERS),
+    "run with other control steps": (
+        lambda: dojo.learn.ars(TASK, epochs=2, **QUICK, resume=_trained(substeps=2)),
+        "expected control steps of 0.05 s, got 0.1 s",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SWAPPED)
+def test_objects_of_another_robot_or_time_are_refused(case):
+    call, message = SWAPPED[case]
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def test_files_of_policies_know_their_robot(tmp_path):
+    other = replace(TASK, sim=SLIDER)
+    POLICY.save(tmp_path / "policy.npz")
+    assert LearnedPolicy.load(tmp_path / "policy.npz", TASK).task is TASK
+    with pytest.raises(ValueError, match="LearnedPolicy.load.task=.*expected a robot with the coordinates"):
+        LearnedPolicy.load(tmp_path / "policy.npz", other)
+    _trained().save(tmp_path / "run.npz")
+    assert Learned.load(tmp_path / "run.npz", TASK).policy.task is TASK
+    with pytest.raises(ValueError, match=OTHERS):
+        Learned.load(tmp_path / "run.npz", other)
+    replace(POLICY, task=None).save(tmp_path / "bare.npz")  # as all files before
+    assert LearnedPolicy.load(tmp_path / "bare.npz", other).task is other

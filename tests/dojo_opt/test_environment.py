@@ -35,6 +35,16 @@ def test_rewards_of_a_plan_add_up_to_its_cost():
         env.step(u)
 
 
+def test_a_free_start_is_that_of_the_plan_where_the_plant_begins_there():
+    sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.05)
+    costs = [dojo.cost.Tracking(np.tile([0.3, 0.0], (6, 1)), 1.0), dojo.cost.Effort(0.01)]
+    problem = dojo.Problem(sim, sim.neutral(), 5, cost=costs, free_start=True)
+    plan = dojo.ilqr(problem)
+    env = dojo.Environment(problem, dojo.Plant(sim, plan.x[0]))
+    env.reset(seed=0)
+    np.testing.assert_allclose(sum(env.step(u)[1] for u in plan.u), -plan.fun, rtol=1e-5)
+
+
 def test_actions_are_shares_of_the_limits():
     problem = dojo.problems.block()
     limited = dojo.Problem(problem.sim, problem.start, 3, cost=dojo.cost.Effort(1.0), control_limits=(-2.0, [2, 4, 6]))

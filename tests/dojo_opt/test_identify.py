@@ -438,6 +438,7 @@ def test_feet_that_stand_on_a_terrain_tell_its_heights():
         ({}, {"link": (0.0, 0.1, 0.0, 0.2, 0.0, 0.0)}, "motion 0: expected no external wrenches"),
         ({"time_step": 0.01}, None, "motion 0: expected the time step 0.02 s, got 0.01 s"),
         ({"order": 4}, None, "expected velocities that are means over the step before, .*got those at the nodes"),
+        ({"mechanism": dojo.models.slider()}, None, "coordinates of 'mechanism' .* got one of 'slider'"),
     ],
 )
 def test_motions_that_the_simulator_would_misread_are_refused(made, wrenches, message):
