@@ -180,7 +180,8 @@ def _grounds() -> None:
     hill = dojo.Terrain.from_function(
         lambda x, y: 0.1 * np.sin(x) + 0.1 * np.cos(y), np.linspace(-2, 2, 9), [-1.0, 0.0, 1.0]
     )
-    for more in ({}, {"terrain": hill}, {"law": "linear"}, {"law": "impact"}, {"restitution": 0.5}):
+    turning = {"torsional_friction": 0.01, "rolling_friction": 0.01, "restitution": 0.5}
+    for more in ({}, {"terrain": hill}, {"law": "linear"}, {"law": "impact"}, {"restitution": 0.5}, turning):
         foot = dojo.Contact("ball", radius=0.1, **more)
         mech = dojo.Mechanism([dojo.Body("ball", 1.0, (0.1, 0.1, 0.1))], [dojo.Joint("floating", None, "ball")], [foot])
         _every(dojo.Simulator(mech, time_step=0.01))

@@ -8,7 +8,9 @@ as a floor that such impacts raise, unless they are slower than max(2 g h, sqrt(
 
 Restitutions are lowered by the same part as long as the impulses f of the step do work in all,
 
-    sum of 1/2 f.(u + u') > 0,     u, u' the relative velocities of the two bodies where f acts, after and before.
+    sum of 1/2 f.(u + u') > 0,     u, u' the relative velocities of the two bodies where f acts, after and before;
+
+moments of torsional and rolling friction likewise, with angular velocities.
 
 Derivation: docs/theory/restitution.md; derivatives: restitution_gradient.py.
 
@@ -21,6 +23,7 @@ from math import sqrt
 
 from sim.contact.contact_law import contact_impulse
 from sim.contact.ground_contact import contact_jacobian, contact_kinematics
+from sim.contact.moments.contact_moments import moment_work
 from sim.contact.pairs.pair_contact import gap_normal, is_absent, pair_arm, pair_force, pair_kinematics
 from sim.model.data import Data
 from sim.model.model import Model
@@ -169,7 +172,7 @@ def impacts_gained(model: Model, data: Data, h: float) -> bool:
         c = data.active[m]
         b = data.bounce[c]
         fn, _, _ = contact_impulse(model, data, c)
-        gain += impulse_work(model, data, h, c)
+        gain += impulse_work(model, data, h, c) + moment_work(model, data, h, c)
         gap = data.contact_kin[c, Kin.GAP] + b[Bounce.FLOOR]
         size += 0.5 * fn * (abs(gap - b[Bounce.GAP2]) + abs(b[Bounce.GAP2] - b[Bounce.GAP1])) / h
         rebound += 0.5 * fn * b[Bounce.RESTITUTION] * abs(b[Bounce.GAP2] - b[Bounce.GAP1]) / h

@@ -11,6 +11,7 @@ A2 and A3. Scenes without restitution do not compile these kernels.
 from __future__ import annotations
 
 from sim.contact.ground_contact import add_contact_law
+from sim.contact.moments.contact_moments import add_impact_moment, add_moment_law, moment_by_gap
 from sim.contact.pairs.pair_contact import pair_arm, pair_force
 from sim.contact.pairs.pair_stiffness import slip_rate
 from sim.derivatives.coupling_gradient import add_column
@@ -39,7 +40,9 @@ def gap_wrench(model: Model, data: Data, c: int) -> tuple[Vec3, Vec3]:
         o = data.origin
         p = data.pos2[i]
         a = (p[0] - o[0] + k[Kin.ARM], p[1] - o[1] + k[Kin.ARM + 1], p[2] - o[2] + k[Kin.ARM + 2])
-    return f, cross(a[0], a[1], a[2], f[0], f[1], f[2])
+    x, y, z = cross(a[0], a[1], a[2], f[0], f[1], f[2])
+    m = moment_by_gap(model, data, c)
+    return f, (x + m[0], y + m[1], z + m[2])
 
 
 @optional(Slot.ADD_BOUNCE_COMPOSITES, default=False)
@@ -61,6 +64,7 @@ def add_bounce_composites(model: Model, data: Data) -> bool:
         if c < ground:
             impacts = True
             add_contact_law(model, data, c, data.A)
+            add_moment_law(model, data, c, data.A)
             continue
         f, t = gap_wrench(model, data, c)
         for side in range(2):
@@ -137,8 +141,9 @@ def _rates(model: Model, data: Data, h: float, c: int, twists: tuple[Vector, Vec
 
 
 @kernel
-def _impulse_wrench(model: Model, data: Data, c: int, g: Vec3) -> None:
-    """couple_wrench = the wrench of W (gap, slip) about O."""
+def _impulse_wrench(model: Model, data: Data, h: float, c: int, twists: tuple[Vector, Vector, Vector]) -> None:
+    """couple_wrench = the wrench of W (gap, slip) about O, and its moment, by the twists of configurations 1, 2, 3."""
+    g = _rates(model, data, h, c, twists)
     W, k, o = data.contact_W[c], data.contact_kin[c], data.origin
     p = data.pos2[model.contact_body[c]]
     fn = W[0] * g[0] + W[1] * g[1] + W[2] * g[2]
@@ -147,6 +152,7 @@ def _impulse_wrench(model: Model, data: Data, c: int, g: Vec3) -> None:
     f = transposed_times(data.contact_frame[c], fn, f1, f2)
     t = cross(p[0] - o[0] + k[Kin.ARM], p[1] - o[1] + k[Kin.ARM + 1], p[2] - o[2] + k[Kin.ARM + 2], f[0], f[1], f[2])
     join(data.couple_wrench, f, t)
+    add_impact_moment(model, data, h, c, g[0], twists[1], twists[2], data.couple_wrench)
 
 
 @kernel
@@ -159,37 +165,43 @@ def _add_ground(model: Model, data: Data, h: float, c: int) -> None:
     while i >= 0:
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
             s1 = data.S1[d]
-            _impulse_wrench(model, data, c, _rates(model, data, h, c, (s1, data.S2[d], data.S3[d])))
+            _impulse_wrench(model, data, h, c, (s1, data.S2[d], data.S3[d]))
             add_column(model, data, model.contact_body[c], -1.0, d, data.dR_dq)
-            _impulse_wrench(model, data, c, _rates(model, data, h, c, (s1, none, none)))
+            _impulse_wrench(model, data, h, c, (s1, none, none))
             add_column(model, data, model.contact_body[c], -1.0, d, data.dR_dv)
         i = model.body_parent[i]
 
 
 @kernel
 def _add_composites(model: Model, data: Data, h: float, c: int) -> None:
-    """A1, A2, A3 of the body of one contact and those above it, once they are composites: for parameters."""
+    """A1, A2, A3 of the body of one contact and those above it, once they are composites, and their products with S2 in
+    G: for parameters.
+    """
     none, unit = data.pair_rows[0], data.pair_rows[1]
     for k in range(6):
         none[k] = unit[k] = 0.0
     for k in range(6):
         unit[k] = 1.0
-        _impulse_wrench(model, data, c, _rates(model, data, h, c, (unit, none, none)))
-        _subtract_column(model, data, c, k, data.A1)
-        _impulse_wrench(model, data, c, _rates(model, data, h, c, (none, unit, none)))
-        _subtract_column(model, data, c, k, data.A2)
-        _impulse_wrench(model, data, c, _rates(model, data, h, c, (none, none, unit)))
-        _subtract_column(model, data, c, k, data.A3)
+        _impulse_wrench(model, data, h, c, (unit, none, none))
+        _subtract_column(model, data, c, data.A1, 0, k)
+        _impulse_wrench(model, data, h, c, (none, unit, none))
+        _subtract_column(model, data, c, data.A2, 6, k)
+        _impulse_wrench(model, data, h, c, (none, none, unit))
+        _subtract_column(model, data, c, data.A3, 12, k)
         unit[k] = 0.0
 
 
 @kernel
-def _subtract_column(model: Model, data: Data, c: int, k: int, A: Matrix) -> None:
-    """Column k of A[i] -= couple_wrench, i from the body of contact c up to the root."""
+def _subtract_column(model: Model, data: Data, c: int, A: Matrix, first: int, k: int) -> None:
+    """Column k of A[i] -= couple_wrench, i from the body of contact c up to the root; G, whose columns of A are from
+    `first` on, likewise.
+    """
     i = model.contact_body[c]
     while i >= 0:
         for r in range(6):
             A[i, 6 * r + k] -= data.couple_wrench[r]
+        for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+            data.G[d, first + k] -= dot(data.S2[d], data.couple_wrench)
         i = model.body_parent[i]
 
 

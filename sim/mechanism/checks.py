@@ -328,20 +328,3 @@ def within_range(call: str, result: Any) -> Floats:
     if not all_finite(out):
         raise ValueError(f"{call}: the result is not finite: an argument is too large")
     return out
-
-
-def no_rebound(call: str, part: Any) -> None:
-    """Refuse a contact or collision with a restitution and friction against turning: impacts have no such moments.
-
-    Args:
-        call: beginning of the call that an error names.
-        part: the contact or collision.
-
-    Raises:
-        ValueError: it has both.
-    """
-    for field in ("torsional_friction", "rolling_friction"):
-        if getattr(part, field) and part.restitution:
-            raise ValueError(
-                f"{call}, {field}=...): together with restitution={part.restitution:g} it is not supported"
-            )

@@ -92,7 +92,6 @@ class Collision:
         checks.one_of(f"{call}, law=...)", self.law, LAWS)
         if self.restitution is not None:
             object.__setattr__(self, "restitution", checks.fraction(f"{call}, restitution=...)", self.restitution))
-        checks.no_rebound(call, self)
         if self.reach is not None:
             object.__setattr__(self, "reach", checks.number(f"{call}, reach=...)", self.reach, above=0.0))
             if isinstance(self.shape_a, String) or isinstance(self.shape_b, String):

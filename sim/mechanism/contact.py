@@ -66,7 +66,6 @@ class Contact:
         object.__setattr__(self, "normal", checks.direction(f"{call}, normal=...)", self.normal))
         object.__setattr__(self, "height", checks.number(f"{call}, height=...)", self.height))
         object.__setattr__(self, "restitution", checks.fraction(f"{call}, restitution=...)", self.restitution))
-        checks.no_rebound(call, self)
         if self.terrain is not None:
             self._put_on(f"{call}, terrain=...)", self.terrain)
 

@@ -37,14 +37,18 @@ from sim.contact.far_contacts import add_far_wrenches, choose_far, has_far_activ
 from sim.contact.inactive import choose_active, has_activated, has_corners, sunk_contact
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.contact.moments.contact_moments import (
+    add_impact_moment,
     add_moment_couplings,
+    add_moment_law,
     add_moment_rates,
     apply_moments,
     condense_moments,
     keep_moments,
+    moment_by_gap,
     moment_constants,
     moment_error,
     moment_rates,
+    moment_work,
     move_moments,
     recover_moments,
     report_moments,
@@ -400,11 +404,18 @@ def link_terms(model: Model) -> None:
     if _has_strings(model):
         link(model.optional, *_STRINGS)
     if len(model.moment_friction):
-        link(model.optional, *_MOMENTS)
+        _link_moments(model)
     if np.any(model.contact_terrain):
         link(model.optional, *_TERRAIN)
     if np.any(model.contact_restitution):
         link(model.optional, *_IMPACTS)
+
+
+def _link_moments(model: Model) -> None:
+    """Link the kernels of torsional and rolling friction."""
+    link(model.optional, *_MOMENTS)
+    if np.any(model.contact_restitution):
+        link(model.optional, moment_work)
 
 
 def link_far(model: Model) -> None:
@@ -447,6 +458,8 @@ def link_gradient(model: Model) -> None:
         link(model.optional, add_string_turn)
     if np.any(model.contact_restitution):
         link(model.optional, add_bounce_composites, add_bounce_derivatives)
+        if len(model.moment_friction):
+            link(model.optional, add_moment_law, moment_by_gap, add_impact_moment)
 
 
 def link_parameters(model: Model) -> None:

@@ -48,6 +48,9 @@ def test_the_situations_match_their_names() -> None:
         contacts = case.sim.step(case.x, case.u).contacts
         return np.linalg.norm(contacts.impulse, axis=1).max()
 
+    for name in ("bouncing", "on terrain", "colliding, bouncing"):
+        sim, x, u = case_of(name)
+        assert np.abs(sim.linearize(x, u, wrt=("restitution",))["restitution"]).max() > 0.1
     assert impulse("flying") < 1e-3 < 0.01 < impulse("touching") < impulse("sticking")
     assert min(impulse(name) for name in CASES if name.startswith(("sliding", "colliding"))) > 0.05
 

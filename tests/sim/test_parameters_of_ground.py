@@ -23,7 +23,8 @@ ON_HILLS = {
     "sliding": (0.0, 0.1, 0.03),
     "sticking": (0.0, 2.0, 0.03),
     "deep": (0.0, 0.5, 0.1),
-    "bouncing": (0.5, 0.1, 0.03),
+    "bouncing": (0.5, 0.1, 0.01),
+    "pivoting": (0.5, 0.5, 0.01, 0.05),
 }
 STAIRS = dojo.Terrain.steps([0.1, 0.08], depth=0.4, edge=0.3, direction=(1.0, 0.5))
 hills_case = functools.cache(lambda name: falling(HILLS, *ON_HILLS[name]))

@@ -12,6 +12,7 @@ import dojo_opt as dojo
 
 R, M, G = 0.1, 1.0, 9.81
 J = 0.4 * M * R * R
+BALL = dojo.Sphere(R)
 TORSIONAL, ROLLING = 0.01, 0.003
 HILL = dojo.Terrain(0.05 * np.sin(np.add.outer(np.arange(9.0), 0.7 * np.arange(9.0))), spacing=(0.25, 0.25))
 
@@ -29,13 +30,16 @@ def state(velocity: Any = (0.0, 0.0, 0.0), spin: Any = (0.0, 0.0, 0.0), at: Any 
     return np.array([*at, 1.0, 0.0, 0.0, 0.0, *velocity, *spin])
 
 
-def two_bodies(shape: Any, *, kappa: float = 1e-4) -> tuple[dojo.Simulator, np.ndarray]:
+def two_bodies(
+    shape: Any, thrown: Any = BALL, *, kappa: float = 1e-4, restitution: float = 0.0
+) -> tuple[dojo.Simulator, np.ndarray]:
     """A ball that is thrown onto another body, without gravity; and the state where they touch."""
     bodies = [
-        dojo.Body("a", 1.0, np.eye(3) * J, shape=dojo.Sphere(R)),
+        dojo.Body("a", 1.0, np.eye(3) * J, shape=thrown),
         dojo.Body("b", 2.0, (0.01, 0.012, 0.015), shape),
     ]
-    rub = dojo.Collision("a", "b", torsional_friction=TORSIONAL, rolling_friction=ROLLING)
+    lengths = {"torsional_friction": TORSIONAL, "rolling_friction": ROLLING}
+    rub = dojo.Collision("a", "b", restitution=restitution, **lengths)
     joints = [dojo.Joint("floating", None, name) for name in "ab"]
     mech = dojo.Mechanism(bodies, joints, collisions=[rub], gravity=(0.0, 0.0, 0.0))
     q = [0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
@@ -53,8 +57,8 @@ def leg() -> tuple[dojo.Simulator, np.ndarray]:
     return dojo.Simulator(mech, time_step=0.01, kappa=1e-5, tolerance=1e-12), x
 
 
-def on_hill() -> tuple[dojo.Simulator, np.ndarray]:
-    sim = ball(kappa=1e-5, terrain=HILL)
+def on_hill(**contact: Any) -> tuple[dojo.Simulator, np.ndarray]:
+    sim = ball(kappa=1e-5, terrain=HILL, **contact)
     x = state((1.0, 0.2, -0.5), (-2.0, 10.0, 3.0), (0.4, 0.5, 0.3))
     x[2] -= float(sim.step(x).contacts.gap[0])
     return sim, x
@@ -109,10 +113,20 @@ def test_extreme_lengths_and_weights_are_solved(length: float, scale: float) -> 
     assert abs(t.x[-1, -1]) < 1000.0
 
 
+SCENES = {
+    "moving": moving,
+    "leg": leg,
+    "on a hill": on_hill,
+    "balls": lambda: two_bodies(BALL),
+    "ball and box": lambda: two_bodies(dojo.Box(0.3, 0.3, 0.2)),
+    "dropped": lambda: (ball(kappa=1e-4, restitution=0.8), THROWN - 0.015 * np.eye(13)[2]),
+    "dropped on a hill": lambda: on_hill(restitution=0.8),
+    "bouncing balls": lambda: two_bodies(BALL, restitution=0.8),
+}
+
+
 @pytest.mark.kernel
-@pytest.mark.parametrize(
-    "scene", [moving, leg, on_hill, lambda: two_bodies(dojo.Sphere(R)), lambda: two_bodies(dojo.Box(0.3, 0.3, 0.2))]
-)
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
 def test_derivatives_by_the_state_are_those_of_differences(scene: Any) -> None:
     sim, x = scene()
     u, eps = np.zeros(sim.nu), 1e-6
@@ -132,7 +146,7 @@ GROUND = ("torsional_friction", "rolling_friction", "friction", "contact_radius"
         (moving, (*GROUND, "contact_normal", "com", "inertia", "time_step")),
         (on_hill, GROUND),
         (
-            lambda: two_bodies(dojo.Sphere(R)),
+            lambda: two_bodies(BALL),
             ("torsional_friction", "rolling_friction", "size_a", "shape_b", "com:b", "time_step"),
         ),
     ],
@@ -150,7 +164,7 @@ def test_derivatives_by_parameters_are_those_of_differences(scene: Any, names: t
 
 
 def test_moments_between_bodies_conserve_momentum() -> None:
-    sim, x = two_bodies(dojo.Sphere(R), kappa=1e-8)
+    sim, x = two_bodies(BALL, kappa=1e-8)
     t = sim.rollout(x, np.zeros((5, 0)), throw=True)
     for before, after in zip(sim.momentum(x), sim.momentum(t.x[-1]), strict=True):
         np.testing.assert_allclose(after, before, atol=1e-12)
@@ -200,6 +214,26 @@ def test_condim_4_and_6_of_mjcf_files_are_read() -> None:
         assert not dojo.load_mjcf(SCENE).contacts[0].torsional_friction
 
 
-def test_a_restitution_beside_it_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"torsional_friction=.*: together with restitution=0.5 it is not supported"):
-        dojo.Contact("foot", restitution=0.5, torsional_friction=0.01)
+# -- impacts -----------------------------------------------------------------------------------------------------------
+
+THROWN = state((0.5, 0.0, -2.0), (5.0, -20.0, 30.0), (0.0, 0.0, R + 0.03))
+
+
+def test_a_spinning_ball_that_bounces_loses_the_moment_of_its_impulses() -> None:
+    """And never gains energy."""
+    sim = ball(rolling=0.0, friction=0.0, restitution=0.8)
+    t = sim.rollout(state((0.5, 0.0, -2.0), (0.0, 0.0, 30.0), THROWN[:3]), np.zeros((40, 0)), throw=True)
+    impulses = t.contacts.impulse[:, 0, 2]
+    assert np.count_nonzero(impulses > 1.0) == 2
+    np.testing.assert_allclose(J * np.diff(t.x[:, -1]), -TORSIONAL * impulses, rtol=1e-3, atol=1e-7)
+    for more in (sim, ball(restitution=0.8), ball(restitution=1.0, friction=0.2)):
+        energy = more.energy(more.rollout(THROWN, np.zeros((100, 0)), throw=True).x)
+        assert energy.max() < energy[0] + 1e-6
+
+
+def test_a_moment_that_stops_the_rolling_of_an_impact_leaves_its_rebound() -> None:
+    """Friction alone did work in this impact, and was taken for a gain of energy."""
+    x = state((-0.5, 0.0, -2.0), (0.0, -20.0, 0.0), (0.0, 0.0, R + 0.011))
+    t = ball(rolling=0.05, restitution=1.0).rollout(x, np.zeros((3, 0)), throw=True)
+    assert abs(t.x[-1, 11]) < 1e-3
+    assert t.x[-1, 9] > 1.5

@@ -111,21 +111,27 @@ def _pyramid() -> Case:
 
 
 def falling(
-    terrain: Terrain | None = None, restitution: float = 0.5, friction: float = 0.5, sunk: float = 0.03
+    terrain: Terrain | None = None,
+    restitution: float = 0.5,
+    friction: float = 0.5,
+    sunk: float = 0.01,
+    turning: float = 0.0,
 ) -> Case:
     """A spinning body on a joint falls on its foot, on a tilted ground or on terrain; with terrain, it slides.
 
-    sunk: how far it would sink in without the ground [m].
+    sunk: how far it would sink in without the ground [m]; an impact is only where it begins above it.
+    turning: torsional, and half the rolling friction [m].
     """
     rng = np.random.default_rng(3)
     mech = _pair("revolute", "floating", LEVEL, spring=3.0, damper=0.2)
     ground = {"terrain": terrain} if terrain else {"normal": (0.2, -0.1, 0.9)}
     foot = Contact("body1", point=(0.1, -0.05, -0.2), radius=0.05, height=-1e3, **ground)
     foot = replace(foot, restitution=restitution, friction=friction)
+    foot = replace(foot, torsional_friction=turning, rolling_friction=0.5 * turning)
     mech = replace(mech, contacts=[foot])
     far = Simulator(mech, time_step=H, kappa=1e-12, tolerance=3e-14)
     x, u = _random_state(far, rng, 1.0, 0.4), 0.1 * rng.normal(size=far.nu)
-    x[far.nq + 2] -= 3.0
+    x[far.nq + 2] = -3.0
     center = _center(far, far.step(x, u, throw=True).x, foot)
     level = replace(foot, height=0.0)
     steep = level.normal_at(center)[2] if terrain else 1.0
@@ -156,8 +162,10 @@ CASES: dict[str, Callable[[], Case]] = {
     "sliding, pyramid": _pyramid,
     "pivoting": lambda: _resting("revolute", -0.01, 0.7, 0.5, turning=0.05),
     "bouncing": falling,
+    "bouncing, pivoting": lambda: falling(friction=0.1, turning=0.05),
     "on terrain": lambda: falling(HILLS),
-    "on terrain, sticking": lambda: falling(HILLS, 0.0, 2.0),
+    "on terrain, sticking": lambda: falling(HILLS, 0.0, 1.0, 0.03),
+    "on terrain, pivoting": lambda: falling(HILLS, turning=0.05),
     "at a limit": lambda: _limited("planar_axis"),
     "at a cone": lambda: _limited("cylindrical_free"),
     "in a loop": lambda: loop("revolute"),

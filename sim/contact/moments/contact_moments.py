@@ -20,6 +20,7 @@ from sim.contact.moments.moment_law import (
 from sim.contact.moments.moment_rates import (
     add_moment,
     bodies_of,
+    earlier_turning,
     faded,
     frame_of,
     frame_turning,
@@ -36,11 +37,12 @@ from sim.contact.moments.moment_rates import (
 from sim.contact.pairs.pair_jacobian import pair_rate
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.record_columns import Cone, ContactRow, Moment
+from sim.model.options import LawForm
+from sim.model.record_columns import Bounce, Cone, ContactRow, Moment
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
-from solvers.rotation import Vec3, cross
-from solvers.types import Matrix
+from solvers.rotation import Vec3, cross, times
+from solvers.types import Matrix, Vector
 
 _FIRST, _END = Moment.SPIN, Moment.ROLL + 2
 
@@ -121,14 +123,17 @@ def condense_moments(
         if has_moment(model, c) and is_felt(model, data, c):
             moment_jacobian(model, data, h, c)
             condense_moment(model, data, h, c, kappa, indefinite, form)
-            _add_side(model, data, c, 0, indefinite, out)
-            if c >= model.contact_height.shape[0] and bodies_of(model, c)[1] >= 0:
-                _add_side(model, data, c, 1, indefinite, out)
+            ground = c < model.contact_height.shape[0]
+            summed = ground and form == LawForm.SOFT and data.bounce[c, Bounce.RESTITUTION] > 0.0
+            _add_side(model, data, c, 0, (0.0 if summed else 1.0, indefinite), out)  # see restitution_gradient.py
+            if not ground and bodies_of(model, c)[1] >= 0:
+                _add_side(model, data, c, 1, (1.0, indefinite), out)
 
 
 @kernel
-def _add_side(model: Model, data: Data, c: int, side: int, indefinite: float, out: Matrix) -> None:
-    """Moment of contact c by the twist of body a (side 0) or b: its law, and the turning of its frame."""
+def _add_side(model: Model, data: Data, c: int, side: int, parts: tuple[float, float], out: Matrix) -> None:
+    """Moment of contact c by the twist of body a (side 0) or b: parts of its law, and of the turning of its frame."""
+    law, turning = parts
     ground = model.contact_height.shape[0]
     p = moment_of(data, c)
     f = world_moment(model, data, c, p)
@@ -139,11 +144,57 @@ def _add_side(model: Model, data: Data, c: int, side: int, indefinite: float, ou
         t = frame_turning(model, data, c, side, k)
         x = cross(t[0], t[1], t[2], f[0], f[1], f[2])
         for r in range(3):
-            d = g[r] + indefinite * x[r]
+            d = law * g[r] + turning * x[r]
             if c < ground:
                 out[model.contact_body[c], 18 + 6 * r + k] -= d
             else:
                 data.coupling_K[2 * model.pair_coupling[c - ground] + side, 18 + 6 * r + k] += d
+
+
+@optional(Slot.ADD_MOMENT_LAW)
+def add_moment_law(model: Model, data: Data, c: int, out: Matrix) -> None:
+    """out += the law of the moment of an impact c on the ground, which `condense_moments` omits."""
+    if has_moment(model, c):
+        _add_side(model, data, c, 0, (1.0, 0.0), out)
+
+
+@optional(Slot.MOMENT_BY_GAP, default=(0.0, 0.0, 0.0))
+def moment_by_gap(model: Model, data: Data, c: int) -> Vec3:
+    """Change of the moment of contact c, world axes, by its law per unit of its gap above the floor of an impact."""
+    if not has_moment(model, c) or not is_felt(model, data, c):
+        return 0.0, 0.0, 0.0
+    return world_moment(model, data, c, moment_change(data, c, 1.0, (0.0, 0.0, 0.0)))
+
+
+@optional(Slot.ADD_IMPACT_MOMENT)
+def add_impact_moment(
+    model: Model, data: Data, h: float, c: int, gap: float, s: Vector, t: Vector, out: Vector
+) -> None:  # fmt: skip
+    """out (6,) += wrench of the moment of an impact on the ground, by its law: of the gap above the floor, and of the
+    twists s and t of configurations 2 and 3.
+    """
+    if not has_moment(model, c):
+        return
+    x, y, z = rates_by(data.moment_Ca[c], t)
+    u, v, w = times(frame_of(model, data, c), *earlier_turning(data, h, model.contact_body[c], s))
+    m = world_moment(model, data, c, moment_change(data, c, gap, (x + u, y + v, z + w)))
+    for k in range(3):
+        out[3 + k] += m[k]
+
+
+@optional(Slot.MOMENT_WORK, default=0.0)
+def moment_work(model: Model, data: Data, h: float, c: int) -> float:
+    """1/2 m.(omega + omega') of the moment m of contact c, omega and omega' before and after."""
+    if not has_moment(model, c) or not is_felt(model, data, c):
+        return 0.0
+    a, b = bodies_of(model, c)
+    m = world_moment(model, data, c, moment_of(data, c))
+    work = 0.0
+    for k in range(3):
+        work += m[k] * (data.turn_in[a, 1 + k] + data.turn[a, 1 + k]) / h
+        if b >= 0:
+            work -= m[k] * (data.turn_in[b, 1 + k] + data.turn[b, 1 + k]) / h
+    return work
 
 
 @optional(Slot.MOMENT_CONSTANTS)
@@ -191,7 +242,7 @@ def add_moment_rates(model: Model, data: Data, h: float) -> None:
     """A2 -= moments of contacts with the ground: rates depend on pose 2."""
     for m in range(data.active_ground_count[0]):
         c = data.active[m]
-        if not has_moment(model, c):
+        if not has_moment(model, c) or data.bounce[c, Bounce.RESTITUTION] > 0.0:
             continue
         for k in range(3):
             d = _earlier(model, data, h, c, 0, k)

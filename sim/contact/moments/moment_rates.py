@@ -83,6 +83,14 @@ def turned_row(data: Data, h: float, i: int, e: Vec3, at: float) -> Vec3:
 
 
 @kernel
+def earlier_turning(data: Data, h: float, i: int, s: Vector) -> Vec3:
+    """Change of omega_i by the twist s of body i at configuration 2."""
+    t, g = data.turn[i], 1.0 / h
+    x, y, z = cross(s[3], s[4], s[5], t[1], t[2], t[3])
+    return g * (x - t[0] * s[3]), g * (y - t[0] * s[4]), g * (z - t[0] * s[5])
+
+
+@kernel
 def row_of(F: Mat3, e: int) -> Vec3:
     """Row e of a frame."""
     if e == 0:

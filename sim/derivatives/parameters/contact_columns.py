@@ -142,12 +142,13 @@ def floor_change(data: Data, c: int, d1: float, d2: float) -> float:
 
 
 @kernel
-def add_restitution(model: Model, data: Data, c: int, w: float, col: int) -> None:
+def add_restitution(model: Model, data: Data, h: float, c: int, w: float, col: int) -> None:
     """The restitution of contact c, in an impact: its floor rises by phi1 - phi2."""
     b = data.bounce[c]
     if is_active(data, c) and b[Bounce.RESTITUTION] > 0.0:
         rise = (b[Bounce.GAP1] - b[Bounce.GAP2]) * b[Bounce.RESTITUTION] / model.contact_restitution[c]
         add_impulse(model, data, c, impulse_change(data, c, -rise, 0.0, 0.0), w, col)
+        add_moment_change(model, data, h, c, (0.0, -rise), (0.0, 0.0, 0.0), w, col)
 
 
 @kernel
@@ -189,7 +190,7 @@ def add_point(model: Model, data: Data, h: float, c: int, k: int, w: float, col:
         g = cross(a[0], a[1], a[2], f[0], f[1], f[2])
         df = (df[0] + g[0], df[1] + g[1], df[2] + g[2])
     add_ground(model, data, c, df, dr, w, col)
-    add_moment_change(model, data, h, c, gap, a, w, col)
+    add_moment_change(model, data, h, c, (gap, gap), a, w, col)
 
 
 @kernel
@@ -203,7 +204,7 @@ def add_radius(model: Model, data: Data, h: float, c: int, w: float, col: int) -
     gap = 0.0 if model.contact_terrain[c] > 0 else -1.0 - floor_change(data, c, -1.0, -1.0)
     p = impulse_change(data, c, gap, _along(F, 3, v), _along(F, 6, v))
     add_ground(model, data, c, ground_force(data, c, p), dr, w, col)
-    add_moment_change(model, data, h, c, gap, (0.0, 0.0, 0.0), w, col)
+    add_moment_change(model, data, h, c, (gap, gap), (0.0, 0.0, 0.0), w, col)
 
 
 @kernel
@@ -216,7 +217,7 @@ def add_height(model: Model, data: Data, h: float, c: int, w: float, col: int) -
     if model.contact_terrain[c] > 0:
         gap = -data.contact_frame[c, 2] - floor_change(data, c, -b[Bounce.ROW1 + 2], -b[Bounce.ROW2 + 2])
     add_impulse(model, data, c, impulse_change(data, c, gap, 0.0, 0.0), w, col)
-    add_moment_change(model, data, h, c, gap, (0.0, 0.0, 0.0), w, col)
+    add_moment_change(model, data, h, c, (gap, gap), (0.0, 0.0, 0.0), w, col)
 
 
 @kernel
@@ -255,4 +256,4 @@ def add_turn(model: Model, data: Data, h: float, c: int, e: Vec3, gap: float, w:
     f = ground_force(data, c, contact_impulse(model, data, c))
     g = cross(e[0], e[1], e[2], f[0], f[1], f[2])
     add_ground(model, data, c, (df[0] + g[0], df[1] + g[1], df[2] + g[2]), dr, w, col)
-    add_moment_change(model, data, h, c, gap, e, w, col)
+    add_moment_change(model, data, h, c, (gap, gap), e, w, col)

@@ -34,14 +34,18 @@ def add_moment_column(model: Model, data: Data, c: int, m: Vec3, w: float, col: 
 
 
 @optional(Slot.ADD_MOMENT_CHANGE)
-def add_moment_change(model: Model, data: Data, h: float, c: int, gap: float, turn: Vec3, w: float, col: int) -> None:
-    """The gap of contact c grows by `gap`, and its frame turns by `turn`, world axes."""
+def add_moment_change(
+    model: Model, data: Data, h: float, c: int, gaps: tuple[float, float], turn: Vec3, w: float, col: int
+) -> None:  # fmt: skip
+    """The gap of contact c grows by gaps[0], that above the floor of an impact by gaps[1]; its frame turns by `turn`,
+    world axes.
+    """
     if not has_moment(model, c) or not is_felt(model, data, c):
         return
     u, p = relative_turning(model, data, h, c), moment_of(data, c)
     x = cross(u[0], u[1], u[2], turn[0], turn[1], turn[2])  # (turn x e).u = e.(u x turn)
     rates = times(frame_of(model, data, c), x[0], x[1], x[2])
-    d = world_moment(model, data, c, faded(model, data, c, gap, moment_change(data, c, gap, rates), p))
+    d = world_moment(model, data, c, faded(model, data, c, gaps[0], moment_change(data, c, gaps[1], rates), p))
     f = world_moment(model, data, c, p)
     y = cross(turn[0], turn[1], turn[2], f[0], f[1], f[2])
     add_moment_column(model, data, c, (d[0] + y[0], d[1] + y[1], d[2] + y[2]), w, col)

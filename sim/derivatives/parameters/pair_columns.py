@@ -100,7 +100,7 @@ def add_moved_shape(
     f = pair_force(data, j, q[0], q[1], q[2])
     x = cross(turn[0], turn[1], turn[2], f[0], f[1], f[2])
     add_pair(model, data, j, (df[0] + x[0], df[1] + x[1], df[2] + x[2]), dp, w, col)
-    add_moment_change(model, data, h, c, gap - floor, turn, w, col)
+    add_moment_change(model, data, h, c, (gap, gap - floor), turn, w, col)
 
 
 @kernel

@@ -83,7 +83,7 @@ def add_contact_term(model: Model, data: Data, h: float, effect: int, i: int, k:
     if effect == Effect.FRICTION:
         add_friction(model, data, i, w, col)
     elif effect == Effect.RESTITUTION:
-        add_restitution(model, data, i, w, col)
+        add_restitution(model, data, h, i, w, col)
     elif effect == Effect.POINT:
         add_point(model, data, h, i, k, w, col)
     elif effect == Effect.RADIUS:

@@ -33,7 +33,7 @@ def add_ground_place(model: Model, data: Data, h: float, c: int, k: int, col: in
     n = data.contact_frame[c]
     if k == 0:
         add_impulse(model, data, c, impulse_change(data, c, -n[2], 0.0, 0.0), 1.0, col)
-        add_moment_change(model, data, h, c, -n[2], (0.0, 0.0, 0.0), 1.0, col)
+        add_moment_change(model, data, h, c, (-n[2], -n[2]), (0.0, 0.0, 0.0), 1.0, col)
         return
     phi = (
         data.contact_kin[c, Kin.GAP] + data.bounce[c, Bounce.FLOOR]
