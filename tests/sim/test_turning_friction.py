@@ -119,6 +119,7 @@ SCENES = {
     "on a hill": on_hill,
     "balls": lambda: two_bodies(BALL),
     "ball and box": lambda: two_bodies(dojo.Box(0.3, 0.3, 0.2)),
+    "boxes": lambda: two_bodies(dojo.Box(0.3, 0.3, 0.2), dojo.Box(0.2, 0.2, 0.2)),  # with points that do not exist
     "dropped": lambda: (ball(kappa=1e-4, restitution=0.8), THROWN - 0.015 * np.eye(13)[2]),
     "dropped on a hill": lambda: on_hill(restitution=0.8),
     "bouncing balls": lambda: two_bodies(BALL, restitution=0.8),

@@ -94,10 +94,11 @@ def move_moments(model: Model, data: Data, alpha: float) -> None:
 
 @optional(Slot.MOMENT_ERROR, default=0.0)
 def moment_error(model: Model, data: Data, kappa: float) -> float:
-    """Largest violation of the laws on the central path of kappa, in units of kappa."""
+    """Largest violation of the laws on the central path of kappa, in units of kappa: of contacts that act."""
     e = 0.0
     for m in range(data.active_count[0]):
-        e = max(e, moment_violation(model, data, data.active[m], kappa))
+        if is_felt(model, data, data.active[m]):
+            e = max(e, moment_violation(model, data, data.active[m], kappa))
     return e
 
 
@@ -212,6 +213,8 @@ def recover_moments(model: Model, data: Data) -> None:
     ground = model.contact_height.shape[0]
     for m in range(data.active_count[0]):
         c = data.active[m]
+        d = data.carry.cone_step[c]
+        d[Moment.SPIN] = d[Moment.ROLL] = d[Moment.ROLL + 1] = 0.0
         if not has_moment(model, c) or not is_felt(model, data, c):
             continue
         a, b = bodies_of(model, c)
@@ -221,7 +224,7 @@ def recover_moments(model: Model, data: Data) -> None:
             x, y, z = x + u, y + v, z + w
         gap = contact_rate(model, data, c)[0] if c < ground else pair_rate(model, data, c)[0]
         t, r, s = moment_change(data, c, gap, (x, y, z))
-        d, U, V = data.carry.cone_step[c], data.moment_w[2 * c], data.moment_w[2 * c + 1]
+        U, V = data.moment_w[2 * c], data.moment_w[2 * c + 1]
         d[Moment.SPIN], d[Moment.ROLL], d[Moment.ROLL + 1] = t + U[1], r + V[1], s + V[2]
 
 
