@@ -24,7 +24,7 @@ print(f"at half the time step, contacts three times harder: return {harder.retur
 start = task.start(np.random.default_rng(2))
 plant = dojo.Plant(task.sim, start)
 seconds = 2.0 if QUICK else 10.0
-loop = dojo.closed_loop(learned.policy.controller, plant, seconds, control_step=task.knot_time, fallen=lambda x: False)
+loop = dojo.closed_loop(learned.policy.controller, plant, seconds, fallen=lambda x: False)
 speed = (loop.x[-1, 0] - loop.x[0, 0]) / seconds
 print(f"in a closed loop: {speed:.1f} m/s over {seconds:g} s")
 print(f"wrote {dojo.viewer.save_html(loop, 'half_cheetah_shac.html')}")

@@ -252,7 +252,7 @@ def identify(
     """Fit parameters to measured motions: see the module.
 
     Args:
-        sim: simulator to begin with; its time step is that of the measurements.
+        sim: simulator to begin with, of order 2; its time step is that of the measurements.
         trajectories: of `rollout`, or (states (T + 1, nx), inputs (T, nu)), measured.
         parameters: names, as in `Simulator.parameters`.
         bodies: whose mass, centre and inertia are fitted together, as physical bodies; see `ParameterSpace`.
@@ -274,14 +274,20 @@ def identify(
 
     Raises:
         TypeError: for an argument of the wrong kind.
-        ValueError: for a value out of range, an unknown name, or a Trajectory under external wrenches, with another
-            time step, or with velocities of another kind (means over steps, or those at nodes).
+        ValueError: for a value out of range, an unknown name, a simulator of higher order or with an accuracy, or a
+            Trajectory of another robot, under external wrenches, with another time step, or with velocities at nodes.
         Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the best of the finished fits, or else the fit
             so far, INTERRUPTED, by the windows that it has got to; None before its first predictions.
     """
     call = "identify"
     if not isinstance(sim, Simulator):
         raise TypeError(f"{call}(sim): expected a Simulator, got {sim!r}")
+    if sim.order > 2 or sim.accuracy is not None:
+        kind, way = (f"order {sim.order}", "order=2") if sim.accuracy is None else ("an accuracy", "accuracy=None")
+        raise ValueError(
+            f"{call}(sim): expected steps of order 2, which have derivatives by parameters, got {kind}; use "
+            f"sim.replace({way}), and motions with its velocities"
+        )
     if "starts" in options:  # its name until version 0.2
         renamed_keywords(call, options, {"starts": "fits"})
         fits = options.pop("fits")

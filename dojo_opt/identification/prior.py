@@ -26,6 +26,8 @@ class Prior:
         for name, value in checks.mapping("identify(prior=...)", given).items():
             call = f"identify(prior=...): {name!r}"
             rows = rows_of("identify(prior=...)", name, space.labels)
+            if isinstance(value, tuple) and len(value) != 2:
+                raise ValueError(f"{call}: expected a deviation, or (mean, deviation), got {value!r}")
             mean, deviation = value if isinstance(value, tuple) else (self.mean[rows], value)
             self.mean[rows] = np.broadcast_to(checks.floats(call, mean), (len(rows),))
             self.precision[rows] = checks.number(call, deviation, above=0.0) ** -2

@@ -31,7 +31,7 @@ class LearnedPolicy:
     """a = s(network((o - mean) / deviation)), where s is tanh, or a clamp to [-1, 1] of linear policies.
 
         u = policy(x)                                               an input (nu,) [N, N m] for a state
-        dojo.closed_loop(policy.controller, plant, 10.0, control_step=policy.task.knot_time)
+        dojo.closed_loop(policy.controller, plant, 10.0)            held for an action of the task
 
     Attributes:
         network: shape of the network.

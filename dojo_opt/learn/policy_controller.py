@@ -46,6 +46,11 @@ class PolicyController:
         """The simulator of the task."""
         return self._task.sim
 
+    @property
+    def control_step(self) -> float:
+        """Time for which an input is held, that of an action of the task [s]."""
+        return self._task.knot_time
+
     def __repr__(self) -> str:
         return f"PolicyController({self._task.name})"
 

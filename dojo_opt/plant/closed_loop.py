@@ -146,7 +146,7 @@ def closed_loop(
         plant: the plant, which is reset.
         duration: length of the run [s].
         control_step: time between calls of the controller, whose answer is held in between [s]; a multiple of the time
-            step of the plant (default None: every time step).
+            step of the plant (default None: that of the task of a learned policy, else every time step).
         reference: function of times (n,) [s] that returns the states (n, nx) of the error (default None: that of the
             controller, raised by the height of the ground that the controller has learnt by then).
         fallen: function of a state that returns whether the robot has fallen, which ends the run (default None:
@@ -175,6 +175,7 @@ def closed_loop(
         names = (sim.mechanism.dof_names for sim in (model, plant.nominal))
         check_same_names("closed_loop(plant)", *names)
     h, steps = plant.nominal.time_step, steps_of("closed_loop(duration)", plant, duration)
+    control_step = getattr(controller, "control_step", None) if control_step is None else control_step
     every = 1 if control_step is None else round(checks.number("closed_loop(control_step=...)", control_step) / h)
     if every < 1 or (control_step is not None and abs(every * h - control_step) > 1e-9):
         raise ValueError(

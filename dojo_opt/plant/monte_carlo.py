@@ -142,7 +142,7 @@ def monte_carlo(
         executor: anything with the interface of `concurrent.futures.Executor`: a ProcessPoolExecutor (use the "spawn"
             context: forked processes inherit no threads), Dask's `client.get_executor()`, Ray's or MPI's pools
             (default None: one run after the other).
-        control_step: time between calls of the controller [s] (default None: every time step of the plant).
+        control_step: time between calls of the controller [s] (default None: as of `closed_loop`).
         components: coordinates of the `rms` of each run, as in `ClosedLoop.rms` (default None: all tracked ones).
 
     Returns:

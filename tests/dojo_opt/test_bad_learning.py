@@ -190,6 +190,18 @@ def _trained(**changes):
 
 
 SWAPPED = {
+    "simulator of higher order": (
+        lambda: dojo.identify(SIM.replace(order=4), [SIM.rollout(np.zeros(2), steps=3)], ["mass"]),
+        r"identify\(sim\): expected steps of order 2.*got order 4; use sim.replace\(order=2\)",
+    ),
+    "simulator with an accuracy": (
+        lambda: dojo.identify(SIM.replace(accuracy=1e-3), [SIM.rollout(np.zeros(2), steps=3)], ["mass"]),
+        r"got an accuracy; use sim.replace\(accuracy=None\)",
+    ),
+    "prior of three numbers": (
+        lambda: dojo.identify(SIM, [SIM.rollout(np.zeros(2), steps=3)], ["mass"], prior={"mass": (1.0, 0.1, 0.2)}),
+        r"identify\(prior=...\): 'mass': expected a deviation, or \(mean, deviation\)",
+    ),
     "plan to begin with": (lambda: dojo.MPC(_problem(), plan=dojo.ilqr(_problem(SLIDER))), "got one of 'slider'"),
     "plan with other knots": (
         lambda: dojo.MPC(_problem(), plan=dojo.ilqr(_problem(SIM.replace(time_step=0.1)))),
@@ -235,3 +247,16 @@ def test_files_of_policies_know_their_robot(tmp_path):
         Learned.load(tmp_path / "run.npz", other)
     replace(POLICY, task=None).save(tmp_path / "bare.npz")  # as all files before
     assert LearnedPolicy.load(tmp_path / "bare.npz", other).task is other
+
+
+def test_a_policy_acts_as_often_as_its_task_unless_told_otherwise():
+    plant, calls = dojo.Plant(SIM.replace(time_step=0.01)), []
+    policy = replace(POLICY, weights=np.array([1.0, 0.2, 0.3]))
+    for given in (None, 0.05, 0.01):
+        calls.append(dojo.closed_loop(policy.controller, plant, 0.2, control_step=given).u)
+    np.testing.assert_array_equal(calls[0], calls[1])
+    assert np.unique(calls[0]).size == 4 and np.unique(calls[2]).size == 20
+    with pytest.raises(
+        ValueError, match=r"control_step=...\): expected a multiple of the plant's step 0.03 s, got 0.05"
+    ):
+        dojo.closed_loop(policy.controller, dojo.Plant(SIM.replace(time_step=0.03)), 0.3)
