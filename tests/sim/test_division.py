@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import dojo_opt as dojo
 from dojo_opt import models
+from sim.model.record_columns import StepReport
 from sim.simulator.engines.dividing_engine import LARGEST_DIVISION, DividingEngine
+from sim.simulator.engines.engine import Engine
 from support.scenes import KINDS, chain, random_state
 
 Floats = NDArray[np.float64]
@@ -405,3 +409,26 @@ def test_overlaps_that_no_pose_opens_are_left_and_named() -> None:
     assert "overlap" in motion.message and "'hit'" in motion.message
     assert np.ptp(np.hstack(sim.momentum(motion.x)), axis=0).max() < 1e-9
     assert not sim.linearize(x, np.zeros(sim.nu)).success
+
+
+def test_a_step_whose_warm_start_fails_is_solved_as_it_is_alone(
+    whip: tuple[dojo.Simulator, Floats], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without the impulses of the step before, and without a division."""
+    sim, x = whip
+    start, t = sim.rollout(x, steps=3, throw=True).x[-1], 1
+    motion = sim.rollout(start, steps=3, throw=True)
+    took, counts = Engine.take_steps, list[int]()
+
+    def failing(self: Engine, model: Any, line: Any, *rest: Any) -> int:
+        """As usual, but that the first call ends before the step t."""
+        counts.append(len(line.us))
+        done = took(self, model, line, *rest)
+        if len(counts) == 1:
+            done, line.reports[t, StepReport.STATUS] = t, dojo.Status.NO_PROGRESS
+        return done
+
+    monkeypatch.setattr(Engine, "take_steps", failing)
+    again = sim.rollout(start, steps=3, throw=True)
+    assert counts == [3, 1, 1] and again.parts.max() == motion.parts.max() == 1
+    assert np.abs(again.x - motion.x).max() < 1e-9

@@ -276,7 +276,9 @@ class DividingEngine(Engine):
         """Go on from the step `knot`, which was not solved."""
         steps, piece = len(motion.us), _PIECE
         try:
-            while knot < steps and self._divide_row(motion, knot, kappa):
+            while knot < steps and (
+                self._begin_anew(model, motion, knot, kappa) or self._divide_row(motion, knot, kappa)
+            ):
                 knot, whole = knot + 1, True
                 while knot < steps and whole:
                     rest = _rows(motion, knot, min(piece, steps - knot))
@@ -288,6 +290,13 @@ class DividingEngine(Engine):
             done = stop.result if isinstance(stop, Interrupted) else 0
             raise Interrupted(knot + (done if isinstance(done, int) else 0)) from None  # not half a divided step
         return knot
+
+    def _begin_anew(self, model: Table, motion: MotionBuffers, knot: int, kappa: float | None) -> bool:
+        """Solve the step `knot`, which was not, without the impulses of the one before; False where that fails, too."""
+        if knot == 0 or super().take_steps(model, _rows(motion, knot, 1), kappa) == 0:
+            return False
+        self._ended.parts = None
+        return True
 
     def _divide_row(self, motion: MotionBuffers, knot: int, kappa: float | None) -> bool:
         """Divide the step `knot` of a motion, which was not solved; False where that does not solve it."""
