@@ -213,3 +213,21 @@ def test_a_step_that_has_no_mean_velocity_says_so() -> None:
     step = sim.step(x)
     assert step.status == dojo.Status.TURN_TOO_LARGE and not step.success
     np.testing.assert_array_equal(step.x, x)
+
+
+def test_a_hopper_that_pushes_off_is_exact_with_an_accuracy_only() -> None:
+    """Steps of order 2 among those of higher order take the impulse of inputs at their beginning (limitations.md)."""
+    hopper, pushes = dojo.models.raiberthopper(), np.array([0.0, 0.0, 60.0])
+
+    def height(time_step: float, **settings: float) -> float:
+        sim = dojo.Simulator(hopper, time_step, **settings)
+        x, steps = sim.neutral(), round(0.4 / time_step)
+        x[2] += 0.03
+        path = sim.rollout(x, np.tile(pushes, (steps, 1)))
+        assert path.success
+        return float(path.x[-1, 2])
+
+    exact = height(0.01, accuracy=1e-3)
+    fine, plain, high, half = height(2e-4), height(0.01), height(0.01, order=4), height(0.005, order=4)
+    assert abs(exact - fine) < 3e-4
+    assert abs(high - exact) > 2.0 * abs(plain - exact) and 1.8 < (high - exact) / (half - exact) < 2.2
