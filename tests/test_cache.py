@@ -424,7 +424,8 @@ SEVERAL = (
 SCENES: dict[str, tuple[str, tuple[str, ...]]] = {  # each with kernels that neither it nor those above it need
     "pendulum": (
         "sim = dojo.Simulator(dojo.models.pendulum())\n"
-        "sim.rollout(sim.neutral(), np.zeros((3, sim.nu)))\nsim.linearize(sim.neutral())",
+        "motion = sim.rollout(sim.neutral(), np.zeros((3, sim.nu)))\nsim.linearize(sim.neutral())\n"
+        "sim.vjp(motion, np.ones((4, sim.ndx)))",
         (*FEATURES, *NO_CONTACTS),
     ),
     "limit": (

@@ -111,6 +111,17 @@ def column_count(model: Model, data: Data) -> int:
 
 
 @kernel
+def clear_columns(data: Data) -> None:
+    """columns = 0, couple_panel = 0."""
+    for m in range(data.columns.shape[1]):
+        for d in range(data.columns.shape[0]):
+            data.columns[d, m] = 0.0
+    for row in range(data.couple_panel.shape[0]):
+        for m in range(data.couple_panel.shape[1]):
+            data.couple_panel[row, m] = 0.0
+
+
+@kernel
 def solve_panel(model: Model, data: Data) -> None:
     """columns := H^-1 columns, as `solve` for one right-hand side.
 

@@ -42,10 +42,11 @@ from sim.model.interruptible_loops import is_due, note_deadline
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.record_columns import Apart, StepReport
-from solvers.compiler import Table, kernel
+from sim.model.slots import Slot
+from solvers.compiler import Table, kernel, optional
 from solvers.dense import copy_vector
 from solvers.status import Status
-from solvers.types import Vector
+from solvers.types import IntegerMatrix, Vector
 
 _SOLVED = int(Status.SOLVED)
 _ACCURACY_NOT_REACHED = int(Status.ACCURACY_NOT_REACHED)
@@ -225,11 +226,17 @@ def take_long(
     return _SOLVED
 
 
-@kernel
+@optional(Slot.ATTEMPT, default=_NOT_FINITE)
 def attempt(
-    models: Table, data_tables: Table, settings: Vector, goal: Vector, embedded: Embedded, line: SubstepState
-) -> int:  # fmt: skip
-    """One attempt at the next sub-step, of order 8, or in contact; the Status."""
+    model: Model,
+    models: IntegerMatrix,
+    data_tables: IntegerMatrix,
+    settings: Vector,
+    goal: Vector,
+    embedded: Embedded,
+    line: SubstepState,
+) -> int:
+    """One attempt at the next sub-step, of order 8, or in contact; the Status.   model: the first of the models."""
     clock = line.clock
     line.report[StepReport.STATUS] = _SOLVED  # the steps that it tries write theirs, with their worst contact
     rest = goal[AccuracyGoal.END] - clock[Clock.TIME]
@@ -259,14 +266,14 @@ def go_on(
 
     models: tables of the Model for order 8 and for order 2; data_tables: of two Data.
     """
-    data, clock = data_view(data_tables[0]), line.clock
+    flight, data, clock = model_view(models[0]), data_view(data_tables[0]), line.clock
     note_deadline(data, settings)
     if clock[Clock.BEGUN] == 0.0:
         begin_substeps(line, goal[AccuracyGoal.END])
     line.taken[0] = 0
     while clock[Clock.TIME] < goal[AccuracyGoal.END] and line.taken[0] < line.lengths.shape[0]:
         effort = line.report[StepReport.ITERATIONS]
-        status = attempt(models, data_tables, settings, goal, embedded, line)
+        status = attempt(flight, models, data_tables, settings, goal, embedded, line)
         if status != _SOLVED:
             return status
         if is_due(data, line.report[StepReport.ITERATIONS] - effort):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from sim.integrators.adaptive import attempt
 from sim.integrators.substeps import AccuracyGoal, Clock, Embedded, SubstepState, begin_substeps, end_report
 from sim.model.interruptible_loops import is_due, note_deadline
-from sim.model.layout import data_view
+from sim.model.layout import data_view, model_view
 from sim.model.record_columns import StepReport
 from solvers.compiler import Table, kernel
 from solvers.dense import copy, copy_vector
@@ -68,7 +68,7 @@ def roll_substeps(
 
     Where a step is not solved, its report has the Status.
     """
-    data, end = data_view(data_tables[0]), goal[AccuracyGoal.END]
+    flight, data, end = model_view(models[0]), data_view(data_tables[0]), goal[AccuracyGoal.END]
     note_deadline(data, settings)
     for t in range(first, path.us.shape[0]):
         if line.clock[Clock.BEGUN] == 0.0:
@@ -76,7 +76,7 @@ def roll_substeps(
         due = False
         while line.clock[Clock.TIME] < end:
             effort, line.taken[0] = line.report[StepReport.ITERATIONS], 0
-            status = attempt(models, data_tables, settings, goal, embedded, line)
+            status = attempt(flight, models, data_tables, settings, goal, embedded, line)
             if line.report[StepReport.PARTS] > goal[AccuracyGoal.MOST]:
                 status, line.report[StepReport.STATUS] = _MAX_ITERATIONS, _SOLVED
             if status != _SOLVED:

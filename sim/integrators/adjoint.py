@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from sim.derivatives.parameters.directions import At, Effect, ParameterTerm
 from sim.derivatives.parameters.height_columns import add_height_gradient
-from sim.derivatives.parameters.residual_columns import clear_columns, fill_columns
-from sim.dynamics.elimination_panel import column_count, solve_panel
+from sim.derivatives.parameters.residual_columns import fill_columns
+from sim.dynamics.elimination_panel import clear_columns, column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
 from sim.integrators.rollout import Linearized, linearize
 from sim.model.data import Data

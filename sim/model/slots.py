@@ -260,3 +260,9 @@ class Slot(Code):
     MOMENT_BY_GAP = 210
     ADD_IMPACT_MOMENT = 211
     MOMENT_WORK = 212
+    # derivatives by parameters
+    FILL_COLUMNS = 213
+    # sub-steps of steps with an accuracy
+    ATTEMPT = 214
+    # states from momenta
+    MEET_MOMENTUM = 215

@@ -100,6 +100,7 @@ from sim.derivatives.parameters.moment_columns import (
     add_moment_friction,
     add_moment_time_step,
 )
+from sim.derivatives.parameters.residual_columns import fill_columns
 from sim.derivatives.parameters.surface import add_surface_radius
 from sim.derivatives.parameters.taut_string_columns import add_moved_end
 from sim.derivatives.restitution_gradient import add_bounce_composites, add_bounce_derivatives
@@ -166,6 +167,7 @@ from sim.solve.prediction import (
     reached_rates,
     take_contacts,
 )
+from sim.solve.start_velocity import meet_momentum
 from sim.step import step
 from solvers.compiler import link
 from solvers.riccati import backward_knots
@@ -332,9 +334,14 @@ def link_nodes(model: Model) -> None:
     if len(model.loop_ntrans) + len(model.gear_dof):
         link(model.optional, *_COUPLING, add_loop_sizes, close_velocity, close_node)
         if np.any(model.dof_damper):
-            link(model.optional, close_interval)
+            link(model.optional, close_interval, meet_momentum)
     if len(model.gear_dof):
         link(model.optional, unit_gear_impulse, gear_response, gear_responses)
+
+
+def link_momentum(model: Model) -> None:
+    """Link the search for the state with the momentum of a node."""
+    link(model.optional, meet_momentum)
 
 
 def link_pairs(model: Model) -> None:
@@ -464,6 +471,7 @@ def link_gradient(model: Model) -> None:
 
 def link_parameters(model: Model) -> None:
     """Link the further kernels of derivatives by parameters."""
+    link(model.optional, fill_columns)
     if np.any(model.contact_terrain):
         link(model.optional, add_surface_radius)
     if len(model.moment_friction):

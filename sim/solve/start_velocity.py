@@ -16,8 +16,9 @@ from sim.dynamics.velocity import joint_twists
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
+from sim.model.slots import Slot
 from sim.solve.residual import rounding
-from solvers.compiler import Table, kernel
+from solvers.compiler import Table, kernel, optional
 from solvers.dense import copy_vector
 from solvers.status import Status
 from solvers.types import Matrix, Vector
@@ -150,7 +151,7 @@ def _momentum_scale(model: Model, data: Data, h: float, x: Vector) -> float:
     return scale
 
 
-@kernel
+@optional(Slot.MEET_MOMENTUM, default=int(Status.NOT_FINITE))
 def meet_momentum(model: Model, data: Data, h: float, x: Vector) -> int:
     """Solve p(q, v15; h) = p for v15, p (nv,) in data.nu.   x: [q; guess of v15], its velocities are overwritten."""
     return _meet_momentum(model, data, h, _momentum_scale(model, data, h, x), x)

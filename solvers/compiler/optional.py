@@ -59,6 +59,7 @@ _TYPES: dict[str, types.Type] = {
     "Cube": types.Array(types.float64, 3, "C"),
     "Stack": types.Array(types.float64, 3, "C"),
     "Integers": types.Array(types.int64, 1, "C"),
+    "IntegerMatrix": types.Array(types.int64, 2, "C"),
 }
 
 

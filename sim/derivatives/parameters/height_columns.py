@@ -17,9 +17,8 @@ from sim.contact.height_field import cell, height_field, weight
 from sim.contact.terrain_contact import center
 from sim.derivatives.parameters.directions import At
 from sim.derivatives.parameters.parameter_jacobian import coordinate_rows
-from sim.derivatives.parameters.residual_columns import clear_columns
 from sim.derivatives.parameters.surface import add_ground_place, is_on_terrain
-from sim.dynamics.elimination_panel import column_count, solve_panel
+from sim.dynamics.elimination_panel import clear_columns, column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view

@@ -36,10 +36,11 @@ from sim.derivatives.parameters.pair_columns import add_pairs_mass, add_shapes_s
 from sim.derivatives.parameters.sizes import add_shapes_size
 from sim.derivatives.parameters.surface import add_surface_radius
 from sim.dynamics.displacements import other_quaternions
-from sim.dynamics.elimination_panel import column_count
+from sim.dynamics.elimination_panel import clear_columns, column_count
 from sim.model.data import Data
 from sim.model.model import Model
-from solvers.compiler import kernel
+from sim.model.slots import Slot
+from solvers.compiler import kernel, optional
 from solvers.types import IntegerMatrix, Vector
 
 
@@ -114,18 +115,7 @@ def add_coupled_term(model: Model, data: Data, h: float, effect: int, i: int, k:
         add_gear_offset(model, data, i, w, col)
 
 
-@kernel
-def clear_columns(data: Data) -> None:
-    """columns = 0, couple_panel = 0."""
-    for m in range(data.columns.shape[1]):
-        for d in range(data.columns.shape[0]):
-            data.columns[d, m] = 0.0
-    for row in range(data.couple_panel.shape[0]):
-        for m in range(data.couple_panel.shape[1]):
-            data.couple_panel[row, m] = 0.0
-
-
-@kernel
+@optional(Slot.FILL_COLUMNS)
 def fill_columns(
     model: Model, data: Data, at: At, terms: IntegerMatrix, weights: Vector, first: int, start: int
 ) -> int:

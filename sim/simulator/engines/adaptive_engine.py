@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sim.derivatives.momentum_gradient import momentum_jacobian
 from sim.dynamics.joints.damper import node_dampings
-from sim.integrators.adaptive import go_on
+from sim.integrators.adaptive import attempt, go_on
 from sim.integrators.adaptive_rollout import SubstepMotion, roll_substeps
 from sim.integrators.extrapolated_step import PARTS, combined_at
 from sim.integrators.hamilton_gradient import Slopes, empty_slopes
@@ -36,10 +36,10 @@ from sim.simulator.engines.engine import REPORT, Engine, Floats, Rolled, contact
 from sim.simulator.engines.linear_systems import solved
 from sim.simulator.engines.node_states import ClosingStates
 from sim.simulator.engines.python_loop_engine import PythonLoopEngine
-from sim.simulator.link_kernels import link_flight
+from sim.simulator.link_kernels import link_flight, link_momentum
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings, least_kappa
-from solvers.compiler import Table
+from solvers.compiler import Table, link
 from solvers.status import Status
 from solvers.types import Cube, Integers, Vector
 
@@ -73,6 +73,12 @@ class Substeps(NamedTuple):
     starts: Floats  # (n, nx) nodes where the sub-steps begin
     lengths: Vector  # (n,) [s]
     orders: Integers  # (n,)
+
+
+def link_substeps(model: Model) -> None:
+    """Link the kernels of sub-steps of order 8, and one attempt at a sub-step of either order."""
+    link(model.optional, attempt)
+    link_flight(model)
 
 
 class AdaptiveEngine(PythonLoopEngine):
@@ -119,7 +125,7 @@ class AdaptiveEngine(PythonLoopEngine):
                 np.zeros(_ROWS, dtype=np.int64),
                 np.zeros(1, dtype=np.int64),
             )
-            models = np.stack([self.linked(link_flight), self._second.step_table()])
+            models = np.stack([self.linked(link_substeps), self._second.step_table(link_momentum)])
             self._kept.line = models, errors, line
         found: tuple[Table, Embedded, SubstepState] = self._kept.line
         return found
@@ -280,7 +286,7 @@ class AdaptiveEngine(PythonLoopEngine):
         """(Status, mean state of the node x before a step of length h); NaN where there is none."""
         (u, wrench), mean, data = held, np.zeros(self.nx), self._scratch.table()
         begin_work(data, wrench)
-        status = int(mean_of_node(self._second.step_table(), data, h, u, x, mean))
+        status = int(mean_of_node(self._second.step_table(link_momentum), data, h, u, x, mean))
         return status, mean if status == Status.SOLVED else np.full(self.nx, np.nan)
 
     def _node(self, mean: Vector, held: Held, h: float) -> tuple[int, Vector]:

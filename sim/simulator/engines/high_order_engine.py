@@ -49,9 +49,9 @@ class HighOrderEngine(Engine):
         super().__init__(own, settings)
         self.states: NodeStates = NodeStates(self)
 
-    def step_table(self) -> Table:
+    def step_table(self, *needs: Callable[[Model], None]) -> Table:
         """As Engine.step_table."""
-        return self.linked(link_stages)
+        return self.linked(link_stages, *needs)
 
     def prepare(self) -> None:
         """As Engine.prepare."""

@@ -16,7 +16,7 @@ from sim.dynamics.joints.damper import node_dampings
 from sim.model.interruptible_loops import rows
 from sim.simulator.engines.engine import Engine, Floats
 from sim.simulator.engines.linear_systems import solved
-from sim.simulator.link_kernels import link_gradient, link_step
+from sim.simulator.link_kernels import link_gradient, link_momentum, link_step
 from sim.solve.start_velocity import SHORTEST, intervals, momenta_of_velocities, momentum_at, state_of_momentum
 from solvers.status import Status
 from solvers.types import Integers, Vector
@@ -85,7 +85,7 @@ class Intervals:
         """The state with P(q, v; h) = P (nv,), sought from the velocity of `near` (nx,); None where there is none."""
         out = near.copy()
         p = P + self._damping(h) @ solved(self.mass(near), P) if self._damped else P
-        status = state_of_momentum(self._engine.linked(link_step), self._engine.table(), h, p, out)
+        status = state_of_momentum(self._engine.linked(link_step, link_momentum), self._engine.table(), h, p, out)
         return out if status == Status.SOLVED and np.isfinite(out).all() else None
 
     def _arriving(self, h: float, x: Vector) -> Vector:

@@ -47,9 +47,9 @@ class LinkedModel:
             self._linked.update(new)
         return self._model
 
-    def step_table(self) -> Table:
-        """Table of the Model, with the step of its order linked."""
-        return self.linked(*self._steps)
+    def step_table(self, *needs: Callable[[Model], None]) -> Table:
+        """Table of the Model, with the step of its order and further needs of a call linked."""
+        return self.linked(*self._steps, *needs)
 
     def gradient_table(self, *needs: Callable[[Model], None]) -> Table:
         """Table of the Model, with the step, its derivatives, and further needs of a call linked."""

@@ -7,7 +7,7 @@ import numpy as np
 from sim.dynamics import coordinates, coordinates_jacobian, energy, state_manifold, velocity
 from sim.model.interruptible_loops import rows
 from sim.simulator.engines.linked_model import LinkedModel
-from sim.simulator.link_kernels import link_nodes
+from sim.simulator.link_kernels import link_momentum, link_nodes
 from sim.simulator.results import SimulationError
 from sim.solve import start_velocity
 from solvers.status import MESSAGES, Status
@@ -33,7 +33,7 @@ class MeanStates:
     def start(self, q: Vector, v: Vector, h: float | None = None) -> tuple[int, Vector]:
         """(status, state) with the velocity v at the node q; h: interval of the state, here and below, [s]."""
         x = np.concatenate([q, v])
-        status = start_velocity.start_at(self._kernels.linked(), self._kernels.table(), h or self.h, v, x)
+        status = start_velocity.start_at(self._kernels.linked(link_momentum), self._kernels.table(), h or self.h, v, x)
         return int(status), x
 
     def started(self, q: Vector, v: Vector, h: float | None = None) -> Vector:

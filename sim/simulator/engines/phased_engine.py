@@ -31,7 +31,7 @@ from sim.simulator.engines.division import DIVISIBLE
 from sim.simulator.engines.engine import REPORT, Engine, Floats, Rolled, contact_rows, interrupted
 from sim.simulator.engines.linear_systems import solved
 from sim.simulator.engines.python_loop_engine import PythonLoopEngine
-from sim.simulator.link_kernels import link_flight
+from sim.simulator.link_kernels import link_flight, link_momentum
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
 from solvers.compiler import Table
@@ -97,7 +97,7 @@ class PhasedEngine(PythonLoopEngine):
         own, other = self.table(), self._second.table()
         if getattr(self._kept, "data_tables", (None, None))[0] is not own:
             self._kept.data_tables = own, np.stack([own, other])
-            self._kept.models = np.stack([self.linked(link_flight), self._second.step_table()])
+            self._kept.models = np.stack([self.linked(link_flight), self._second.step_table(link_momentum)])
         return self._kept.models, self._kept.data_tables[1]
 
     def _divide(self, path: Phases, t: int, kappa: float | None) -> bool:
