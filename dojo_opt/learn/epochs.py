@@ -11,7 +11,7 @@ import numpy as np
 from dojo_opt.learn.task import Task
 from dojo_opt.learn.training_result import Learned, LearningProgress
 from dojo_opt.planning.executors import check_executor
-from dojo_opt.planning.same_robot import check_same_names, check_same_velocities
+from dojo_opt.planning.same_robot import check_same_names
 from sim.mechanism import checks
 from sim.mechanism.renamed import renamed_keywords
 from solvers.status import Status
@@ -44,14 +44,16 @@ def learn(
     return _run_epochs(run, resume)
 
 
-def _check_task(call: str, task: Task, before: Task | None) -> None:
-    """Refuse a run of another robot, or with other control steps; one without its task, as of a file, is not judged."""
-    if before is None or before is task:
-        return
-    check_same_names(call, task.sim.mechanism.dof_names, before.sim.mechanism.dof_names)
-    check_same_velocities(call, task.sim, before.sim)
-    if not np.isclose(task.knot_time, before.knot_time, rtol=1e-9):
-        raise ValueError(f"{call}: expected control steps of {task.knot_time:g} s, got {before.knot_time:g} s")
+def _check_task(call: str, own: dict[str, Any], given: dict[str, Any]) -> None:
+    """Refuse a run of another robot, or with other control steps, by what the state of a run tells of its task."""
+    check_same_names(call, own["dofs"], given["dofs"])
+    if bool(own["mean_over"]) != bool(given["mean_over"]):
+        kinds = "at the nodes", "over time steps"
+        wanted, got = (kinds[bool(task["mean_over"])] for task in (own, given))
+        raise ValueError(f"{call}: expected velocities {wanted}, got those {got}; use a simulator of the same order")
+    steps = own["control_step"], given["control_step"]
+    if not np.isclose(*steps, rtol=1e-9):
+        raise ValueError(f"{call}: expected control steps of {steps[0]:g} s, got {steps[1]:g} s")
 
 
 def _check_state(call: str, own: dict[str, Any], given: dict[str, Any]) -> None:
@@ -75,8 +77,9 @@ def _run_epochs(search: Any, resume: Learned | None) -> Learned:
             raise ValueError(
                 f"{name}(resume=...): expected a run of {name} with seed {search.seed} and this policy, got {resume!r}"
             )
-        _check_task(f"{name}(resume=...)", search.task, resume.policy.task)
-        _check_state(f"{name}(resume=...)", search.state(), resume.state)
+        own = search.state()
+        _check_state(f"{name}(resume=...)", own, {"task": own["task"], **resume.state})  # older files have no task
+        _check_task(f"{name}(resume=...)", own["task"], {**own["task"], **resume.state.get("task", {})})
         search.resume(resume)
     progress = LearningProgress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
     count = min(o.evaluations, o.epochs)

@@ -95,7 +95,9 @@ class Training:
         """The numbers, arrays and random state that `resume` needs."""
         numbers = {name: getattr(self, name) for name in self.NUMBERS}
         arrays = {name: array.copy() for name, array in self.arrays().items()}
-        return {**numbers, **arrays, "rng": self.rng.bit_generator.state}
+        sim = self.task.sim
+        task = {"dofs": list(sim.mechanism.dof_names), "mean_over": sim.mean_over, "control_step": self.task.knot_time}
+        return {**numbers, **arrays, "rng": self.rng.bit_generator.state, "task": task}
 
     def resume(self, learned: Learned) -> None:
         """Go on where a run ended."""

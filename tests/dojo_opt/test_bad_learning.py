@@ -221,6 +221,10 @@ SWAPPED = {
         OTHERS,
     ),
     "run to resume": (lambda: dojo.learn.ars(TASK, epochs=2, **QUICK, resume=_trained(sim=SLIDER)), OTHERS),
+    "run with other velocities": (
+        lambda: dojo.learn.ars(TASK, epochs=2, **QUICK, resume=_trained(sim=SIM.replace(order=4))),
+        "expected velocities over time steps, got those at the nodes",
+    ),
     "run with other control steps": (
         lambda: dojo.learn.ars(TASK, epochs=2, **QUICK, resume=_trained(substeps=2)),
         "expected control steps of 0.05 s, got 0.1 s",
@@ -245,6 +249,8 @@ def test_files_of_policies_know_their_robot(tmp_path):
     assert Learned.load(tmp_path / "run.npz", TASK).policy.task is TASK
     with pytest.raises(ValueError, match=OTHERS):
         Learned.load(tmp_path / "run.npz", other)
+    with pytest.raises(ValueError, match=OTHERS):
+        dojo.learn.ars(other, epochs=2, **QUICK, resume=Learned.load(tmp_path / "run.npz"))
     replace(POLICY, task=None).save(tmp_path / "bare.npz")  # as all files before
     assert LearnedPolicy.load(tmp_path / "bare.npz", other).task is other
 
