@@ -106,11 +106,15 @@ def best_of(
     Raises:
         TypeError: for an argument of the wrong kind.
         ValueError: for a number out of range, or no seed.
+        KeyboardInterrupt: Ctrl-C came before the first run had a policy.
     """
     if "callback" in options or "resume" in options:
         raise TypeError("best_of(...): callback and resume are its own; give them to the algorithm")
     first = max(1, round(checks.fraction("best_of(share=...)", share) * checks.whole_number("best_of(epochs)", epochs)))
+    numbers = list(numbers) if isinstance(numbers, Iterable) else numbers
     begun = seeds(algorithm, task, numbers, executor=executor, epochs=epochs, callback=_StopAt(first), **options)
+    if not begun and numbers:
+        raise KeyboardInterrupt  # before the first run had a policy
     if not begun:
         raise ValueError("best_of(numbers): expected at least one seed")
     chosen = max(begun, key=_earned)

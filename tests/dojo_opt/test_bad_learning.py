@@ -266,3 +266,13 @@ def test_a_policy_acts_as_often_as_its_task_unless_told_otherwise():
         ValueError, match=r"control_step=...\): expected a multiple of the plant's step 0.03 s, got 0.05"
     ):
         dojo.closed_loop(policy.controller, dojo.Plant(SIM.replace(time_step=0.03)), 0.3)
+
+
+def test_ctrl_c_before_the_first_policy_is_no_lack_of_seeds():
+    def algorithm(task, **options):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        dojo.learn.best_of(algorithm, TASK, (1, 2), epochs=3)
+    with pytest.raises(ValueError, match="expected at least one seed"):
+        dojo.learn.best_of(algorithm, TASK, (), epochs=3)
