@@ -7,7 +7,8 @@ relative to the mass m of its body, is at most the cutoff at the gap that the mo
 
 Its impulse is that of its law at the pose and velocity to which this motion leads, and derivatives omit it: the matrix
 of the step lacks at most e (1 + m W^2) of the inertia, W as in inactive.py. A far contact that ends the step nearer
-than half the gap of e = cutoff takes part after all. Contacts on terrain, and those of meshes, are never far.
+than half the gap of e = cutoff takes part after all. Contacts on terrain, those of meshes, and those with torsional or
+rolling friction are never far.
 Derivation: docs/theory/inactive_contacts.md.
 """
 
@@ -31,9 +32,11 @@ _NEAR = 0.5  # share of the gap of e = cutoff below which a far contact takes pa
 
 @kernel
 def far_gap(model: Model, options: StepOptions, c: int) -> float:
-    """Gap at which the contacts of cluster c have e = cutoff, infinite for bodies without mass."""
+    """Gap at which the contacts of cluster c have e = cutoff, infinite for bodies without mass and for contacts with
+    torsional or rolling friction.
+    """
     i, mu = model.contact_body[c], model.cluster[c, Cluster.FRICTION]
-    if not model.body_mass[i] > 0.0:
+    if not model.body_mass[i] > 0.0 or model.cluster[c, Cluster.LENGTH] > 0.0:
         return 1e300
     stiffness = model.cluster[c, Cluster.CONTACTS] * options.kappa * (mu * mu + options.h * (1.0 + mu))
     return sqrt(stiffness / (options.cutoff * model.body_mass[i]))

@@ -33,7 +33,7 @@ from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.dense import clear
 from solvers.rotation import rotate, three
-from solvers.types import Matrix
+from solvers.types import Matrix, Vector
 
 _UNSTEADY = 0.03  # share of the motion in the step before by which the motion of corners in this one may differ
 _STIFFEST = 300.0  # largest e of the inactive corners of a cluster, whose stiffness the matrix does not omit
@@ -143,9 +143,10 @@ def _sort(model: Model, data: Data, options: StepOptions, c: int, a: float) -> f
 @kernel
 def _farther(model: Model, options: StepOptions, c: int) -> bool:
     """Whether more contacts of a cluster at rest are far than `_leave_out` finds, as at all but tiny cutoffs."""
+    least = far_gap(model, options, c)
     if options.cutoff >= COUPLED:
-        return True
-    return far_gap(model, options, c) < 2.0 * _radius(model, options, c, model.cluster[c, Cluster.CONTACTS], COUPLED)
+        return least < 1e300
+    return least < 2.0 * _radius(model, options, c, model.cluster[c, Cluster.CONTACTS], COUPLED)
 
 
 @kernel
@@ -169,10 +170,9 @@ def _leave_out(model: Model, data: Data, options: StepOptions, c: int) -> float:
 def _radius(model: Model, options: StepOptions, c: int, count: float, e: float) -> float:
     """Half gap a at which so many contacts of a cluster, all as near, have this e."""
     p, h = model.cluster[c], options.h
-    mu = p[Cluster.FRICTION]
     n = count * options.kappa / e
-    b = 0.5 * n * h * (1.0 + mu) * p[Cluster.TURNING]
-    return b + sqrt(b * b + n * (mu * mu + h * (1.0 + mu)) * p[Cluster.MOBILITY])
+    b = 0.5 * n * h * (1.0 + p[Cluster.FRICTION]) * p[Cluster.TURNING]
+    return b + sqrt(b * b + n * _mobility(p, h))
 
 
 @kernel
@@ -221,11 +221,17 @@ def _half_gap_ahead(model: Model, data: Data, c: int) -> float:
 
 
 @kernel
+def _mobility(p: Vector, h: float) -> float:
+    """(mu^2 + h (1 + mu)) M of a row of `cluster`, and the same of moments (moments/inactive_moments.py)."""
+    mu = p[Cluster.FRICTION]
+    return (mu * mu + h * (1.0 + mu)) * p[Cluster.MOBILITY] + p[Cluster.SPIN] + h * p[Cluster.SPIN_GROWTH]
+
+
+@kernel
 def _stiffness(model: Model, h: float, c: int, a: float) -> float:
     """e a^2/(n kappa) of a cluster at the gap a, see above."""
     p = model.cluster[c]
-    mu = p[Cluster.FRICTION]
-    return (mu * mu + h * (1.0 + mu)) * p[Cluster.MOBILITY] + h * (1.0 + mu) * p[Cluster.TURNING] * a
+    return _mobility(p, h) + h * (1.0 + p[Cluster.FRICTION]) * p[Cluster.TURNING] * a
 
 
 @optional(Slot.HAS_ACTIVATED, default=False)

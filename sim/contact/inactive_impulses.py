@@ -12,6 +12,7 @@ from sim.contact.contact_law import contact_impulse, start_contact
 from sim.contact.corners import evaluate_corners, gather_corners
 from sim.contact.inactive_bounds import ANGLE, NEARER, bound_changes, keep_motion
 from sim.contact.inactive_terrain import evaluate_on_terrain
+from sim.contact.moments.inactive_moments import evaluate_moments
 from sim.dynamics.displacements import third_quaternion
 from sim.model.data import Data
 from sim.model.model import Law, Model
@@ -48,6 +49,7 @@ def changes(model: Model, data: Data, h: float, c: int) -> tuple[float, float]:
     if dx + arm * turn > NEARER * row[Inactive.LEAST_GAP]:
         return 1e300, 0.0
     law = row[Inactive.BY_GAP] * (dx + arm * turn) + row[Inactive.BY_SLIP] * (dv + arm * (dw + w * turn))
+    law += row[Inactive.BY_RATE] * dw
     return law, row[Inactive.BY_TURN] * turn
 
 
@@ -168,6 +170,7 @@ def _evaluate(model: Model, data: Data, h: float, c: int) -> None:
         Y0, Y1, Y2 = Y0 + fy * p[0], Y1 + fy * p[1], Y2 + fy * p[2]
     row[Inactive.LEAST_GAP] = least
     bound_changes(model, data, c, (1.0 - NEARER) * least)
+    evaluate_moments(model, data, h, c, (1.0 - NEARER) * least)
     _keep_arms(row, (N0, N1, N2), (X0, X1, X2), (Y0, Y1, Y2))
     for k in range(3):
         row[Inactive.FORCE + k] = N * f[k] + X * f[3 + k] + Y * f[6 + k]
@@ -213,6 +216,6 @@ def add_inactive_wrenches(model: Model, data: Data) -> None:
         A[0] -= x
         A[1] -= y
         A[2] -= z
-        A[3] -= tx + row[Inactive.MOMENT]
-        A[4] -= ty + row[Inactive.MOMENT + 1]
-        A[5] -= tz + row[Inactive.MOMENT + 2]
+        A[3] -= tx + row[Inactive.MOMENT] + row[Inactive.TURNING]
+        A[4] -= ty + row[Inactive.MOMENT + 1] + row[Inactive.TURNING + 1]
+        A[5] -= tz + row[Inactive.MOMENT + 2] + row[Inactive.TURNING + 2]

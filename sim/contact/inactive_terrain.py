@@ -7,6 +7,7 @@ from math import sqrt
 from sim.contact.contact_law import contact_impulse, start_contact
 from sim.contact.ground_contact import contact_kinematics
 from sim.contact.inactive_bounds import NEARER, bound_changes, keep_motion
+from sim.contact.moments.inactive_moments import evaluate_moments
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.record_columns import Cluster, Grid, Inactive, Kin
@@ -37,6 +38,7 @@ def evaluate_on_terrain(model: Model, data: Data, h: float, c: int) -> None:
     row[Inactive.LEAST_GAP] = max(k[Kin.GAP] / p[Grid.SLOPE], row[Inactive.ACTIVATION])
     least = (1.0 - NEARER) * row[Inactive.LEAST_GAP]
     bound_changes(model, data, c, least)
+    evaluate_moments(model, data, h, c, least)
     mu = model.contact_friction[c]
     force = data.carry.inactive_kappa[0] / least * (1.0 + mu)
     speed = sqrt(k[Kin.SLIP1] * k[Kin.SLIP1] + k[Kin.SLIP2] * k[Kin.SLIP2])
@@ -48,4 +50,6 @@ def evaluate_on_terrain(model: Model, data: Data, h: float, c: int) -> None:
     arm = 1.0 + abs(data.pos2[i, 0] - data.origin[0]) + abs(data.pos2[i, 1] - data.origin[1])
     arm += abs(data.pos2[i, 2] - data.origin[2]) + model.cluster[c, Cluster.ARM] + model.contact_radius[c]
     row[Inactive.BY_GAP] += 2.0 * curvature * arm * force
+    moment = model.cluster[c, Cluster.LENGTH] * data.carry.inactive_kappa[0] / least
+    row[Inactive.BY_GAP] += 2.0 * curvature * (moment + row[Inactive.BY_RATE] * turning)
     row[Inactive.BY_TURN] = 2.0 * model.cluster[c, Cluster.ARM] * force

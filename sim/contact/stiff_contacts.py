@@ -5,6 +5,7 @@ from __future__ import annotations
 from sim.contact.contact_law import condense_contact
 from sim.contact.ground_contact import contact_jacobian, contact_kinematics
 from sim.contact.inactive import enlist_all
+from sim.contact.moments.inactive_moments import place_moment
 from sim.contact.pairs.inactive_pairs import enlist_pairs
 from sim.model.data import Data
 from sim.model.model import Model
@@ -29,6 +30,7 @@ def all_stiff(model: Model, data: Data, h: float) -> None:
                 if data.contact_out[k] == 1:
                     data.contact_out[k] = 0
                     contact_kinematics(model, data, h, k)
+                    place_moment(model, data, h, k, data.carry.inactive_kappa[0])
     if found:
         enlist_all(model, data)
         enlist_pairs(model, data)

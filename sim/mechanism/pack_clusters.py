@@ -39,10 +39,13 @@ def pack_clusters(model: Model) -> None:
         several = float(np.count_nonzero(model.contact_body[:count] == body))
         others = radii.any() or model.contact_terrain[first] or np.any(model.contact_law[first:end] == _LINEAR)
         corners = end - first > MANY and not others
-        if len(model.moment_friction) and model.moment_friction[first:end].any():
-            mobility = turn = several = np.inf  # always active: inactive contacts have no moments
-            corners = False
-        model.cluster[first] = *center, around, arm, mobility, friction, turn, several, corners
+        lengths = model.moment_friction[first:end].max(axis=0) if len(model.moment_friction) else np.zeros(2)
+        moments = (0.0, 0.0, 0.0)
+        if lengths.any():
+            corners = False  # the sums of corners have no moments
+            total, largest = float(lengths.sum()), float(lengths.max())
+            moments = total, largest**2 * turning, total * (mobility * turning) ** 0.5
+        model.cluster[first] = *center, around, arm, mobility, friction, turn, several, corners, *moments
 
 
 def _swings(inertia: Floats, points: Floats) -> Floats:

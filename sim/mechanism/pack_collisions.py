@@ -47,7 +47,7 @@ def _pack_far(found: Sequence[ContactCandidate], model: Model) -> None:
     degree = Counter(i for j in firsts for i in found[j].bodies)
     for j, end in zip(firsts, [*firsts[1:], len(found)], strict=True):
         candidate = found[j]
-        arms, mobility, turning = [0.0, 0.0], 0.0, 0.0
+        arms, mobility, turning, spinning = [0.0, 0.0], 0.0, 0.0, 0.0
         for side, i in enumerate(candidate.bodies):
             if i < 0:
                 continue
@@ -57,11 +57,15 @@ def _pack_far(found: Sequence[ContactCandidate], model: Model) -> None:
             arms[side] = arm
             mobility += 1.0 / model.body_mass[i] + arm**2 / least if free else np.inf
             turning += arm / least if free else np.inf
+            spinning += 1.0 / least if free else np.inf
             model.body_reach[i] = max(model.body_reach[i], arm)
         most: float = max(degree[i] for i in candidate.bodies if i >= 0)
-        if any(candidate.moment_friction):
-            most = np.inf  # always active within its reach: inactive_pairs.py has no moments
-        model.pair_bound[j] = sum(candidate.radii), *arms, mobility, turning, most, end - j, candidate.reach
+        lengths, moments = candidate.moment_friction, (0.0, 0.0, 0.0, 0.0)
+        if any(lengths):
+            growth = sum(lengths) * (mobility * spinning) ** 0.5
+            moments = sum(lengths), max(lengths) ** 2 * spinning, growth, sum(lengths) * spinning
+        near = sum(candidate.radii), *arms, mobility, turning, most, end - j, candidate.reach
+        model.pair_bound[j] = *near, *moments
 
 
 def tables_of(found: Sequence[ContactCandidate]) -> list[Floats]:

@@ -108,7 +108,7 @@ class Data(NamedTuple):
     feature_choice: Integers  # (1,) FeatureChoice: when active features of shapes are chosen
     strategy_solves: Integers  # (64,) solutions by start strategy (solve/globalization.py) since the Data was made
     overlap_allowed: Integers  # (1,) 1 where a small overlap in other features is accepted
-    inactive: Matrix  # (nground, 41) Inactive, see contact/inactive.py
+    inactive: Matrix  # (nground, 45) Inactive, see contact/inactive.py
     corners: Matrix  # (10, nground + 8) Corner, see contact/corners.py
     near_corners: Matrix  # (6, nground + 8) scratch: columns of these, up to Corner.OUT
     corner_sums: Matrix  # (36, 8) scratch: the law of a cluster of corners, in the frame of its contacts

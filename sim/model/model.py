@@ -104,10 +104,10 @@ class Model(NamedTuple):
     terrain_place: Matrix  # (nterrain, 8) Grid, see contact/height_field.py
     terrain_heights: Vector  # (nheight,) coefficients of all terrains [m]
     terrain_rates: Vector  # (nheight,) their derivatives by the radius of the contacts
-    cluster: Matrix  # (nground, 10) in the row of the first contact of a cluster: Cluster
+    cluster: Matrix  # (nground, 13) in the row of the first contact of a cluster: Cluster
     pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
     pair_least: Vector  # (npair,) the smallest of the sizes of both shapes [m]; 1e300 for corners on a half-space
-    pair_bound: Matrix  # (npair, 8) at the first pair of a collision, whether it is active: PairBound
+    pair_bound: Matrix  # (npair, 12) at the first pair of a collision, whether it is active: PairBound
     hull: Matrix  # (nhull, 4) tables of the polytopes that collide (collision/polytope_table.py)
     body_reach: Vector  # (nbody,) largest distance of the shapes that collide from the centre of mass [m]
     pair_place: Matrix  # (2 npair, 12) centre and rotation of the shapes of a and of b in their bodies

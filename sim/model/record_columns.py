@@ -142,6 +142,8 @@ class Inactive(Code):
     CORNERS = 38  # 1 where its law is in the matrix (contact/corners.py)
     SHARE = 39  # `indefinite` of the law in corner_law; -1 where that has not been evaluated
     DRIFT = 40  # bound of the relative change of that law since it was evaluated
+    TURNING = 41  # (3,) sum of the moments of torsional and rolling friction
+    BY_RATE = 44  # bound of d(wrench about O) per angular velocity
 
 
 class Corner(Code):
@@ -175,6 +177,9 @@ class Cluster(Code):
     TURNING = 7  # T
     CONTACTS = 8  # those of its body
     CORNERS = 9  # 1 for many points on a plane, as of a mesh (contact/corners.py)
+    LENGTH = 10  # largest torsional and largest rolling friction, the sum [m]; 0 where there is none, and so are
+    SPIN = 11  # their largest^2 N of moments/inactive_moments.py, and
+    SPIN_GROWTH = 12  # LENGTH sqrt(M N)
 
 
 class Bounce(Code):
@@ -262,6 +267,10 @@ class PairBound(Code):
     COLLISIONS = 5  # that one of its bodies has
     POINTS = 6
     REACH = 7  # gap from which there is no force, infinite for most
+    LENGTH = 8  # torsional and rolling friction, the sum [m]
+    SPIN = 9  # as in Cluster
+    SPIN_GROWTH = 10
+    SPIN_TURNING = 11  # LENGTH N
 
 
 class PairFade(Code):

@@ -260,6 +260,10 @@ class Slot(Code):
     MOMENT_BY_GAP = 210
     ADD_IMPACT_MOMENT = 211
     MOMENT_WORK = 212
+    PLACE_MOMENT = 216
+    ADD_INACTIVE_MOMENT = 217
+    EVALUATE_MOMENTS = 218
+    MOMENT_SLOPE = 219
     # derivatives by parameters
     FILL_COLUMNS = 213
     # sub-steps of steps with an accuracy

@@ -55,6 +55,7 @@ from sim.contact.moments.contact_moments import (
     resume_moments,
     start_moments,
 )
+from sim.contact.moments.inactive_moments import add_inactive_moment, evaluate_moments, moment_slope, place_moment
 from sim.contact.pairs.active_features import choose_pairs, choose_shapes, open_pairs, overlapping
 from sim.contact.pairs.clearance import measure_pairs, omitted_pairs, pairs_reached
 from sim.contact.pairs.cylinder_pairs import (
@@ -287,6 +288,10 @@ _MOMENTS = (
     moment_constants,
     recover_moments,
     report_moments,
+    place_moment,
+    add_inactive_moment,
+    evaluate_moments,
+    moment_slope,
 )
 _TERRAIN = (
     place_on_terrain,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.contact.pairs.inactive_pairs import COUPLED, STEEPEST
+from sim.contact.pairs.inactive_pairs import COUPLED
+from sim.contact.pairs.limited_reach import STEEPEST
 from sim.mechanism.pack_clusters import STIFFNESS
 from sim.model.model import Model
 from sim.model.record_columns import Cluster, PairBound
@@ -17,23 +18,28 @@ def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDA
     Twice the positive root a of the bound in inactive.py, and of that in pairs/inactive_pairs.py for collisions:
 
     1000 tolerance a^2 = n kappa ((mu^2 + h (1 + mu)) M + h (1 + mu) T a)
+
+    and the terms of moments/inactive_moments.py.
     """
     out, ground = np.zeros(len(model.contact_body)), len(model.contact_height)
     for first in np.flatnonzero(model.cluster_end):
         mobility, mu, turn = model.cluster[first, [Cluster.MOBILITY, Cluster.FRICTION, Cluster.TURNING]]
+        spin, growth = model.cluster[first, [Cluster.SPIN, Cluster.SPIN_GROWTH]]
         scale = ground * kappa / (STIFFNESS * tolerance)
-        b, c = scale * time_step * (1.0 + mu) * turn, scale * (mu * mu + time_step * (1.0 + mu)) * mobility
+        b = scale * time_step * (1.0 + mu) * turn
+        c = scale * ((mu * mu + time_step * (1.0 + mu)) * mobility + spin + time_step * growth)
         out[first : model.cluster_end[first]] = b + np.sqrt(b * b + 4.0 * c)
     for j in np.flatnonzero(model.pair_feature == 0):
         bound = model.pair_bound[j]
         points, limit = int(bound[PairBound.POINTS]), bound[PairBound.REACH]
-        # a string, whose gap has no ball around it, and friction against turning: always active
-        if not np.isfinite(bound[[PairBound.MOBILITY, PairBound.COLLISIONS]]).all():
+        if not np.isfinite(bound[PairBound.MOBILITY]):  # a string, whose gap has no ball around it: always active
             out[ground + j : ground + j + points] = limit
             continue
         mu, scale = model.contact_friction[ground + j], points * bound[PairBound.COLLISIONS] * kappa / COUPLED
         b = scale * time_step * (1.0 + mu) * (bound[PairBound.TURNING] + bound[PairBound.MOBILITY] * STEEPEST / limit)
+        b += scale * time_step * (bound[PairBound.SPIN_TURNING] + bound[PairBound.SPIN_GROWTH] * STEEPEST / limit)
         c = scale * (mu * mu + time_step * (1.0 + mu)) * bound[PairBound.MOBILITY]
+        c += scale * (bound[PairBound.SPIN] + 2.0 * time_step * bound[PairBound.SPIN_GROWTH])
         out[ground + j : ground + j + points] = min(b + np.sqrt(b * b + 4.0 * c), limit)
     return out
 
@@ -47,7 +53,8 @@ def far_reach(model: Model, time_step: float, kappa: float, cutoff: float) -> ND
     for first in np.flatnonzero(model.cluster_end):
         mass = model.body_mass[model.contact_body[first]]
         mu, count = model.cluster[first, [Cluster.FRICTION, Cluster.CONTACTS]]
-        if model.contact_terrain[first] == 0 and model.contact_hold[first] == 0 and mass > 0.0:
+        plain = model.contact_terrain[first] == 0 and model.cluster[first, Cluster.LENGTH] == 0.0
+        if plain and model.contact_hold[first] == 0 and mass > 0.0:
             stiffness = count * kappa * (mu * mu + time_step * (1.0 + mu))
             out[first : model.cluster_end[first]] = np.sqrt(stiffness / (cutoff * mass))
     return out

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from sim.model.record_columns import Cluster, PairBound
 
 R, M, G = 0.1, 1.0, 9.81
 J = 0.4 * M * R * R
@@ -31,15 +32,15 @@ def state(velocity: Any = (0.0, 0.0, 0.0), spin: Any = (0.0, 0.0, 0.0), at: Any 
 
 
 def two_bodies(
-    shape: Any, thrown: Any = BALL, *, kappa: float = 1e-4, restitution: float = 0.0
+    shape: Any, thrown: Any = BALL, *, kappa: float = 1e-4, scale: float = 1.0, **collision: Any
 ) -> tuple[dojo.Simulator, np.ndarray]:
     """A ball that is thrown onto another body, without gravity; and the state where they touch."""
     bodies = [
         dojo.Body("a", 1.0, np.eye(3) * J, shape=thrown),
         dojo.Body("b", 2.0, (0.01, 0.012, 0.015), shape),
     ]
-    lengths = {"torsional_friction": TORSIONAL, "rolling_friction": ROLLING}
-    rub = dojo.Collision("a", "b", restitution=restitution, **lengths)
+    lengths = {"torsional_friction": scale * TORSIONAL, "rolling_friction": scale * ROLLING}
+    rub = dojo.Collision("a", "b", **lengths, **collision)
     joints = [dojo.Joint("floating", None, name) for name in "ab"]
     mech = dojo.Mechanism(bodies, joints, collisions=[rub], gravity=(0.0, 0.0, 0.0))
     q = [0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
@@ -213,6 +214,57 @@ def test_condim_4_and_6_of_mjcf_files_are_read() -> None:
     assert lengths == {"a": (0.02, 0.0), "b": (0.01, 0.002), "a-b": (0.03, 0.004)}
     with pytest.warns(dojo.MjcfWarning, match="torsional and rolling friction is omitted"):
         assert not dojo.load_mjcf(SCENE).contacts[0].torsional_friction
+
+
+# -- inactive contacts -------------------------------------------------------------------------------------------------
+
+
+def tilted() -> tuple[dojo.Simulator, np.ndarray]:
+    """A rod that spins on one of its two feet."""
+    feet = [dojo.Contact("rod", (s, 0, 0), torsional_friction=0.3, rolling_friction=0.1) for s in (-0.5, 0.5)]
+    mech = dojo.Mechanism([dojo.Body("rod", M, (0.1, 0.1, 0.1))], [dojo.Joint("floating", None, "rod")], feet)
+    turned = [np.cos(0.5), 0.0, -np.sin(0.5), 0.0]
+    x = np.array([0, 0, 0.5 * np.sin(1.0) + 1e-3, *turned, 0, 0, 0, 0.5, 0.3, 5.0])
+    return dojo.Simulator(mech, time_step=0.01, kappa=1e-5, tolerance=1e-9), x
+
+
+def apart(**collision: Any) -> tuple[dojo.Simulator, np.ndarray]:
+    sim, x = two_bodies(BALL, scale=100.0, **collision)
+    x[2], x[16] = 6.0, 0.0
+    return sim, x
+
+
+FAR = {
+    "above": lambda: (ball(1.0, 0.5, kappa=1e-6), state((1.0, 0.0, 0.0), (5.0, 3.0, -9.0), (0.0, 0.0, 12.0))),
+    "above a hill": lambda: (
+        ball(1.0, 0.5, kappa=1e-6, terrain=HILL),
+        state((1.0, 0.0, 0.0), (20.0, 9.0, -40.0), (0.4, 0.5, 45.0)),
+    ),
+    "apart": apart,
+    "apart, within a reach": lambda: apart(reach=8.0),
+    "one foot up": tilted,
+}
+
+
+@pytest.mark.parametrize("scene", FAR.values(), ids=FAR)
+@pytest.mark.parametrize("cutoff", [0.0, 0.1])
+def test_far_contacts_have_their_moments_without_being_solved_for(scene: Any, cutoff: float) -> None:
+    """States, moments and derivatives are those with all contacts active; none of them is far beyond a cutoff."""
+    sim, x = scene()
+    sim = sim.replace(tolerance=1e-9, cutoff=cutoff)
+    every = sim.replace()
+    every.model.cluster[:, Cluster.MOBILITY] = np.inf
+    every.model.pair_bound[:, PairBound.MOBILITY] = np.inf
+    us = np.zeros((8, 0))
+    t, expected = sim.rollout(x, us, throw=True), every.rollout(x, us, throw=True)
+    active = [int(s._engine.last().active_count[0]) for s in (sim, every)]
+    assert active[0] < active[1]
+    moments = expected.contacts.moment_impulse
+    assert np.abs(moments).max(axis=(0, 2)).min() > 1e-8
+    np.testing.assert_allclose(t.contacts.moment_impulse, moments, rtol=0, atol=3e-9)
+    np.testing.assert_allclose(t.x, expected.x, rtol=0, atol=1e-6)
+    A, B = sim.linearize(x).A, every.linearize(x).A
+    np.testing.assert_allclose(A, B, rtol=0, atol=2e-6 * np.abs(B).max())
 
 
 # -- impacts -----------------------------------------------------------------------------------------------------------

@@ -1,7 +1,6 @@
 """Friction against spinning and rolling of all active contacts: one kernel per operation of the interior point.
 
-Every kernel is optional: scenes without torsional or rolling friction compile none of them. Contacts that have it are
-always active (contact/inactive.py).
+Every kernel is optional: scenes without torsional or rolling friction compile none of them.
 """
 
 from __future__ import annotations
@@ -34,6 +33,7 @@ from sim.contact.moments.moment_rates import (
     turned_row,
     world_moment,
 )
+from sim.contact.pairs.limited_reach import end_of
 from sim.contact.pairs.pair_jacobian import pair_rate
 from sim.model.data import Data
 from sim.model.model import Model
@@ -273,10 +273,24 @@ def add_moment_couplings(model: Model, data: Data, h: float) -> None:
 
 @optional(Slot.REPORT_MOMENTS)
 def report_moments(model: Model, data: Data, out: Matrix) -> None:
-    """Moments of the active contacts in their rows, world axes."""
+    """Moments of contacts in their rows, world axes: active, and inactive ones of clusters and collisions."""
     for m in range(data.active_count[0]):
-        c = data.active[m]
-        if has_moment(model, c) and is_felt(model, data, c):
-            x = world_moment(model, data, c, moment_of(data, c))
-            for k in range(3):
-                out[c, ContactRow.MOMENT + k] = x[k]
+        _report(model, data, data.active[m], out)
+    for m in range(data.inactive_count[0]):
+        first = data.inactive_first[m]
+        for c in range(first, model.cluster_end[first]):
+            if data.contact_out[c] == 1:
+                _report(model, data, c, out)
+    for m in range(data.near_collision_count[0]):
+        first = data.near_collisions[m]
+        if data.pair_activation[first] > 0.0:
+            for j in range(first, end_of(model, first)):
+                _report(model, data, model.contact_height.shape[0] + j, out)
+
+
+@kernel
+def _report(model: Model, data: Data, c: int, out: Matrix) -> None:
+    if has_moment(model, c) and is_felt(model, data, c):
+        x = world_moment(model, data, c, moment_of(data, c))
+        for k in range(3):
+            out[c, ContactRow.MOMENT + k] = x[k]

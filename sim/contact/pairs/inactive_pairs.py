@@ -23,10 +23,12 @@ from sim.contact.collision.collide import apart_at_least
 from sim.contact.collision.edge_axes import OPEN
 from sim.contact.contact_law import contact_impulse, start_contact
 from sim.contact.inactive_bounds import ANGLE
+from sim.contact.moments.inactive_moments import add_inactive_moment, moment_slope, place_moment
 from sim.contact.pairs.active_features import choose_shapes, distance, open_pairs
 from sim.contact.pairs.cylinder_pairs import cylinder_apart, on_cylinder
 from sim.contact.pairs.limited_reach import (
     FAR,
+    STEEPEST,
     end_of,
     enlist_near,
     follow_step,
@@ -48,7 +50,6 @@ from sim.model.record_columns import PairBound, RelativePose, Witness
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 
-STEEPEST = 3.75  # reaches times the largest rate of the part that acts (limited_reach.py)
 COUPLED = 1e-2  # largest sum of e over the inactive collisions of a body
 
 
@@ -141,12 +142,13 @@ def _far_enough(model: Model, options: StepOptions, j: int, a: float) -> float:
     f = model.pair_bound[j]
     if 2.0 * a >= f[PairBound.REACH]:
         return f[PairBound.REACH]
-    mu = model.contact_friction[model.contact_height.shape[0] + j]
-    h = options.h
+    mu, h = model.contact_friction[model.contact_height.shape[0] + j], options.h
     if not a > 0.0:
         return 0.0
     e = (mu * mu + h * (1.0 + mu)) * f[PairBound.MOBILITY] / a + h * (1.0 + mu) * f[PairBound.TURNING]
     e += h * (1.0 + mu) * f[PairBound.MOBILITY] * STEEPEST / f[PairBound.REACH]
+    e += (f[PairBound.SPIN] + 2.0 * h * f[PairBound.SPIN_GROWTH]) / a + h * f[PairBound.SPIN_TURNING]
+    e += h * f[PairBound.SPIN_GROWTH] * STEEPEST / f[PairBound.REACH]
     return a if f[PairBound.POINTS] * f[PairBound.COLLISIONS] * options.kappa * e <= COUPLED * a else 0.0
 
 
@@ -163,7 +165,8 @@ def _change(model: Model, data: Data, options: StepOptions, j: int, a: float) ->
             for k in range(3):
                 lever += abs(data.pos2[i, k] - data.origin[k])
     push = f[PairBound.POINTS] * options.kappa / a
-    return 2.0 * lever * push * (1.0 + (1.0 + mu + 2.0 * mu * mu / options.h) / a + STEEPEST / f[PairBound.REACH])
+    change = 2.0 * lever * push * (1.0 + (1.0 + mu + 2.0 * mu * mu / options.h) / a + STEEPEST / f[PairBound.REACH])
+    return change + push * moment_slope(model, data, options.h, j, a)
 
 
 @optional(Slot.INACTIVE_PAIR_IMPULSES, seldom=True)
@@ -197,6 +200,7 @@ def _place_inactive(model: Model, data: Data, h: float, j: int, kappa: float) ->
     for m in range(j, end_of(model, j)):
         point_kinematics(model, data, h, m)
         start_contact(model, data, model.contact_height.shape[0] + m, kappa, data.pair_activation[j])
+        place_moment(model, data, h, model.contact_height.shape[0] + m, kappa)
 
 
 @kernel
@@ -205,6 +209,7 @@ def _apply_inactive(model: Model, data: Data, j: int) -> None:
     if acts(data, j):
         n, t1, t2 = contact_impulse(model, data, model.contact_height.shape[0] + j)
         add_pair_wrench(model, data, j, n, t1, t2, data.inactive_wrench)
+        add_inactive_moment(model, data, model.contact_height.shape[0] + j, data.inactive_wrench)
 
 
 @kernel

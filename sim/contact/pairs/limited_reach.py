@@ -29,6 +29,7 @@ from solvers.rotation import Vec3, rotate
 
 BEYOND = 2e9  # gap in the row of the first pair where it is beyond its reach, see pair_report.py
 FAR = -1.0  # pair_activation of a collision beyond its reach
+STEEPEST = 3.75  # reaches times the largest rate of the part that acts
 _APART = 2.0  # reaches from where on no gap is within one, but for polytopes
 _HALF_ANGLE = 3.2  # an angle is at most so many times the sine of its half
 
