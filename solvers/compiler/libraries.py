@@ -257,11 +257,12 @@ class EntryLibrary(JITCodeLibrary):
 
 class OptionalLibrary(EntryLibrary):
     """An optional kernel: its loops run over a few joints, axes or contacts. Vectors of several rounds of a loop make
-    them slower, by up to a tenth, and take a tenth of a cold start; kernels that need vectors have lanes.py.
+    them slower, by up to a tenth, and take a tenth of a cold start; those of neighbouring numbers gain nothing, and
+    take a fiftieth. Kernels that need vectors have lanes.py.
     """
 
     def _optimize(self) -> None:
-        passes, builder = self._codegen._module_pass_manager(loop_vectorize=False)
+        passes, builder = self._codegen._module_pass_manager(loop_vectorize=False, slp_vectorize=False)
         passes.run(self._final_module, builder)
 
 
@@ -271,8 +272,8 @@ class RolledLibrary(EntryLibrary):
     """
 
     def _optimize(self) -> None:
-        tuning = llvm.create_pipeline_tuning_options(speed_level=3)
-        tuning.loop_vectorization, tuning.slp_vectorization, tuning.loop_unrolling = False, True, False
+        tuning = llvm.create_pipeline_tuning_options(speed_level=2)
+        tuning.loop_vectorization, tuning.slp_vectorization, tuning.loop_unrolling = False, False, False
         builder = llvm.create_pass_builder(self._codegen._tm, tuning)
         builder.getModulePassManager().run(self._final_module, builder)
 

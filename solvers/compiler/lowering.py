@@ -22,13 +22,14 @@ from numba import types
 from numba.core import cgutils, ir
 from numba.core.analysis import compute_cfg_from_blocks, must_use_alloca
 from numba.core.compiler_machinery import register_pass
+from numba.core.errors import NumbaError
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
 from solvers.compiler.arithmetic import ARITHMETIC, choice
 from solvers.compiler.array_words import DATA, SHAPE, STRIDES, WORD, ArrayWords
 from solvers.compiler.operators import OPERATORS
-from solvers.compiler.ranges import RANGE, RangeIterator, RangeRound, RangeValue
+from solvers.compiler.ranges import RANGE, Loop, RangeIterator, RangeRound, RangeValue
 from solvers.compiler.records import RecordType, field_words
 
 __all__ = ["KernelLowering"]
@@ -53,11 +54,14 @@ def _variables_read(statement: Any) -> list[str]:
 class _Lower(Lower):
     """Numba's lowering with the changes above, for functions without reference counts."""
 
+    _disable_sroa_like_opt = False  # Numba looks for debug information, which kernels have on its own pipeline only
+
     def init(self) -> None:
         """Before anything is lowered."""
         super().init()
         self._items: dict[Any, list[Any]] = {}  # of tuples, by their values
         self._refusals: dict[str, Any] = {}  # blocks that end the kernel, by their messages
+        self._accesses: dict[tuple[str, str], Any] = {}  # what `_mark` writes, by type and field
 
     def _find_singly_assigned_variable(self) -> None:
         """Variables that need no place in memory: assigned once, where all that use them come by after that."""
@@ -112,10 +116,25 @@ class _Lower(Lower):
         else:
             self.builder.store(self._as_value(value, kind), self.getvar(name))
 
+    def lower_block(self, block: Any) -> None:
+        """The statements of a block; an error names its own."""
+        self.pre_block(block)
+        statement = None
+        try:
+            for statement in block.body:
+                self.loc = statement.loc
+                self.lower_inst(statement)
+        except NumbaError as error:
+            error.add_context(f'lowering "{statement}" at {self.loc}')
+            raise
+        self.post_block(block)
+
     def lower_inst(self, inst: Any) -> None:
         """One statement."""
         if isinstance(inst, ir.Assign):
             self.storevar(self.lower_assign(self.typeof(inst.target.name), inst), inst.target.name)
+        elif isinstance(inst, ir.Jump) and (head := self.blkmap[inst.target]).instructions:  # written before: a loop
+            self.builder.branch(head).set_metadata("llvm.loop", Loop.of(self.builder.module))
         elif not (isinstance(inst, ir.SetItem | ir.StaticSetItem) and self._write(inst)):
             super().lower_inst(inst)
 
@@ -318,12 +337,14 @@ class _Lower(Lower):
 
     def _mark(self, access: Any, name: str, kind: Any) -> None:
         """Mark a read or a write of a number: it can meet those of its type, of the same field where that is known."""
-        module = self.builder.module
-        root = module.add_metadata([MetaDataString(module, "dojo_opt")])
-        node = module.add_metadata([MetaDataString(module, str(kind)), root, WORD(0)])
-        if home := self._home(name):
-            node = module.add_metadata([MetaDataString(module, home), node, WORD(0)])
-        access.set_metadata("tbaa", module.add_metadata([node, node, WORD(0)]))
+        found = str(kind), self._home(name)
+        if found not in self._accesses:
+            module = self.builder.module
+            node = module.add_metadata([MetaDataString(module, "dojo_opt")])
+            for part in filter(None, found):
+                node = module.add_metadata([MetaDataString(module, part), node, WORD(0)])
+            self._accesses[found] = module.add_metadata([node, node, WORD(0)])
+        access.set_metadata("tbaa", self._accesses[found])
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)

@@ -3,6 +3,10 @@
 For `for i in range(n)` Numba writes some sixty instructions, in nine blocks. Most of them find out the sign of the
 step, and whether it is zero. A step that is written as a number needs about ten, in the blocks of the loop itself. The
 optimiser turns both into the same code, but reading and cleaning the longer one was a twentieth of a cold start.
+
+The optimiser also writes four or eight rounds of a loop side by side where it does not know their number, with a second
+loop for the rest. Loops of kernels run over a few joints, axes or contacts: the further code is seldom used, and took a
+twentieth of a cold start. `Loop` forbids that; loops of a known number of rounds are written out as before.
 """
 
 from __future__ import annotations
@@ -10,15 +14,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from llvmlite.ir import Constant
+from llvmlite.ir import Constant, MetaDataString, Module
+from llvmlite.ir.values import MDValue
 from numba import types
 from numba.core import cgutils
 
 from solvers.compiler.array_words import WORD
 
-__all__ = ["RANGE", "RangeIterator", "RangeValue", "RangeRound"]
+__all__ = ["RANGE", "Loop", "RangeIterator", "RangeValue", "RangeRound"]
 
 RANGE = types.range_state64_type
+
+
+class Loop(MDValue):  # type: ignore[misc]
+    """A loop that is not written out where its number of rounds is unknown: LLVM's `llvm.loop`, one node for each."""
+
+    @classmethod
+    def of(cls, module: Module) -> Loop:
+        """The node of one more loop of a module."""
+        rolled = module.add_metadata([MetaDataString(module, "llvm.loop.unroll.runtime.disable")])
+        return cls(module, [rolled], str(len(module.metadata)))
+
+    def descr(self, buf: list[str]) -> None:
+        """Write it; the first operand of such a node is itself."""
+        references = ", ".join(node.get_reference() for node in (self, *self.operands))
+        buf += (f"distinct !{{ {references} }}", "\n")
 
 
 class RangeValue(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -254,3 +254,15 @@ def test_a_loop_over_a_range_takes_few_instructions_before_it_is_optimized():
     blocks = [[*block.instructions] for f in module.functions for block in f.blocks]
     assert sum(map(len, blocks)) <= 25
     assert not any(i.opcode in ("srem", "sdiv") for block in blocks for i in block)
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="looks at compiled code")
+@pytest.mark.skipif(os.environ.get("DOJO_OPT_PLAIN_NUMBA", "0") not in ("", "0"), reason="Numba writes four rounds")
+@pytest.mark.parametrize(("rounds", "written"), [("a.shape[0]", 1), ("3", 3)])
+def test_rounds_of_a_loop_are_written_side_by_side_only_where_their_number_is_known(rounds: str, written: int):
+    names: dict[str, Any] = {}
+    exec(f"def product(a):\n    x = a[0]\n    for i in range({rounds}):\n        x *= a[i]\n    return x", names)
+    compiled = local_kernel(names["product"]).entry
+    assert compiled(np.array([2.0, 3.0, 4.0])) == 48.0
+    (text,) = compiled.inspect_llvm().values()
+    assert text.count(" fmul ") == written
