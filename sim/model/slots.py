@@ -270,3 +270,8 @@ class Slot(Code):
     ATTEMPT = 214
     # states from momenta
     MEET_MOMENTUM = 215
+    # pairs of shapes: in the other order, and their elements beside those of the beginning of a step
+    EXCHANGE_SHAPES = 220
+    SUBSTITUTE_ELEMENTS = 221
+    REMEMBER_ELEMENTS = 222
+    KEEP_ELEMENTS = 223

@@ -29,6 +29,7 @@ from sim.contact.active_contacts import (
     start_contacts,
 )
 from sim.contact.collision.pair_kernels import KERNELS
+from sim.contact.collision.swapped_shapes import exchange_shapes
 from sim.contact.contact_law import slip_noise
 from sim.contact.contact_report import report_ground, worst_contact
 from sim.contact.corner_laws import add_corner_laws, add_corner_slips
@@ -56,7 +57,14 @@ from sim.contact.moments.contact_moments import (
     start_moments,
 )
 from sim.contact.moments.inactive_moments import add_inactive_moment, evaluate_moments, moment_slope, place_moment
-from sim.contact.pairs.active_features import choose_pairs, choose_shapes, open_pairs, overlapping
+from sim.contact.pairs.active_features import (
+    choose_pairs,
+    choose_shapes,
+    keep_elements,
+    open_pairs,
+    overlapping,
+    substitute_elements,
+)
 from sim.contact.pairs.clearance import measure_pairs, omitted_pairs, pairs_reached
 from sim.contact.pairs.cylinder_pairs import (
     choose_cylinders,
@@ -77,6 +85,7 @@ from sim.contact.pairs.pair_energy import pair_slack, pairs_gained
 from sim.contact.pairs.pair_jacobian import pair_rate
 from sim.contact.pairs.pair_report import pairs_finite, report_pairs
 from sim.contact.pairs.pair_stiffness import apply_pairs, condense_pairs, pair_constants
+from sim.contact.pairs.previous_features import remember
 from sim.contact.pairs.taut_string import is_taut, pull_from_before, string_arm
 from sim.contact.pairs.taut_string_stiffness import add_string_stiffness, add_string_turn
 from sim.contact.pyramid import (
@@ -257,6 +266,7 @@ _PAIRS = (
     pairs_gained,
     pair_slack,
 )
+_CHOICES = (overlapping, substitute_elements, remember, keep_elements)
 _CYLINDERS = (
     cylinder_distance,
     cylinder_apart,
@@ -351,6 +361,8 @@ def link_momentum(model: Model) -> None:
 
 def link_pairs(model: Model) -> None:
     """Link the kernels of each kind of pair of shapes."""
+    if np.any(model.pair_kind >= SWAPPED):
+        link(model.optional, exchange_shapes)
     for kind in np.unique(model.pair_kind % SWAPPED):
         link(model.optional, *KERNELS.get(Pair(kind), ()))  # those of cylinders have kernels for all points at once
 
@@ -410,7 +422,7 @@ def link_terms(model: Model) -> None:
         link(model.optional, *_PAIRS)
         link_pairs(model)
     if np.any(np.isin(model.pair_kind % SWAPPED, CHOSEN)):
-        link(model.optional, overlapping)
+        link(model.optional, *_CHOICES)
     if np.any(model.pair_kind % SWAPPED >= int(Pair.POLYTOPE_CYLINDER)):
         link(model.optional, *_CYLINDERS)
     if _has_strings(model):

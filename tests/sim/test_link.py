@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from sim.model.shape_kinds import SWAPPED
 from sim.model.slots import Slot
 
 GROUND = (
@@ -59,8 +60,22 @@ def test_a_scene_without_pairs_links_none_of_their_kernels() -> None:
 
 
 def test_shapes_of_one_contact_link_no_choice_of_elements() -> None:
-    assert Slot.OVERLAPPING not in linked(dojo.Sphere(0.1), ground=False)
-    assert Slot.OVERLAPPING in linked(dojo.Box(0.1, 0.1, 0.1), ground=False)
+    choices = {Slot.OVERLAPPING, Slot.SUBSTITUTE_ELEMENTS, Slot.REMEMBER_ELEMENTS, Slot.KEEP_ELEMENTS}
+    assert not choices & set(linked(dojo.Sphere(0.1), ground=False))
+    assert choices <= set(linked(dojo.Box(0.1, 0.1, 0.1), ground=False))
+
+
+@pytest.mark.parametrize(
+    "shapes", [(dojo.Sphere(0.1), dojo.Capsule(0.1, 0.1)), (dojo.Capsule(0.1, 0.1), dojo.Sphere(0.1))]
+)
+def test_shapes_are_exchanged_only_where_the_second_one_comes_first(shapes: tuple[dojo.Shape, dojo.Shape]) -> None:
+    bodies, joints = [dojo.Body("a", 1.0, (0.1, 0.1, 0.1))], [dojo.Joint("floating", None, "a")]
+    mech = dojo.Mechanism(bodies, joints, collisions=[dojo.Collision("a", None, *shapes)])
+    sim = dojo.Simulator(mech, time_step=0.01)
+    x = sim.neutral()
+    x[2] = 1.0
+    sim.step(x)
+    assert bool(sim.model.optional[Slot.EXCHANGE_SHAPES]) == bool(np.any(sim.model.pair_kind >= SWAPPED))
 
 
 @pytest.mark.parametrize("features", [{}, {"limits": (-0.5, 0.5)}, {"friction": 0.1, "limits": (-0.5, 0.5)}])

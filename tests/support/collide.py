@@ -11,6 +11,7 @@ from sim.contact.collision import collide as kernels
 from sim.contact.collision import cylinder_contacts as cylinder_kernels
 from sim.contact.collision.edge_axes import Arrangement
 from sim.contact.collision.pair_kernels import KERNELS
+from sim.contact.collision.swapped_shapes import exchange_shapes
 from sim.model.layout import Sizes, allocate_model, model_view, table
 from sim.model.model import Model
 from sim.model.shape_kinds import OUT, Pair
@@ -25,6 +26,7 @@ def _model(rows: int, numbers: bytes) -> tuple[Model, Table]:
     model.hull[:] = np.frombuffer(numbers).reshape(rows, 4)
     for needs in KERNELS.values():
         link(model.optional, *needs)
+    link(model.optional, exchange_shapes)
     return model, table(model)
 
 

@@ -24,7 +24,7 @@ from sim.contact.collision.pair_kernels import (
     sides_capsule_box,
 )
 from sim.contact.collision.polytope_polytope import apart_polytopes
-from sim.contact.collision.swapped_shapes import exchange
+from sim.contact.collision.swapped_shapes import exchange_shapes
 from sim.contact.collision.witness import ABSENT
 from sim.model.model import Model
 from sim.model.record_columns import Witness
@@ -99,7 +99,7 @@ def choose(
     """`collide`, with the result of `arrange`; also the elements that it found: a number, 0 for none."""
     code = _choose(model, kind % SWAPPED, feature, arrangement, sizes, R, r, out)
     if kind >= SWAPPED and code != 0:
-        exchange(R, r, out)
+        exchange_shapes(model, R, r, out)
     return code
 
 
@@ -129,7 +129,7 @@ def collide_chosen(
     """Contact of the elements that `choose` found: smooth, wherever the shapes have moved to since then."""
     put_contact(model, kind % SWAPPED, feature, code, sizes, R, r, out)
     if kind >= SWAPPED and code != 0:
-        exchange(R, r, out)
+        exchange_shapes(model, R, r, out)
 
 
 @kernel

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from sim.contact.collision.box import column, to_a
 from sim.contact.collision.witness import axis, dot
+from sim.model.model import Model
 from sim.model.record_columns import Witness
-from solvers.compiler import inner_kernel
+from sim.model.slots import Slot
+from solvers.compiler import inner_kernel, optional
 from solvers.rotation import Vec3, cross, put_three, three
 from solvers.types import Vector
 
@@ -59,3 +61,9 @@ def exchange(R: Vector, r: Vector, out: Vector) -> None:
     _turn(R, r, out, Witness.POINT_RATE, 1.0, p, 1.0)
     put_three(n, Witness.NORMAL, out)
     put_three(p, Witness.POINT, out)
+
+
+@optional(Slot.EXCHANGE_SHAPES)
+def exchange_shapes(model: Model, R: Vector, r: Vector, out: Vector) -> None:
+    """`exchange`, for pairs that are not of cylinders."""
+    exchange(R, r, out)

@@ -16,6 +16,7 @@ from sim.contact.pairs.previous_features import (
     NEAR,
     has_no_room,
     keep,
+    last_point,
     left_behind,
     overlap_before,
     remember,
@@ -76,29 +77,45 @@ def choose_shapes(model: Model, data: Data, first: int) -> None:
         choose_cylinders(model, data, first)
         return
     pose = data.pair_relative[first]
-    before = data.pair_before[first]
     faces = arrange(model, kind, model.pair_sizes[first], pose[:9], pose[9:], data.pair_sides[first])
-    g = data.pair_trial[0]
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         sizes = model.pair_sizes[j]
         code = choose(model, kind, j - first, faces, sizes, pose[:9], pose[9:], data.pair_out[j])
         if code > 1 or code < 0:  # a choice
-            collide_chosen(model, kind, j - first, code, sizes, before[:9], before[9 : RelativePose.GAP], g)
-            if g[Witness.GAP] < before[RelativePose.GAP] and left_behind(
-                data, kind, data.pair_out[j], pose, before, before[RelativePose.GAP]
-            ):
-                code = instead(model, kind, j - first, sizes, before[:9], before[9 : RelativePose.GAP])
-                collide_chosen(model, kind, j - first, code, sizes, before[:9], before[9 : RelativePose.GAP], g)
-                code = code if g[Witness.GAP] >= before[RelativePose.GAP] else 0
-                collide_chosen(model, kind, j - first, code, sizes, pose[:9], pose[9:], data.pair_out[j])
+            code = substitute_elements(model, data, first, j, code)
         data.pair_code[j] = code
         j += 1
     if data.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
-        keep(model, data, first)
-        for k in range(first, j):
-            sizes = model.pair_sizes[k]
-            collide_chosen(model, kind, k - first, data.pair_code[k], sizes, pose[:9], pose[9:], data.pair_out[k])
+        keep_elements(model, data, first)
+
+
+@optional(Slot.SUBSTITUTE_ELEMENTS, seldom=True)
+def substitute_elements(model: Model, data: Data, first: int, j: int, code: int) -> int:
+    """The elements of point j and its pair_out, chosen at pair_relative: others, or none, instead of those that
+    overlapped when the step began.
+    """
+    kind, sizes, g = model.pair_kind[first], model.pair_sizes[j], data.pair_trial[0]
+    pose, before = data.pair_relative[first], data.pair_before[first]
+    collide_chosen(model, kind, j - first, code, sizes, before[:9], before[9 : RelativePose.GAP], g)
+    if g[Witness.GAP] < before[RelativePose.GAP] and left_behind(
+        data, kind, data.pair_out[j], pose, before, before[RelativePose.GAP]
+    ):
+        code = instead(model, kind, j - first, sizes, before[:9], before[9 : RelativePose.GAP])
+        collide_chosen(model, kind, j - first, code, sizes, before[:9], before[9 : RelativePose.GAP], g)
+        code = code if g[Witness.GAP] >= before[RelativePose.GAP] else 0
+        collide_chosen(model, kind, j - first, code, sizes, pose[:9], pose[9:], data.pair_out[j])
+    return code
+
+
+@optional(Slot.KEEP_ELEMENTS, seldom=True)
+def keep_elements(model: Model, data: Data, first: int) -> None:
+    """`keep`, and pair_out of all points of the collision."""
+    kind, pose = model.pair_kind[first], data.pair_relative[first]
+    keep(model, data, first)
+    for k in range(first, last_point(model, first)):
+        sizes = model.pair_sizes[k]
+        collide_chosen(model, kind, k - first, data.pair_code[k], sizes, pose[:9], pose[9:], data.pair_out[k])
 
 
 @optional(Slot.CHOOSE_PAIRS)

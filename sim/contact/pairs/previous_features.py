@@ -17,7 +17,8 @@ from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.record_columns import Cone, Hull, PairSize, RelativePose, Witness
 from sim.model.shape_kinds import RIM_POINTS, SWAPPED, Pair
-from solvers.compiler import inner_kernel, kernel
+from sim.model.slots import Slot
+from solvers.compiler import inner_kernel, kernel, optional
 from solvers.rotation import Vec3, three
 from solvers.types import Matrix, Vector
 
@@ -111,7 +112,7 @@ def left_behind(data: Data, kind: int, out: Vector, pose: Vector, before: Vector
     return out[Witness.GAP] - dot(three(out, Witness.NORMAL), moved) < least
 
 
-@kernel
+@optional(Slot.REMEMBER_ELEMENTS, seldom=True)
 def remember(model: Model, data: Data, first: int) -> None:
     """pair_previous: the features of the points of a collision that press; 0 for the others."""
     close = NEAR * model.pair_least[first]
