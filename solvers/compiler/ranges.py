@@ -26,7 +26,7 @@ __all__ = ["RANGE", "Loop", "RangeIterator", "RangeValue", "RangeRound"]
 RANGE = types.range_state64_type
 
 
-class Loop(MDValue):  # type: ignore[misc]
+class Loop(MDValue):
     """A loop that is not written out where its number of rounds is unknown: LLVM's `llvm.loop`, one node for each."""
 
     @classmethod
