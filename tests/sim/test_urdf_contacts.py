@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from naive import rotation as rot
 
 import dojo_opt as dojo
 from sim.mechanism.stance import gaps
@@ -144,11 +145,10 @@ def test_a_contact_can_be_placed_by_hand_in_the_frame_of_its_link(tmp_path: Path
 
 
 def test_friction_is_the_callers_or_the_files_or_the_usual_one(tmp_path: Path) -> None:
-    rubber = '<contact><lateral_friction value="1.5"/><rolling_friction value="0.1"/></contact>'
+    rubber = '<contact><lateral_friction value="1.5"/></contact>'
     slick, sticky = one(tmp_path, collision(SPHERE)), one(tmp_path, rubber, collision(SPHERE))
     assert (slick.contacts[0].friction, sticky.contacts[0].friction) == (0.8, 1.5)
     assert one(tmp_path, rubber, collision(SPHERE), friction=0.2).contacts[0].friction == 0.2
-    assert "rolling and spinning friction are not modelled: body" in str(sticky.report)
     assert one(tmp_path, collision(SPHERE), law="linear").contacts[0].law == "linear"
 
 
@@ -163,6 +163,53 @@ def test_friction_and_law_are_those_of_self_collisions_too(tmp_path: Path) -> No
         for given in ({}, {"friction": 0.1, "law": "linear", "restitution": 0.3})
     ]
     assert [(c.friction, c.law, c.restitution) for c in pairs] == [(0.2, "nonlinear", 0.0), (0.1, "linear", 0.3)]
+
+
+def test_spinning_and_rolling_friction_is_that_of_the_file_where_the_caller_asks_for_it(tmp_path: Path) -> None:
+    rubber = '<contact><rolling_friction value="0.003"/><spinning_friction value="0.01"/></contact>'
+    with pytest.warns(
+        dojo.UrdfWarning, match="torsional and rolling friction is omitted .*turning_friction=True.*: body"
+    ):
+        sliding = one(tmp_path, rubber, collision(SPHERE))
+    turning = one(tmp_path, rubber, collision(SPHERE), turning_friction=True)
+    for mech, lengths in ((sliding, (0.0, 0.0)), (turning, (0.01, 0.003))):
+        contact, shape = mech.contacts[0], mech.bodies[0].shapes[0]
+        assert (contact.torsional_friction, contact.rolling_friction) == lengths
+        assert (shape.torsional_friction or 0.0, shape.rolling_friction or 0.0) == lengths
+    assert "omitted" not in str(turning.report)
+    with pytest.raises(dojo.UrdfError, match="<rolling_friction>: expected a coefficient >= 0, got -1"):
+        one(tmp_path, '<contact><rolling_friction value="-1"/></contact>', collision(SPHERE))
+
+
+def test_friction_against_spinning_and_rolling_is_that_of_bullet(tmp_path: Path) -> None:
+    """A ball that spins, or rolls, on its plane, whose friction is 1."""
+    bullet = pytest.importorskip("pybullet")
+    surface = '<contact><spinning_friction value="0.01"/><rolling_friction value="0.003"/></contact>'
+    solid = inertial(inertia=(0.004, 0.004, 0.004, 0.0, 0.0, 0.0))
+    path = write(tmp_path, link("body", solid, collision(SPHERE), surface))
+    sim = dojo.Simulator(dojo.load_urdf(path, turning_friction=True), time_step=0.001, kappa=1e-10)
+    x = sim.neutral()
+    bullet.connect(bullet.DIRECT)
+    try:
+        bullet.setGravity(0.0, 0.0, -9.81)
+        bullet.setTimeStep(0.001)
+        plane = bullet.createMultiBody(0.0, bullet.createCollisionShape(bullet.GEOM_PLANE))
+        bullet.changeDynamics(plane, -1, lateralFriction=1.0)
+        ball = bullet.loadURDF(str(path), x[:3])
+        bullet.changeDynamics(ball, -1, linearDamping=0.0, angularDamping=0.0)
+        bullet.resetBaseVelocity(ball, [1.0, 0.0, 0.0], [0.0, 1.0 / x[2], 5.0])
+        speeds = []
+        for _ in range(60):
+            bullet.stepSimulation()
+            speeds.append([bullet.getBaseVelocity(ball)[0][0], bullet.getBaseVelocity(ball)[1][2]])
+    finally:
+        bullet.disconnect()
+    x[7:] = 1.0, 0.0, 0.0, 0.0, 1.0 / x[2], 5.0
+    states = sim.rollout(x, np.zeros((60, 0)), throw=True).x[1:]
+    spins = [float(rot.matrix(q)[2] @ w) for q, w in zip(states[:, 3:7], states[:, 10:], strict=True)]
+    for k, mine in enumerate((states[:, 7], np.array(spins))):
+        loss = mine[19] - mine[59], speeds[19][k] - speeds[59][k]
+        assert loss[0] == pytest.approx(loss[1], rel=0.02) and loss[0] > 1e-3
 
 
 def test_restitution_is_that_of_the_file_where_the_caller_asks_for_it(tmp_path: Path) -> None:

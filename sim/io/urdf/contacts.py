@@ -67,9 +67,17 @@ def find_contacts(
             continue
         balls = [ball for shape in _shapes(place) for ball in _balls(shape, place, choices.rim_points)]
         for k, (point, radius) in enumerate(balls):
-            label = _free(name if len(balls) == 1 else f"{name}_{k}", taken)
-            at, bounce = point - coms[body], link.restitution or 0.0
-            ball = Contact(body, at, radius, friction=friction, law=choices.law, name=label, restitution=bounce)
+            ball = Contact(
+                body,
+                point - coms[body],
+                radius,
+                friction=friction,
+                law=choices.law,
+                name=_free(name if len(balls) == 1 else f"{name}_{k}", taken),
+                restitution=link.restitution or 0.0,
+                torsional_friction=link.torsional_friction or 0.0,
+                rolling_friction=link.rolling_friction or 0.0,
+            )
             out.append(ball)
         other = sorted({s.kind for s in link.collisions if s.kind not in SHAPES})
         for kind in other:

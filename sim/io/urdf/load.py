@@ -40,6 +40,7 @@ def load_urdf(
     actuated: Sequence[str] | None = None,
     joint_friction: bool = False,
     restitution: float | None = 0.0,
+    turning_friction: bool = False,
     law: str = "nonlinear",
     rim_points: int = 4,
     collisions: str | None = None,
@@ -80,6 +81,9 @@ def load_urdf(
             higher order or of a given accuracy are for joints without it.
         restitution: coefficient of restitution of all shapes and their contacts; None: <restitution> of the link if
             the file has it, else 0.
+        turning_friction: whether contacts of shapes and self-collisions have the torsional and rolling friction of
+            <spinning_friction> and <rolling_friction> of the link [m]. Bullet multiplies them by the friction of the
+            other body, which is 1 for its plane; here self-collisions have the larger one of both links.
         law: law of contacts of shapes and of self-collisions, see `dojo.Contact`.
         rim_points: number of points per rim of a cylinder.
         collisions: "self" lets all links collide but those that a joint connects, with links that are part of the
@@ -114,6 +118,7 @@ def load_urdf(
     ]
     choice = mesh_choices(meshes, robot.links), whole_number("load_urdf(mesh_corners=...)", mesh_corners, 4)
     robot = _bouncing(robot, restitution, notes)
+    robot = robot if checks.flag("load_urdf(turning_friction=...)", turning_friction) else _sliding(robot, notes)
     every = contacts is None or ALL in as_list(contacts)
     robot = with_shapes(robot, file, choice, folders, ground and every, notes)
     loops = read_loops(root, robot, notes)
@@ -152,6 +157,18 @@ def _bouncing(robot: Robot, restitution: float | None, notes: Notes) -> Robot:
     if given:
         notes.add("contacts without the restitution of the file, which restitution=None uses", given)
     links = {name: replace(link, restitution=value or None) for name, link in robot.links.items()}
+    return replace(robot, links=links)
+
+
+def _sliding(robot: Robot, notes: Notes) -> Robot:
+    """The robot without torsional and rolling friction."""
+    given = [name for name, link in robot.links.items() if link.torsional_friction or link.rolling_friction]
+    if given:
+        text = (
+            "torsional and rolling friction is omitted (<spinning_friction>, <rolling_friction>; turning_friction=True"
+        )
+        notes.add(f"{text} has it)", given, warn=True)
+    links = {name: replace(link, torsional_friction=None, rolling_friction=None) for name, link in robot.links.items()}
     return replace(robot, links=links)
 
 

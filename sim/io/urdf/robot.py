@@ -79,6 +79,8 @@ class UrdfLink:
     visuals: tuple[Geometry, ...]
     friction: float | None  # <contact><lateral_friction>, as PyBullet reads it
     restitution: float | None  # <contact><restitution>, likewise
+    torsional_friction: float | None  # <contact><spinning_friction>, likewise, on a ground of friction 1 [m]
+    rolling_friction: float | None  # <contact><rolling_friction> [m]
     element: Element
 
     @property
@@ -123,7 +125,7 @@ def read_robot(root: Element, notes: Notes) -> Robot:
         if element.tag.startswith("xacro:"):
             raise element.error("this is a xacro file; run xacro on it first")
     palette = _palette(root)
-    links = _by_name(root.all("link"), lambda e: _link(e, palette, notes))
+    links = _by_name(root.all("link"), lambda e: _link(e, palette))
     joints = _by_name(root.all("joint"), lambda e: _joint(e, notes))
     if not links:
         raise root.error("expected at least one <link>")
@@ -153,7 +155,17 @@ def _pose(element: Element) -> Pose:
     return Pose(roll_pitch_yaw(origin.vector("rpy", 3, zero)), origin.vector("xyz", 3, zero))
 
 
-def _link(element: Element, palette: Palette, notes: Notes) -> UrdfLink:
+_INFINITE = float("inf")
+# by element of a <contact> the largest value, in the order of UrdfLink
+_SURFACE = {
+    "lateral_friction": _INFINITE,
+    "restitution": 1.0,
+    "spinning_friction": _INFINITE,
+    "rolling_friction": _INFINITE,
+}
+
+
+def _link(element: Element, palette: Palette) -> UrdfLink:
     mass, com, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
     inertial = element.one("inertial")
     if inertial is not None:
@@ -166,19 +178,20 @@ def _link(element: Element, palette: Palette, notes: Notes) -> UrdfLink:
         )
         given = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         com, inertia = pose.point, pose.rotation @ given @ pose.rotation.T
-    contact = element.one("contact")
-    lateral = contact.one("lateral_friction") if contact else None
-    friction = lateral.number("value") if lateral else None
-    if lateral and friction is not None and friction < 0.0:
-        raise lateral.error(f"expected a coefficient >= 0, got {friction:g}")
-    bounce = contact.one("restitution") if contact else None
-    restitution = bounce.number("value") if bounce else None
-    if bounce and restitution is not None and not 0.0 <= restitution <= 1.0:
-        raise bounce.error(f"expected a coefficient of restitution between 0 and 1, got {restitution:g}")
-    if contact and any(e.tag in ("rolling_friction", "spinning_friction") for e in contact.children):
-        notes.add("rolling and spinning friction are not modelled", [element.text("name")])
     shapes = [tuple(_geometry(e, palette) for e in element.all(tag)) for tag in ("collision", "visual")]
-    return UrdfLink(element.text("name"), mass, com, inertia, shapes[0], shapes[1], friction, restitution, element)
+    mu, e, spin, roll = (_of_surface(element, tag, largest) for tag, largest in _SURFACE.items())
+    return UrdfLink(element.text("name"), mass, com, inertia, shapes[0], shapes[1], mu, e, spin, roll, element)
+
+
+def _of_surface(element: Element, tag: str, largest: float) -> float | None:
+    """The number of an element of the <contact> of a link, if it has it."""
+    contact = element.one("contact")
+    given = contact.one(tag) if contact else None
+    value = given.number("value") if given else None
+    if given and value is not None and not 0.0 <= value <= largest:
+        expected = "a coefficient of restitution between 0 and 1" if largest == 1.0 else "a coefficient >= 0"
+        raise given.error(f"expected {expected}, got {value:g}")
+    return value
 
 
 def _geometry(element: Element, palette: Palette) -> Geometry:

@@ -10,7 +10,7 @@ from sim.io.urdf.robot import Geometry, UrdfLink
 from sim.io.urdf.tree import MergedLinks
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.pose import Pose
-from sim.mechanism.shapes import Box, Capsule, Cylinder, Solid, Sphere
+from sim.mechanism.shapes import SURFACE_FIELDS, Box, Capsule, Cylinder, Solid, Sphere
 from sim.mechanism.visual import Visual
 from solvers.types import Floats
 
@@ -18,7 +18,7 @@ from solvers.types import Floats
 def body_shapes(body: MergedLinks, com: Floats) -> tuple[Solid, ...]:
     """All primitives among the collision shapes of a body; without one the largest of its visual shapes, if any.
 
-    Each has friction and restitution of its link, where the file gives them.
+    Each has the friction, of all kinds, and restitution of its link, where the file gives them.
     """
     found = collision_shapes(body, com)
     if found:
@@ -85,7 +85,7 @@ def solid_of(shape: Geometry, pose: Pose, com: Floats, name: str, link: UrdfLink
     """The shape in the body, from its centre of mass; None for a mesh that is not read or something without extent."""
     settings: dict[str, Any] = {"center": tuple(pose.point - com), "orientation": pose.quaternion, "name": name}
     if link is not None:
-        settings |= {"friction": link.friction, "restitution": link.restitution}
+        settings |= {field: getattr(link, field) for field in SURFACE_FIELDS}
     if shape.points is not None:
         return Polytope(shape.points, **settings)
     if not shape.sizes or min(shape.sizes) <= 0.0:

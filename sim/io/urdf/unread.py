@@ -7,7 +7,7 @@ from collections import Counter
 from sim.io.urdf.xml import Element
 
 _JOINT = ("origin", "parent", "child", "link1", "link2", "axis", "mimic", "dynamics", "limit")
-# by element those inside that are read; the last two of a <contact> have a note of their own
+# by element those inside that are read
 _READ = {
     "robot": ("link", "joint", "loop_joint"),
     "link": ("inertial", "collision", "contact"),
