@@ -1,8 +1,8 @@
 """Random mechanisms in random states: count the failures of steps, motions and derivatives.
 
-    python benchmarks/attacks.py             2000 steps, 10,000 motions, 4000 crowds, 300 derivatives, 500 gradients,
-                                             1000 files
-    python benchmarks/attacks.py --quick     40, 60, 40, 10, 10 and 40
+    python benchmarks/attacks.py             2000 steps, 10,000 motions, 4000 crowds, 300 derivatives, 60 steps with
+                                             derivatives by parameters, 500 gradients, 1000 files
+    python benchmarks/attacks.py --quick     40, 60, 40, 10, 2, 10 and 40
     python benchmarks/attacks.py --only motions --first 5000 --count 2000
 
 steps          one step of any mechanism (random_mechanisms.py), kappa default or 1e-4: no exception, every number
@@ -15,6 +15,8 @@ crowds         the same of trees of any joints whose bodies collide with one ano
                are not judged
 derivatives    d(next state)/d(state) of a step at kappa 1e-4 against central differences on the manifold, where those
                of two step sizes agree
+parameters     the same by all parameters of a kind along a random direction, for every kind, also of torsional and
+               rolling friction, and of bodies that collide
 gradients      `linearize_trajectory` of a motion whose bodies collide, and the gradient of its end by `vjp`: next
                states, derivatives and gradient are those of its steps, one after the other
 files          a URDF and an MJCF file, mutated at random (tests/support/robot_texts.py): refused by an error that names
@@ -28,6 +30,7 @@ import sys
 import warnings
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -39,6 +42,8 @@ from random_mechanisms import COMMON, Recipe, heights, random_mechanism, random_
 import dojo_opt as dojo
 from dojo_opt.report.result import Report, Table
 from solvers.types import Vector
+from support.parameter_case import Case, kind_of
+from support.parameter_errors import ONE_SIDED, random_direction
 from support.robot_texts import MJCF, URDF, mutated
 
 TIME_STEPS = (0.01, 0.02, 0.05)
@@ -161,6 +166,60 @@ def derivative_case(seed: int) -> tuple[str, float]:
     return "compared", float(np.abs(found.A @ direction - fine).max() / size)
 
 
+def rubbing(mech: dojo.Mechanism, rng: Any) -> dojo.Mechanism:
+    """The mechanism with torsional and rolling friction of some of its contacts."""
+    parts = {
+        field: [
+            replace(c, torsional_friction=rng.uniform(0.0, 0.1), rolling_friction=rng.uniform(0.0, 0.05))
+            if rng.random() < 0.5
+            else c
+            for c in getattr(mech, field)
+        ]
+        for field in ("contacts", "collisions")
+    }
+    return replace(mech, **parts)
+
+
+def parameter_case(seed: int) -> dict[str, tuple[str, float]]:
+    """(("compared", relative error of the derivative along a random direction), or why there is none) by kind."""
+    rng = np.random.default_rng([seed, 7])
+    mech = random_mechanism(rng, ANYTHING if seed % 2 else CROWDED)
+    sim = dojo.Simulator(
+        rubbing(mech, rng) if rng.random() < 0.5 else mech, time_step=0.01, kappa=1e-4, tolerance=1e-12
+    )
+    case = Case(sim, random_state(sim, rng), rng.normal(size=sim.nu))
+    here = sim.step(case.x, case.u)
+    if not here.success:
+        return {}
+    return {kind: compared(case, kind, here) for kind in case.kinds()}
+
+
+def compared(case: Case, kind: str, here: dojo.StepResult) -> tuple[str, float]:
+    """As parameter_case, of one kind; here: the step."""
+    sim, names = case.sim, [name for name in case.sim.parameters().names if kind_of(name) == kind]
+    values = sim.parameters(names).values
+    direction = random_direction(kind, values, sim.time_step)
+    found = sim.linearize(case.x, case.u, wrt=names)
+    if not found.success:
+        return "refused", 0.0
+    rate = np.concatenate([found[name] for name in names], axis=1) @ direction
+    slopes = []
+    for size in (1e-5, 1e-6):
+        ways = (1.0, 2.0) if kind in ONE_SIDED else (-1.0, 1.0)
+        moved = [sim.with_parameters(dict(zip(names, values + w * size * direction, strict=True))) for w in ways]
+        ends = [one.step(case.x, case.u) for one in moved]
+        if not all(end.success and end.parts == here.parts for end in ends):
+            return "no reference", 0.0
+        near, far = (sim.difference(end.x, here.x) / size for end in ends)
+        slopes.append(2.0 * near - 0.5 * far if kind in ONE_SIDED else 0.5 * (far - near))
+        if size * np.abs(near).max() > APART:
+            return "several solutions", 0.0
+    scale = 1e-2 + np.abs(rate).max()
+    if np.abs(slopes[0] - slopes[1]).max() > 10.0 * AGREE * scale:
+        return "no reference", 0.0
+    return "compared", float(np.abs(slopes[1] - rate).max() / scale)
+
+
 def gradient_case(seed: int) -> tuple[str, float]:
     """("compared", largest relative error of the linearization of a motion), or why there is none."""
     rng = np.random.default_rng([seed, 6])
@@ -264,6 +323,21 @@ def derivatives(report: Report, seeds: range) -> None:
     ]
 
 
+def parameters(report: Report, seeds: range) -> None:
+    """Derivatives of a step by parameters."""
+    cases = [parameter_case(*case) for case in progress()([(f"step {seed}", (seed,)) for seed in seeds], "parameters")]
+    found = [(seed, kind, *end) for seed, case in zip(seeds, cases, strict=True) for kind, end in case.items()]
+    known = [error for *_, end, error in found if end == "compared"]
+    wrong = [(seed, kind) for seed, kind, _, error in found if error > WRONG]
+    report.rows += [
+        number("parameters: kinds of steps with a reference", len(known)),
+        number("parameters: refused", sum(end == "refused" for *_, end, _ in found)),
+        number("parameters: wrong", len(wrong), 0, note=", ".join(f"seed {seed} {kind}" for seed, kind in wrong[:9])),
+        number("parameters: median error", float(np.median(known)) if known else np.nan),
+        number("parameters: largest error", max(known, default=0.0)),
+    ]
+
+
 def gradients(report: Report, seeds: range) -> None:
     """Of motions, against those of their steps."""
     named = [(f"gradient {seed}", (seed,)) for seed in seeds]
@@ -322,6 +396,7 @@ SECTIONS = {  # with the numbers of cases, whole and quick
     "motions": (motions, 10_000, 60),
     "crowds": (crowds, 4000, 40),
     "derivatives": (derivatives, 300, 10),
+    "parameters": (parameters, 60, 2),
     "gradients": (gradients, 500, 10),
     "files": (files, 1000, 40),
 }

@@ -14,9 +14,12 @@ from support.coupled_scenes import COUPLED, kinds
 from support.jacobians import check_jacobian, check_step
 from support.parameter_case import Case
 from support.parameter_errors import error
+from support.scenes import KINDS as JOINTS
+from support.scenes import chain, random_state
 from support.situations import CASES
 
 ALL = {**CASES, **COUPLED}
+GEOMETRY = ("parent_point", "child_point", "orientation", "axis", "pitch")
 case_of = functools.cache(lambda name: ALL[name]())
 
 
@@ -26,6 +29,24 @@ def test_every_kind_in_every_situation(name: str) -> None:
     case = case_of(name)
     errors = {kind: error(case, kind) for kind in kinds(name, case)}
     assert all(e < 1e-6 for e in errors.values()), errors
+
+
+@pytest.mark.parametrize("kind", [kind for kind in JOINTS if kind not in ("fixed", "floating")])
+def test_every_kind_of_joint(kind: str) -> None:
+    """Geometry of joints with dampers; and from the second step of a motion on, which carries the one before on."""
+    rng = np.random.default_rng(2)
+    sim = dojo.Simulator(chain(kind, 2, damper=0.5, spring=2.0), time_step=0.02, tolerance=1e-12)
+    x, u = random_state(sim, rng, speed=2.0), rng.normal(size=sim.nu)
+    case = Case(sim, x, u)
+    errors = {name: error(case, name) for name in case.kinds() if name in GEOMETRY}
+    assert "axis" in errors or kind in ("spherical", "fixed_orientation")
+    assert all(e < 1e-6 for e in errors.values()), errors
+    names = sim.parameters().names
+    xs, line = sim.linearize_rollout(x, np.tile(u, (3, 1)), wrt=names, throw=True)
+    for t in range(3):
+        step = sim.linearize(xs[t], u, wrt=names)
+        for name, block in line.parameters.items():
+            np.testing.assert_allclose(block[t], step[name], rtol=1e-7, atol=1e-8)
 
 
 def test_derivatives_by_the_state_prepare_none_by_parameters(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -38,7 +38,7 @@ def error(case: Case, *kinds: str) -> float:
     kind = kinds[0]
     names = [name for name in sim.parameters().names if kind_of(name) in kinds]
     values = sim.parameters(names).values
-    direction = _direction(kind, values, sim.time_step)
+    direction = random_direction(kind, values, sim.time_step)
     blocks = sim.linearize(x, u, wrt=names)
     rate = np.concatenate([blocks[name] for name in names], axis=1) @ direction
     here = sim.step(x, u, throw=True)
@@ -61,7 +61,7 @@ def error(case: Case, *kinds: str) -> float:
     return min(errors)
 
 
-def _direction(kind: str, values: Floats, time_step: float) -> Floats:
+def random_direction(kind: str, values: Floats, time_step: float) -> Floats:
     """Random, in proportion to the parameters; away from zero where they may not be negative."""
     rng = np.random.default_rng(len(values))
     size = rng.uniform(0.5, 1.0, size=len(values))

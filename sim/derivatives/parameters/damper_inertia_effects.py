@@ -5,7 +5,8 @@ that joint j carries, a geometry that displaces these by a twist X changes 2 T =
 
     2 H.(V x X)      V: twist of the bodies before the displacement
 
-An axis that turns takes along the bodies behind it, which turn back about its joint point.
+An axis that turns takes along the bodies behind it, which turn back about its joint point. All three rotations of a
+joint, or all three of its translations, have no directions that turn.
 """
 
 from __future__ import annotations
@@ -84,6 +85,8 @@ def _joint_rates(model: Model, at: Bent, i: int, motion: tuple[Floats, Floats, F
     before, behind, H = motion
     parent = at.rotation[model.body_parent[i]] if model.body_parent[i] >= 0 else np.eye(3)
     lead = BEND * model.joint_lead[i] * at.frame[i] @ model.joint_axis[i]
+    ntrans, nrot, first = int(model.joint_ntrans[i]), int(model.joint_nrot[i]), int(model.body_vadr[i])
+    velocity = x[first : first + ntrans].T @ at.columns[first : first + ntrans, :3]  # of its translations
     out: Rates = {}
     for k in range(3):
         shift = np.concatenate([parent[:, k], np.zeros(3)])
@@ -94,9 +97,11 @@ def _joint_rates(model: Model, at: Bent, i: int, motion: tuple[Floats, Floats, F
         out[int(Effect.ORIENTATION), i, k] = _moved(H, before, twist)
         turned = at.rotation[i][:, k]
         back = np.concatenate([(at.joint[i] + lead) @ cross_matrix(turned), turned])
-        out[int(Effect.AXIS), i, k] = _moved(H, before, twist) - _moved(H, behind, back)
-    if model.joint_nrot[i] == 1:
-        d = int(model.body_vadr[i]) + int(model.joint_ntrans[i])
+        whole = _moved(H, before, twist) - _moved(H, behind, back)
+        along = 2.0 * np.sum(H[:, :3] * np.cross(turn, velocity), axis=1)
+        out[int(Effect.AXIS), i, k] = along if nrot == 3 else whole - along if ntrans == 3 else whole
+    if nrot == 1:
+        d = first + ntrans
         along = at.frame[i] @ joint_columns(model, i)[-1, 3:]
         moved = _moved(H, before, BEND * np.concatenate([along, np.zeros(3)]))
         out[int(Effect.LEAD), i, 0] = 2.0 * H[:, :3] @ along * x[d] + moved

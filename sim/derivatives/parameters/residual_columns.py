@@ -37,6 +37,7 @@ from sim.derivatives.parameters.sizes import add_shapes_size
 from sim.derivatives.parameters.surface import add_surface_radius
 from sim.dynamics.displacements import other_quaternions
 from sim.dynamics.elimination_panel import clear_columns, column_count
+from sim.dynamics.kinematics import displace
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -123,6 +124,7 @@ def fill_columns(
     clear_columns(data)
     take_corners(model, data, at.h)
     other_quaternions(data)
+    displace(model, at.q, at.v, -at.h, data.theta1)  # steps that continue a motion do not need it
     end = first + column_count(model, data)
     t = start
     while t < weights.shape[0] and terms[t, ParameterTerm.COLUMN] < end:
