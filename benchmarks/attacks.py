@@ -229,13 +229,13 @@ def gradient_case(seed: int) -> tuple[str, float]:
     if not motion.success:
         return "step not solved", 0.0
     steps = [sim.linearize(x, u) for x, u in zip(motion.x, motion.u, strict=False)]
-    apart = [np.abs(sim.difference(step.x_next, x)).max() for step, x in zip(steps, motion.x[1:], strict=True)]
     whole = sim.linearize_trajectory(motion.x, motion.u)
     cost = np.zeros((MOTION + 1, sim.ndx))
     cost[-1] = rng.normal(size=sim.ndx)
     adjoint, expected, error = sim.vjp(motion, cost, wrt=("state",)), cost[-1], 0.0
     if not (whole.success and adjoint.success and all(step.success for step in steps)):
         return "refused", 0.0
+    apart = [np.abs(sim.difference(step.x_next, x)).max() for step, x in zip(steps, motion.x[1:], strict=True)]
     if max(apart) > APART:
         return "several solutions", 0.0
     for k, step in reversed(list(enumerate(steps))):
