@@ -8,6 +8,7 @@ from sim.contact.far_contacts import FAR
 from sim.contact.ground_contact import contact_kinematics
 from sim.contact.inactive import sunk_contact
 from sim.contact.moments.contact_moments import report_moments
+from sim.contact.moments.moment_law import moment_violation
 from sim.contact.pairs.pair_report import report_pairs
 from sim.model.data import Data
 from sim.model.model import Model
@@ -32,6 +33,7 @@ def worst_contact(model: Model, data: Data, kappa: float) -> float:
     for m in range(data.active_count[0]):
         c = data.active[m]
         e = contact_error(model, data, c) + slip_violation(model, data, c, kappa)
+        e += moment_violation(model, data, c, kappa)
         if e > error:
             error = e
             worst = float(c)

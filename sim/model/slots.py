@@ -264,6 +264,7 @@ class Slot(Code):
     ADD_INACTIVE_MOMENT = 217
     EVALUATE_MOMENTS = 218
     MOMENT_SLOPE = 219
+    MOMENT_VIOLATION = 224
     # derivatives by parameters
     FILL_COLUMNS = 213
     # sub-steps of steps with an accuracy

@@ -57,6 +57,7 @@ from sim.contact.moments.contact_moments import (
     start_moments,
 )
 from sim.contact.moments.inactive_moments import add_inactive_moment, evaluate_moments, moment_slope, place_moment
+from sim.contact.moments.moment_law import moment_violation
 from sim.contact.pairs.active_features import (
     choose_pairs,
     choose_shapes,
@@ -302,6 +303,7 @@ _MOMENTS = (
     add_inactive_moment,
     evaluate_moments,
     moment_slope,
+    moment_violation,
 )
 _TERRAIN = (
     place_on_terrain,

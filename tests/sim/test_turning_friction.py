@@ -200,6 +200,19 @@ def test_moments_are_saved_and_described(tmp_path: Path) -> None:
     assert not plain.contacts.moment.any()
 
 
+def test_the_contact_whose_moment_is_furthest_from_its_law_is_named() -> None:
+    names = ("first", "second")
+    bodies = [dojo.Body(name, M, np.eye(3) * J) for name in names]
+    feet = [dojo.Contact(name, radius=R, torsional_friction=0.05) for name in names]
+    mech = dojo.Mechanism(bodies, [dojo.Joint("floating", None, name) for name in names], feet)
+    sim = dojo.Simulator(mech, time_step=0.01, max_iterations=3)
+    for k, name in enumerate(names):
+        x = sim.neutral()
+        x[sim.nq + 6 * k + 5] = 50.0
+        message = sim.step(x).message
+        assert f"Contact '{name}' is worst" in message, message
+
+
 SCENE = """<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1" condim="3" friction="1 .02 .001"/>
   <body name="a" pos="0 0 1"><freejoint/><geom name="a" size=".1" condim="4" friction=".5 .01 .002"/></body>
   <body name="b" pos="0 0 2"><freejoint/><geom name="b" size=".1" condim="6" friction=".5 .01 .002" priority="1"/></body>

@@ -97,8 +97,7 @@ def moment_error(model: Model, data: Data, kappa: float) -> float:
     """Largest violation of the laws on the central path of kappa, in units of kappa: of contacts that act."""
     e = 0.0
     for m in range(data.active_count[0]):
-        if is_felt(model, data, data.active[m]):
-            e = max(e, moment_violation(model, data, data.active[m], kappa))
+        e = max(e, moment_violation(model, data, data.active[m], kappa))
     return e
 
 

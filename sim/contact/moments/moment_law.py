@@ -20,12 +20,14 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.cone import condense_bounded, distance_from_path, put_on_path, within_cone
+from sim.contact.moments.moment_rates import is_felt
 from sim.contact.softening import compose, contact_response, hardness_part, loaded_response
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import LawForm
 from sim.model.record_columns import Cone, ConeScale, Moment, MomentRow
-from solvers.compiler import kernel
+from sim.model.slots import Slot
+from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3
 from solvers.types import Vector
 
@@ -75,10 +77,12 @@ def keep_in_bounds(model: Model, data: Data, c: int) -> None:
         )
 
 
-@kernel
+@optional(Slot.MOMENT_VIOLATION, default=0.0)
 def moment_violation(model: Model, data: Data, c: int, kappa: float) -> float:
-    """Violation of both laws of contact c, in units of kappa."""
+    """Violation of both laws of contact c, in units of kappa; 0 where it does not act."""
     r = 0.0
+    if not is_felt(model, data, c):
+        return r
     for e in range(2):
         if model.moment_friction[c, e] > 0.0:
             b0 = bound(model, data, c, e)
