@@ -99,7 +99,7 @@ class _Travel:
                 if not np.abs(x).max() < _LOST:
                     return np.array(xs), done, f"lost before {done * self.time_step:g} s"
                 xs.append(x)
-        except (RuntimeError, ValueError, SystemError) as error:
+        except (RuntimeError, ValueError, SystemError, SystemExit) as error:
             return np.array(xs), done, str(error).split(". ")[0][:200]
         return np.array(xs), done, ""
 
@@ -178,7 +178,7 @@ def controlled(
         begin = time.process_time()
         simulator.AdvanceTo(seconds)
         cost = time.process_time() - begin
-    except (RuntimeError, ValueError, SystemError):
+    except (RuntimeError, ValueError, SystemError, SystemExit):
         return None, np.inf
     return read(model, scene, context)[: len(start) - len(model.dof_body)], cost
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,15 @@ from sim.model.model import InputKind, Model
 from solvers.types import Matrix, Vector
 
 APPROXIMATIONS = ("Lagged", "Sap", "Tamsi")  # its default, its convex one, and its oldest
+
+
+@contextmanager
+def _raising() -> Iterator[None]:
+    """Failed assertions of Drake as RuntimeErrors; they would end the process."""
+    try:
+        yield
+    except SystemExit as error:
+        raise RuntimeError(str(error)) from error
 
 
 class DrakeStep:
@@ -65,7 +75,8 @@ class DrakeStep:
 
         def update(x: Any) -> Any:
             context.SetDiscreteState(x)
-            return diagram.EvalUniquePeriodicDiscreteUpdate(root).value()
+            with _raising():
+                return diagram.EvalUniquePeriodicDiscreteUpdate(root).value()
 
         return update
 
@@ -78,7 +89,8 @@ class DrakeStep:
 
     def _step(self, x: Vector) -> Vector:
         self._context.SetDiscreteState(x)
-        return np.array(self._diagram.EvalUniquePeriodicDiscreteUpdate(self._root).value())
+        with _raising():
+            return np.array(self._diagram.EvalUniquePeriodicDiscreteUpdate(self._root).value())
 
     def _central(self, eps: float) -> Matrix:
         try:
