@@ -2,7 +2,7 @@
 
     DOJO_OPT_PURE=1                        the pure wheel, for any system and Python; compiles on the first use
     DOJO_OPT_PREBUILD=all|examples|none    what is compiled: every entry, or those of guide and models (the default)
-    DOJO_OPT_TARGETS="x86-64-v3 ..."       for which processors; the best that this one can run by default
+    DOJO_OPT_TARGETS="x86-64-v3 ..."       for which processors; by default one that most like this one can run
 
 The code runs with the version of Numba that compiled it. A build in isolation has the newest; `pip install
 --no-build-isolation .` takes that of the environment, which needs hatchling then.

@@ -25,7 +25,7 @@ from solvers.compiler.shipped import SUFFIX, Shipped, write_shipped
 from support.fork_server import forked
 from support.programs import HOME, PACKAGES, python
 
-TARGET = (targets.runnable() or ("none",))[0]
+TARGET = (targets.usual() or ("none",))[0]
 pytestmark = [
     pytest.mark.skipif(TARGET == "none", reason="no target is known for this processor"),
     pytest.mark.slow,  # its package is compiled and copied first
@@ -401,6 +401,11 @@ def test_targets_are_those_that_the_processor_can_run(monkeypatch: pytest.Monkey
     monkeypatch.setattr(targets.platform, "machine", lambda: "x86_64")
     monkeypatch.setattr(targets.llvm, "get_host_cpu_features", lambda: known)
     assert targets.runnable() == ("x86-64-v3", "x86-64-v2")
+    wide = known | dict.fromkeys(targets.FEATURES["x86-64-v4"], True)
+    monkeypatch.setattr(targets.llvm, "get_host_cpu_features", lambda: wide)
+    assert targets.runnable() == ("x86-64-v4", "x86-64-v3", "x86-64-v2")
+    assert targets.usual() == ("x86-64-v3",)
+    monkeypatch.setattr(targets.llvm, "get_host_cpu_features", lambda: known)
     assert targets.best_target(("x86-64-v2",)) == "x86-64-v2"
     known["avx2"] = False
     assert targets.runnable() == ("x86-64-v2",)

@@ -16,7 +16,7 @@ from solvers.compiler import compiled, shipped
 from solvers.compiler.cache import ship
 from solvers.compiler.crossing import SYSTEMS
 from solvers.compiler.shipped import FOLDER
-from solvers.compiler.targets import FEATURES, runnable
+from solvers.compiler.targets import FEATURES, runnable, usual
 
 _MOST = 8  # workers by default: each takes half a gigabyte, and the longest task is a fifth of all
 
@@ -30,7 +30,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m dojo_opt.prebuild", description=__doc__)
     parser.add_argument("--content", choices=CONTENTS, default="all", help="content to compile (default: all)")
     parser.add_argument(
-        "--targets", nargs="+", choices=FEATURES, default=runnable()[:1], help="targets that this processor can run"
+        "--targets", nargs="+", choices=FEATURES, default=usual(), help="targets that this processor can run"
     )
     parser.add_argument("--out", type=Path, default=FOLDER, help=f"folder of the file (default: {FOLDER})")
     parser.add_argument("--cache", type=Path, help="folder with compiled code to start from (default: a temporary one)")

@@ -1,7 +1,8 @@
 """Processors that code is shipped for: families of them, by LLVM's names, instead of the one that compiles.
 
 Code for x86-64-v3 (AVX2 and FMA, every x86 processor since 2013 to 2015 but the smallest) is as fast as code for the
-processor itself; code for x86-64-v2 takes a third longer. The others have one family each: 64-bit ARM has vectors and
+processor itself, or takes up to a twelfth longer where that has the twice as many registers of x86-64-v4 (AVX-512);
+code for x86-64-v2 takes a third longer. The others have one family each: 64-bit ARM has vectors and
 fused products in every processor, and all of Apple's later ones can run code for its first.
 """
 
@@ -13,12 +14,14 @@ import sys
 import llvmlite.binding as llvm
 import numba
 
-__all__ = ["FEATURES", "best_target", "build_environment", "runnable", "system_of"]
+__all__ = ["FEATURES", "best_target", "build_environment", "runnable", "system_of", "usual"]
 
 _V2 = ("cx16", "popcnt", "sahf", "sse3", "sse4.1", "sse4.2", "ssse3")
 _V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+_V4 = (*_V3, "avx512bw", "avx512cd", "avx512dq", "avx512f", "avx512vl")
 
 FEATURES: dict[str, tuple[str, ...]] = {  # features of a processor beyond the least of its architecture
+    "x86-64-v4": _V4,
     "x86-64-v3": _V3,
     "x86-64-v2": _V2,
     "apple-m1": (),
@@ -32,7 +35,7 @@ def target_names() -> tuple[str, ...]:
     if sys.maxsize < 2**32:  # a 32-bit Python on such a machine
         return ()
     if machine in ("x86_64", "amd64"):
-        return ("x86-64-v3", "x86-64-v2")
+        return ("x86-64-v4", "x86-64-v3", "x86-64-v2")
     if machine in ("aarch64", "arm64"):
         return ("apple-m1",) if sys.platform == "darwin" else ("generic",)
     return ()
@@ -58,6 +61,11 @@ def runnable() -> tuple[str, ...]:
     if not numba.config.ENABLE_AVX:  # which Numba turns off where it is known to fail
         host = {name: has and not name.startswith("avx") for name, has in host.items()}
     return tuple(target for target in target_names() if all(host.get(name, False) for name in FEATURES[target]))
+
+
+def usual() -> tuple[str, ...]:
+    """The target of a build unless others are named: the best that most processors can run, for wheels are copied."""
+    return tuple(target for target in runnable() if target != "x86-64-v4")[:1]
 
 
 def best_target(shipped: tuple[str, ...]) -> str | None:
