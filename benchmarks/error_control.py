@@ -11,8 +11,9 @@ of a reference is its largest difference from runs with steps that are twice as 
 impacts lie elsewhere, and from an extrapolation of lower order: accuracies below three times it are omitted.
 
 Cost: processor time of the whole motion, relative to the cheapest fixed order and step, or step of RK4, or accuracy of
-Drake's, with an error no larger; nan where there is none. Bounces of MuJoCo are not comparable. `told`: the estimated
-error of the result (`errors`) over the requested one: above 1, the motion reports a miss.
+Drake's, with an error no larger; nan where there is none. Drake's accuracies end with the first for which a motion
+fails or takes more than 20 s. Bounces of MuJoCo are not comparable. `told`: the estimated error of the result
+(`errors`) over the requested one: above 1, the motion reports a miss.
 """
 
 from __future__ import annotations
@@ -115,6 +116,8 @@ def drake(motion: ReferenceMotion, exact: Vector, scheme: str, quick: bool) -> P
     for accuracy in _ASKED[: 2 if quick else None]:
         try:
             end, cost = controlled(motion.mechanism, np.r_[motion.q, motion.v], motion.seconds, accuracy, scheme)
+            if end is None and cost == np.inf and out:
+                break  # it fails, or takes too long, at all higher ones
             out.append((error(sim, end, exact, motion.seconds), cost, f"{accuracy:g}"))
         except ValueError:  # not for this contact; or coordinates of a joint that Drake has not
             return []

@@ -20,6 +20,7 @@ from sim.simulator.simulator import Simulator
 from solvers.types import Floats
 
 APPROXIMATIONS = ("Lagged", "Sap", "Tamsi")
+PATIENCE = 20.0  # [s] of processor time for a motion of a given accuracy
 _LOST = 1e8  # [m/s, rad/s] faster than this, the simulation has blown up
 
 
@@ -156,13 +157,14 @@ def controlled(
         scheme: a name of Drake's `GetIntegrationSchemes`.
 
     Returns:
-        q in the end, None where the motion failed, and the processor time [s].
+        q in the end, None where the motion failed or took more than PATIENCE, and the processor time [s].
 
     Raises:
         ValueError: for a mechanism that Drake cannot represent.
     """
     from pydrake.systems.analysis import ResetIntegratorFromFlags
     from pydrake.systems.analysis import Simulator as DrakeSimulator
+    from pydrake.systems.framework import EventStatus
 
     model = Simulator(mechanism).model
     scene = drake_scene.load(model, 0.0)
@@ -173,12 +175,22 @@ def controlled(
     write(model, scene, context, start)
     if scene.actuated:
         scene.plant.get_actuation_input_port().FixValue(context, np.zeros(len(scene.actuated)))
+    begin = time.process_time()
+
+    def late(_: Any) -> Any:
+        """The end of a motion that takes too long."""
+        over = time.process_time() - begin > PATIENCE
+        return EventStatus.ReachedTermination(None, "too slow") if over else EventStatus.DidNothing()
+
     try:
         simulator.Initialize()
+        simulator.set_monitor(late)
         begin = time.process_time()
         simulator.AdvanceTo(seconds)
         cost = time.process_time() - begin
     except (RuntimeError, ValueError, SystemError, SystemExit):
+        return None, np.inf
+    if context.get_time() < seconds:
         return None, np.inf
     return read(model, scene, context)[: len(start) - len(model.dof_body)], cost
 
