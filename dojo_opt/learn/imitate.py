@@ -181,7 +181,7 @@ def imitate(
     Args:
         task: whose states, inputs and control steps the plans have.
         plans: of `dojo.ilqr`, or (states (T + 1, nx), inputs (T, nu) [N, N m], gains (T, nu, ndx)).
-        seed: of all random numbers; the same seed gives the same policy, to the last bit.
+        seed: of all random numbers; the same seed gives the same policy, to the last bit, on a kind of processor.
         resume: a run to continue, of the same plans, seed and options.
         **options: fields of `dojo.learn.ImitationOptions`.
 

@@ -249,7 +249,7 @@ def ars(
 
     Args:
         task: the task to learn.
-        seed: of all random numbers; the same seed gives the same policy, to the last bit.
+        seed: of all random numbers; the same seed gives the same policy, to the last bit, on a kind of processor.
         resume: a run to continue, of the same task, seed and options.
         executor: anything with the interface of `concurrent.futures.Executor`, as for `dojo.monte_carlo`; its workers
             roll out the directions, and the policy is the same to the last bit (default None: none).
@@ -270,7 +270,7 @@ def gradient_search(task: Task, *, seed: int = 0, resume: Learned | None = None,
 
     Args:
         task: the task to learn.
-        seed: of all random numbers; the same seed gives the same policy, to the last bit.
+        seed: of all random numbers; the same seed gives the same policy, to the last bit, on a kind of processor.
         resume: a run to continue, of the same task, seed and options.
         **options: fields of `dojo.learn.GradientSearchOptions`.
 

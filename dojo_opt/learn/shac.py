@@ -318,7 +318,8 @@ def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options:
 
     Args:
         task: the task to learn.
-        seed: of all random numbers; the same seed gives the same policy, to the last bit, on any number of cores.
+        seed: of all random numbers; the same seed gives the same policy, to the last bit, on any number of cores of a
+            kind of processor; others multiply matrices in another order.
         resume: a run to continue, of the same task, seed and options: epochs that are done are not done again.
         **options: fields of `dojo.learn.ShacOptions`; by default those of `task.settings`.
 
