@@ -20,6 +20,7 @@ _LEAST_LETTERS, _MOST_LETTERS = 4, 60  # of a word whose letters are looked for 
 _LONG = 8192  # numbers; OpenBLAS divides products of 10,000 and more among threads
 _LONGEST = 200  # characters of a value in a message
 UNIT = 1e-3  # by how much the length of a quaternion may be off, as one typed with four digits is
+_ROUNDED_LENGTH = 4.0 * float(np.finfo(np.float64).eps)  # off 1: that of a vector that was scaled
 LARGEST = 2**53  # up to which floats hold all whole numbers
 _FLOAT = np.dtype(np.float64)  # `is` takes a tenth of the time of ==
 
@@ -171,7 +172,7 @@ def direction(call: str, value: Any) -> tuple[float, ...]:
     length = float(np.linalg.norm(out))
     if length < 1e-9:
         raise ValueError(f"{call}: expected a direction, got the zero vector")
-    return tuple(float(x) for x in out / length)
+    return _scaled(out, length)
 
 
 def quaternion(call: str, value: Any) -> tuple[float, ...]:
@@ -180,7 +181,12 @@ def quaternion(call: str, value: Any) -> tuple[float, ...]:
     length = float(np.linalg.norm(out))
     if abs(length - 1.0) > UNIT:
         raise ValueError(f"{call}: expected a unit quaternion (w, x, y, z), got length {length:g}")
-    return tuple(float(x) for x in out / length)
+    return _scaled(out, length)
+
+
+def _scaled(vector: Floats, length: float) -> tuple[float, ...]:
+    """The vector over its length; as it is where that is 1 but for rounding: loaded parts have the same bits."""
+    return tuple(vector.tolist() if abs(length - 1.0) <= _ROUNDED_LENGTH else (vector / length).tolist())
 
 
 def name(call: str, value: Any) -> str:

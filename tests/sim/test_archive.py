@@ -41,6 +41,16 @@ def test_terrain_and_collisions_come_back():
     np.testing.assert_array_equal(found.collisions[0].shape_b.vertices, given.collisions[0].shape_b.vertices)
 
 
+def test_parts_that_are_made_again_have_the_same_bits():
+    """An axis that was scaled to length one once more would change in its last digit, and the motion with it."""
+    rng = np.random.default_rng(4)
+    for axis, quaternion in zip(rng.normal(size=(200, 3)), rng.normal(size=(200, 4)), strict=True):
+        turn = quaternion / np.linalg.norm(quaternion)
+        first = dojo.Joint("revolute", None, "b", axis=axis, orientation=turn)
+        again = dojo.Joint("revolute", None, "b", axis=first.axis, orientation=first.orientation)
+        assert (first.axis, first.orientation) == (again.axis, again.orientation)
+
+
 def test_a_trajectory_comes_back_and_goes_on(tmp_path):
     sim = Simulator(dojo.models.block(), time_step=0.02)
     made = sim.rollout(sim.neutral(), steps=5)
