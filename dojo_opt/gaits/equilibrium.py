@@ -105,7 +105,7 @@ def _off_stops(sim: Simulator, x: Floats) -> Floats:
         ValueError: a joint is beyond its stop.
     """
     out, h = x.copy(), sim.time_step
-    load = float(np.abs(potential_gradient(sim, x)).max(initial=0.0))
+    load = _weight(sim, x)
     q, (lo, hi) = x[: sim.nq], sim.mechanism.coordinate_limits
     span = np.where(np.isfinite(lo) & np.isfinite(hi), hi - lo, 1.0)
     beyond = (q < lo - 1e-9 * span) | (q > hi + 1e-9 * span)
@@ -188,7 +188,7 @@ class _Rest(NamedTuple):
         near: how far above the lowest contact of its body another one may carry [m].
         """
         sim, feet, (_, allowed, loose) = self.sim, self.feet, self.motions
-        weight = float(np.abs(potential_gradient(sim, state)).max())
+        weight = _weight(sim, state)
         for _ in range(iterations):
             down, up, cosine = _under(feet, state)
             gap = feet.gaps(state)
@@ -240,7 +240,7 @@ class _Rest(NamedTuple):
     def leaned(self, state: Floats, iterations: int) -> Floats:
         """The state that shifts its weight over its contacts, where these are too few to carry it as it is."""
         sim, allowed = self.sim, self.motions.allowed
-        weight = float(np.abs(potential_gradient(sim, state)).max())
+        weight = _weight(sim, state)
         for _ in range(_LEANS):
             state = self.standing(state, _LOWEST[-1], iterations)
             left = self.balance(state, allowed, sim.kappa).left
@@ -295,7 +295,7 @@ class _Rest(NamedTuple):
             down = _under(feet, state)[0] @ along
             by = along @ np.linalg.lstsq(down[short > 0.0], 1.1 * short[short > 0.0], rcond=_RANK)[0]
             state = self.motions.move(sim, state, by)
-        weight = float(np.abs(potential_gradient(sim, state)).max())
+        weight = _weight(sim, state)
         kappa = max(sim.kappa, _NEAR * sim.time_step * weight / len(feet.names))
         while True:
             state = self.sunk(state, kappa)
@@ -425,9 +425,14 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     return _with_velocity(sim, found, u), u
 
 
+def _weight(sim: Simulator, state: Floats) -> float:
+    """Largest generalised force of gravity and springs, beside which others are small [N, N m]."""
+    return float(np.abs(potential_gradient(sim, state)).max(initial=0.0))
+
+
 def _level(sim: Simulator, state: Floats) -> float:
     """The kappa with gaps that rounding leaves right, at least [N s m]."""
-    weight = float(np.abs(potential_gradient(sim, state)).max(initial=0.0))
+    weight = _weight(sim, state)
     return _ROUNDED * _size(sim, state) * sim.time_step * weight
 
 
@@ -449,7 +454,7 @@ def _pressed_harder(sim: Simulator, state: Floats, kappa: float) -> Floats:
         feet = Feet(sim, names)
         down, _, cosine = _under(feet, state)
         rows, distances, slopes = [*rows, down], [*distances, feet.gaps(state)], [*slopes, cosine]
-    weight = float(np.abs(potential_gradient(sim, state)).max(initial=0.0))
+    weight = _weight(sim, state)
     force = sim.kappa / (sim.time_step * np.concatenate(slopes) * np.concatenate(distances))
     loaded = force > _UNLOADED * weight
     distance, along = np.concatenate(distances)[loaded], np.concatenate(rows)[loaded] @ motions.allowed
@@ -486,7 +491,7 @@ def _with_velocity(sim: Simulator, state: Floats, u: Floats) -> Floats:
 def _at_rest(sim: Simulator, x: Floats, iterations: int) -> tuple[Floats, Floats]:
     """`equilibrium` near a state (nx,) without velocity, at a kappa that rounding allows."""
     mech, state = sim.mechanism, sim.close(_off_stops(sim, x))
-    weight = float(np.abs(potential_gradient(sim, state)).max(initial=0.0))
+    weight = _weight(sim, state)
     most = max(_LEFT * weight, _NOTHING * sum(body.mass for body in mech.bodies))
     if not mech.ground_contact_names:
         load = potential_gradient(sim, state) - stop_torques(sim, state)
@@ -503,7 +508,7 @@ def _on_ground(
 ) -> tuple[Floats, Floats]:
     """The state of rest near `state` of a robot with contacts, and the inputs; most: imbalance that may remain."""
     mech, names = sim.mechanism, sim.mechanism.ground_contact_names
-    weight = float(np.abs(potential_gradient(sim, state)).max(initial=0.0))
+    weight = _weight(sim, state)
     rest = _Rest(sim, Feet(sim, names), motions)
     found, load, force = _on_contacts(rest, state, most, iterations)
     gaps, left = rest.feet.gaps(found), motions.left(load)
@@ -526,7 +531,7 @@ def _on_contacts(rest: _Rest, state: Floats, most: float, iterations: int) -> tu
     searches: list[Callable[[], Floats]] = [lambda: state]  # it may float, or rest already
     searches += [partial(rest.standing, state, near, iterations) for near in _LOWEST]
     searches += [partial(rest.leaned, state, iterations), partial(rest.settled, state)]
-    heavy = most <= _LEFT * float(np.abs(potential_gradient(rest.sim, state)).max(initial=0.0))
+    heavy = most <= _LEFT * _weight(rest.sim, state)
     first = best = None
     least = np.inf
     for k, search in enumerate(searches):

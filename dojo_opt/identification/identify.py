@@ -280,14 +280,7 @@ def identify(
             so far, INTERRUPTED, by the windows that it has got to; None before its first predictions.
     """
     call = "identify"
-    if not isinstance(sim, Simulator):
-        raise TypeError(f"{call}(sim): expected a Simulator, got {sim!r}")
-    if sim.order > 2 or sim.accuracy is not None:
-        kind, way = (f"order {sim.order}", "order=2") if sim.accuracy is None else ("an accuracy", "accuracy=None")
-        raise ValueError(
-            f"{call}(sim): expected steps of order 2, which have derivatives by parameters, got {kind}; use "
-            f"sim.replace({way}), and motions with its velocities"
-        )
+    _check_simulator(call, sim)
     if "starts" in options:  # its name until version 0.2
         renamed_keywords(call, options, {"starts": "fits"})
         fits = options.pop("fits")
@@ -313,6 +306,18 @@ def identify(
     except KeyboardInterrupt as stop:
         raise Interrupted(_best(found) if found else getattr(stop, "result", None)) from None
     return _best(found)
+
+
+def _check_simulator(call: str, sim: Any) -> None:
+    """Refuse what is no Simulator, or one whose steps have no derivatives by parameters."""
+    if not isinstance(sim, Simulator):
+        raise TypeError(f"{call}(sim): expected a Simulator, got {sim!r}")
+    if sim.order > 2 or sim.accuracy is not None:
+        kind, way = (f"order {sim.order}", "order=2") if sim.accuracy is None else ("an accuracy", "accuracy=None")
+        raise ValueError(
+            f"{call}(sim): expected steps of order 2, which have derivatives by parameters, got {kind}; use "
+            f"sim.replace({way}), and motions with its velocities"
+        )
 
 
 def _best(found: list[Identified]) -> Identified:

@@ -64,8 +64,9 @@ def stewart(
         leg = top + np.array([0.0, 0.0, height]) - foot
         length = float(np.linalg.norm(leg))
         bodies += [Body(f"{name}_{k}", leg_mass, shape=Cylinder(r, length / 2)) for name, r in _RADII.items()]
-        joints += _leg_joints(k, foot, leg, spring, damper)
-        end, upright = (0.0, 0.0, length / 4), np.array(from_z(leg / length)) * (1.0, -1.0, -1.0, -1.0)
+        turn = np.array(from_z(leg / length))
+        joints += _leg_joints(k, foot, turn, length, spring=spring, damper=damper)
+        end, upright = (0.0, 0.0, length / 4), turn * (1.0, -1.0, -1.0, -1.0)
         closing.append(Joint("spherical", f"rod_{k}", "plate", f"ball_{k}", end, top, orientation=upright, close=k > 0))
     bodies.append(Body("plate", plate_mass, shape=Cylinder(plate_radius, 0.03)))
     return Mechanism(
@@ -77,14 +78,12 @@ def stewart(
     )
 
 
-def _leg_joints(k: int, foot: Floats, leg: Floats, spring: float, damper: float) -> list[Joint]:
-    """The joints of leg k, a vector from its foot on the ground: its hinge there, and its slider."""
-    length = float(np.linalg.norm(leg))
-    turn, low = from_z(leg / length), (0.0, 0.0, -length / 4)
-    slider: dict[str, Any] = {"parent_point": (0.0, 0.0, length / 2), "spring": spring, "damper": damper}
+def _leg_joints(k: int, foot: Floats, turn: Floats, length: float, **slider: Any) -> list[Joint]:
+    """The joints of leg k with its foot on the ground, turned from the vertical: its hinge, and its slider."""
+    low, top = (0.0, 0.0, -length / 4), (0.0, 0.0, length / 2)
     return [
         Joint("orbital", None, f"cylinder_{k}", f"hinge_{k}", foot, low, orientation=turn),
-        Joint("prismatic", f"cylinder_{k}", f"rod_{k}", f"slider_{k}", **slider),
+        Joint("prismatic", f"cylinder_{k}", f"rod_{k}", f"slider_{k}", top, **slider),
     ]
 
 

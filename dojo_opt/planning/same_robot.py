@@ -67,12 +67,13 @@ def check_same_velocities(call: str, sim: Simulator, other: Any) -> None:
     Raises:
         ValueError: the velocities are of the other kind.
     """
-    nodes, wanted = (s is not None and (s.order > 2 or s.accuracy is not None) for s in (other, sim))
-    if other is not None and nodes != wanted:
-        raise ValueError(
-            f"{call}: expected velocities that are {_KINDS[wanted]}, as the simulator has them, got {_KINDS[nodes]}; "
-            "use a simulator of the same order"
-        )
+    if other is None or bool(sim.mean_over) == bool(other.mean_over):
+        return
+    wanted, got = _KINDS if sim.mean_over else reversed(_KINDS)
+    raise ValueError(
+        f"{call}: expected velocities that are {wanted}, as the simulator has them, got {got}; use a simulator of the "
+        "same order"
+    )
 
 
 def check_same_knots(call: str, plan: Any, knot_time: float, owner: str) -> None:

@@ -22,7 +22,7 @@ class LoaderChoices(NamedTuple):
     joint_friction: bool  # whether joints have the dry friction of the file
     gravity: tuple[float, ...]  # (3,) [m/s^2]
     itself: bool  # whether all bodies but neighbours collide
-    turning_friction: bool = False  # whether contacts have the torsional and rolling friction of the file
+    turning_friction: bool  # whether contacts have the torsional and rolling friction of the file
 
 
 def loader_choices(
@@ -35,7 +35,7 @@ def loader_choices(
     joint_friction: bool,
     gravity: ArrayLike,
     collisions: str | None,
-    turning_friction: bool = False,
+    turning_friction: bool,
 ) -> LoaderChoices:
     """The checked choices; a ValueError names the call."""
     if collisions is not None:

@@ -14,7 +14,7 @@ from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.memory_limit import check_room
 from sim.model.state_columns import BodyState
-from sim.simulator.engines.engine import REPORT, Engine, contact_rows
+from sim.simulator.engines.engine import REPORT, Engine
 from solvers.status import MESSAGES, Status
 from solvers.types import Floats
 
@@ -99,7 +99,8 @@ class Arguments:
 
     def check_room(self, method: str, name: str, rows: int, slopes: int) -> None:
         """Refuse more steps than the memory holds: states, inputs, reports, contacts and derivatives."""
-        each = self.nx + self.nu + REPORT + contact_rows(self._engine.sizes).size + slopes
+        _, contacts, columns = self._engine.no_outputs[0].shape
+        each = self.nx + self.nu + REPORT + contacts * columns + slopes
         check_room(
             f"Simulator.{method}({name})",
             rows,

@@ -118,7 +118,18 @@ def load_urdf(
     ]
     choice = mesh_choices(meshes, robot.links), whole_number("load_urdf(mesh_corners=...)", mesh_corners, 4)
     robot = _bouncing(robot, restitution, notes)
-    robot = robot if checks.flag("load_urdf(turning_friction=...)", turning_friction) else _sliding(robot, notes)
+    shared = loader_choices(
+        "load_urdf",
+        ground=ground,
+        friction=friction,
+        law=law,
+        rim_points=rim_points,
+        joint_friction=joint_friction,
+        gravity=gravity,
+        collisions=collisions,
+        turning_friction=turning_friction,
+    )
+    robot = robot if shared.turning_friction else _sliding(robot, notes)
     every = contacts is None or ALL in as_list(contacts)
     robot = with_shapes(robot, file, choice, folders, ground and every, notes)
     loops = read_loops(root, robot, notes)
@@ -134,16 +145,7 @@ def load_urdf(
         position=checks.vector("load_urdf(position=...)", position, 3),
         actuated=None if actuated is None else tuple(actuated),
         contacts=contacts if ground else (),
-        shared=loader_choices(
-            "load_urdf",
-            ground=ground,
-            friction=friction,
-            law=law,
-            rim_points=rim_points,
-            joint_friction=joint_friction,
-            gravity=gravity,
-            collisions=collisions,
-        ),
+        shared=shared,
     )
     return assemble(robot, loops, choices, notes)
 
@@ -164,10 +166,12 @@ def _sliding(robot: Robot, notes: Notes) -> Robot:
     """The robot without torsional and rolling friction."""
     given = [name for name, link in robot.links.items() if link.torsional_friction or link.rolling_friction]
     if given:
-        text = (
-            "torsional and rolling friction is omitted (<spinning_friction>, <rolling_friction>; turning_friction=True"
+        notes.add(
+            "torsional and rolling friction is omitted (<spinning_friction>, <rolling_friction>; "
+            "turning_friction=True has it)",
+            given,
+            warn=True,
         )
-        notes.add(f"{text} has it)", given, warn=True)
     links = {name: replace(link, torsional_friction=None, rolling_friction=None) for name, link in robot.links.items()}
     return replace(robot, links=links)
 
